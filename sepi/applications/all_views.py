@@ -23,7 +23,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.applications.carried_map import MOST_STRETCHED, TOLERANCE, corner_disparities
+from sepi.applications.carried_map import TOLERANCE, corner_disparities
 from sepi.built_in_variants import DEFAULT_VARIANT
 from sepi.errors import SepiError
 from sepi.kernels import all_views as kernels
@@ -32,9 +32,6 @@ from sepi.pipeline import estimate_depth
 from sepi.stage import ERROR_BARS, Progress, StageMaps, no_progress
 from sepi.validation import require_type
 from sepi.variants import Variant
-
-LEAST_WEIGHT = 0.05
-"""Vote of a map where its confidence is 0, beside 1: beside depth steps all are small, and there they differ."""
 
 EDGE_VIEWS = 25
 """Views that each view is compared with at its depth steps, at least."""
@@ -64,24 +61,6 @@ class Sources(NamedTuple):
     bars: FloatMap
     corners: FloatMap
     baselines: npt.NDArray[np.float64]
-
-
-class Rules(NamedTuple):
-    """When maps agree.
-
-    Attributes
-    ----------
-    most_stretched : float
-        A surface seen more than so many times larger than in its map's view is not carried.
-    tolerance : float
-        Disparities that differ by no more are of one surface, pixels per view step.
-    least_weight : float
-        Of a map where its confidence is 0.
-    """
-
-    most_stretched: float
-    tolerance: float
-    least_weight: float
 
 
 class ViewMaps(NamedTuple):
@@ -320,11 +299,10 @@ def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int
     """What the carried maps say of some views."""
     shape = (len(places), *light_field.shape)
     disparity, confidence, extended = np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, bool)
-    rules = Rules(MOST_STRETCHED, TOLERANCE, LEAST_WEIGHT)
     baselines = np.ascontiguousarray(light_field.baselines[tuple(places.T)])
     told = len(sources.bars) > 0
     bars = np.empty((*shape, 3) if told else (len(places), 0, 0, 3), np.float32)
-    kernels.maps_of_views(sources, rules, baselines, disparity, confidence, bars, extended)
+    kernels.maps_of_views(sources, baselines, disparity, confidence, bars, extended)
     positions = [(int(t), int(s)) for t, s in places]
     views = [ViewMaps(*of_view) for of_view in zip(positions, disparity, confidence, extended, strict=True)]
     if not told:

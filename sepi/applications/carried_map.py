@@ -8,11 +8,8 @@ import numpy.typing as npt
 from sepi.kernels import all_views as kernels
 from sepi.lightfield import BoolMap, FloatMap
 
-TOLERANCE = 0.1
+TOLERANCE: float = kernels.TOLERANCE
 """Disparities that differ by no more are of one surface, pixels per view step."""
-
-MOST_STRETCHED = 2.0
-"""A surface that a view sees so many times larger than the map's view did is left to maps that saw it better."""
 
 
 def carried_map(disparity: FloatMap, baseline: tuple[float, float], known: BoolMap | None = None) -> FloatMap:
@@ -68,7 +65,7 @@ def corner_disparities(disparity: FloatMap) -> FloatMap:
         Top left, top right, bottom right, bottom left.
     """
     corners = np.empty((*disparity.shape, 4), np.float32)
-    kernels.corner_disparities(np.ascontiguousarray(disparity, np.float32), TOLERANCE, corners)
+    kernels.corner_disparities(np.ascontiguousarray(disparity, np.float32), corners)
     return corners
 
 
@@ -81,7 +78,7 @@ def _carried(
         # compiled code knows no NaN; behind all else, what is unknown hides nothing
         disparity = np.where(known, disparity, disparity[known].min(initial=0) - np.float32(1))
     disparity = np.ascontiguousarray(disparity, np.float32)
-    kernels.carry(disparity, corner_disparities(disparity), *baseline, MOST_STRETCHED, nearest, origin)
+    kernels.carry(disparity, corner_disparities(disparity), *baseline, nearest, origin)
     if known is not None:
         origin[~known.ravel()[origin]] = -1
     nearest[origin < 0] = np.nan

@@ -82,3 +82,8 @@ namespace sepi {
 using Unlocked = nanobind::call_guard<nanobind::gil_scoped_release>;
 
 }  // namespace sepi
+
+// What all bindings say
+namespace nb = nanobind;
+using namespace nb::literals;
+using sepi::Unlocked;

@@ -50,6 +50,9 @@ struct Place {
     // its mirrored samples.
     Index below() const { return row + (fy > 0); }
     Index right() const { return column + (fx > 0); }
+
+    // Row and column of the pixel that is nearest.
+    std::array<Index, 2> nearest() const { return {row + (fy >= 0.5), column + (fx >= 0.5)}; }
 };
 
 // A place in a picture (H, W), unless it lies outside, or is not known.

@@ -84,21 +84,17 @@ def render_shot(name: str, shot: Shot, *, camera: Camera, size: int = 192) -> Po
     normals = np.column_stack([across, down, a + camera.offset + (b + c) * middle]) / camera.scale
     boxes, pinhole = boxes_round(scene), np.array([camera.focal_px, middle, middle])
 
-    def hits(samples: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
-        y, x = ((np.indices((shot.lens.height * samples, shot.lens.width * samples)) + 0.5) / samples - 0.5).reshape(
-            2, -1
-        )
-        rays = shot.lens.rays(np.column_stack([x, y])) @ shot.rotation
-        owner, found = np.empty(len(rays), np.int64), np.full((len(rays), 3), np.inf)
+    def met(samples: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Depths and colours of what rays through so many samples per pixel and direction meet."""
+        y, x = (np.indices((shot.lens.height * samples, shot.lens.width * samples)) + 0.5) / samples - 0.5
+        rays = shot.lens.rays(np.column_stack([x.ravel(), y.ravel()])) @ shot.rotation
+        depths, colours = np.empty(len(rays)), np.empty((len(rays), 3))
         origin = np.ascontiguousarray(shot.centre, np.float64)
-        kernels.cast(scene, boxes, normals, origin, rays, pinhole, owner, found)
-        return owner, found
+        kernels.cast(scene, boxes, normals, origin, rays, pinhole, depths, colours)
+        return depths, colours
 
-    owner, found = hits(_SAMPLES)
-    colours = np.empty((owner.size, 3))
-    kernels.colours_at(scene, owner, found, colours)
     shape = shot.lens.height, shot.lens.width
-    mean = colours.reshape(shape[0], _SAMPLES, shape[1], _SAMPLES, 3).mean(axis=(1, 3))
+    mean = met(_SAMPLES)[1].reshape(shape[0], _SAMPLES, shape[1], _SAMPLES, 3).mean(axis=(1, 3))
     # rays have z = 1: their lengths are depths
-    depth = hits(1)[1][:, 0].reshape(shape).astype(np.float32)
+    depth = met(1)[0].reshape(shape).astype(np.float32)
     return Posed(np.round(np.clip(mean, 0, 1) * 255).astype(np.uint8), depth)

@@ -142,7 +142,7 @@ def test_carried_surfaces_are_what_plain_numpy_draws(v: float, u: float) -> None
     disparity = bumpy_map()
     corners = corner_disparities(disparity)
     nearest, origin = np.empty_like(disparity), np.empty(disparity.shape, np.int32)
-    kernels.carry(disparity, corners, v, u, 2.0, nearest, origin)
+    kernels.carry(disparity, corners, v, u, nearest, origin)
     np.testing.assert_allclose(nearest, plain_carry(disparity, corners, v, u, 2.0), atol=1e-4)
     seen = origin >= 0
     np.testing.assert_array_equal(seen, nearest != kernels.EMPTY)

@@ -30,9 +30,10 @@ struct Point {
 };
 
 // Draw a triangle of a pixel, clockwise in its own view, into a view's maps.
-void draw_triangle(Point a, Point b, Point c, double most_area, std::int32_t pixel, Array<float, 2> nearest, Array<std::int32_t, 2> origin) {
+void draw_triangle(Point a, Point b, Point c, std::int32_t pixel, Array<float, 2> nearest, Array<std::int32_t, 2> origin) {
     const double area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-    if (!(0.5 * EDGE_ON < area && area <= most_area)) return;
+    // in its own view the triangle is a quarter of a pixel
+    if (!(0.5 * EDGE_ON < area && area <= 0.5 * MOST_STRETCHED)) return;
     // the pixels along an axis of n that it may touch: mostly one, or none
     const auto touched = [](double p, double q, double r, Index n) {
         const auto [least, most] = std::minmax({p, q, r});
@@ -55,7 +56,6 @@ void draw_triangle(Point a, Point b, Point c, double most_area, std::int32_t pix
 // Maps that are carried to a view v down and u across from the reference view, and what they say of it.
 struct Fusion {
     const Sources &sources;
-    const Rules &rules;
     const double v, u;
 
     // What a map shows at a pixel of the view.
@@ -77,7 +77,7 @@ struct Fusion {
     void fuse(Array<float, 2> disparity, Array<float, 2> confidence, Array<float, 3> bars) {
         for (Index n = 0; n < N; ++n) {
             closeness[n] = float(1 / (1 + std::hypot(down(n), across(n))));
-            carry(sources.disparity[n], sources.corners[n], down(n), across(n), rules.most_stretched, nearest.array()[n], origin.array()[n]);
+            carry(sources.disparity[n], sources.corners[n], down(n), across(n), nearest.array()[n], origin.array()[n]);
         }
         for (Index y = 0; y < H; ++y) {
             for (Index x = 0; x < W; ++x) {
@@ -86,7 +86,7 @@ struct Fusion {
                 // of the maps that agree with the best, the mean
                 float total = 0, belief = 0, weight = 0, sums[3] = {};
                 for (const Shown &map : maps) {
-                    if (!(map.disparity > EMPTY) || std::abs(map.disparity - best) > rules.tolerance) continue;
+                    if (!(map.disparity > EMPTY) || std::abs(map.disparity - best) > TOLERANCE) continue;
                     total += map.weight * (map.disparity - best);
                     belief += map.weight * map.confidence;
                     weight += map.weight;
@@ -105,7 +105,7 @@ struct Fusion {
         const Index row = pixel / std::int32_t(W), column = pixel % std::int32_t(W);
         const float believed = pixel >= 0 ? sources.confidence(n, row, column) : 0;
         const float *bars = pixel >= 0 && sources.bars.shape[0] > 0 ? sources.bars.at(n, row, column) : nullptr;
-        return {nearest.array()(n, y, x), believed, closeness[n] * (rules.least_weight + believed), bars};
+        return {nearest.array()(n, y, x), believed, closeness[n] * (LEAST_WEIGHT + believed), bars};
     }
 
     // The disparity that most maps are for, if they differ.
@@ -113,7 +113,7 @@ struct Fusion {
         float low = FARTHER, high = EMPTY, most = -FARTHER;
         for (const Shown &map : maps)
             if (map.disparity > EMPTY) low = std::min(low, map.disparity), high = std::max(high, map.disparity);
-        if (!(high > low + rules.tolerance)) return high;
+        if (!(high > low + TOLERANCE)) return high;
         float best = high;
         for (const Shown &map : maps) {
             if (!(map.disparity > EMPTY)) continue;
@@ -126,12 +126,12 @@ struct Fusion {
     float score(Index y, Index x, float d) const {
         float sum = 0;
         for (Index n = 0; n < N; ++n) {
-            if (std::abs(maps[n].disparity - d) <= rules.tolerance) {
+            if (std::abs(maps[n].disparity - d) <= TOLERANCE) {
                 sum += maps[n].weight;
             } else if (maps[n].disparity < d) {
                 // it shows only what is behind, where it would show the surface
                 const auto place = place_within(y + d * down(n), x + d * across(n), H, W);
-                const auto is_behind = [&](Index i, Index j) { return sources.disparity(n, i, j) < d - rules.tolerance; };
+                const auto is_behind = [&](Index i, Index j) { return sources.disparity(n, i, j) < d - TOLERANCE; };
                 if (place && all_about(*place, is_behind)) sum -= maps[n].weight;
             }
         }
@@ -169,7 +169,7 @@ void extend_background(double v, double u, Array<float, 2> disparity, Array<bool
 
 }  // namespace
 
-void corner_disparities(Array<const float, 2> disparity, float tolerance, Array<float, 3> out) {
+void corner_disparities(Array<const float, 2> disparity, Array<float, 3> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const Scratch<float, 3> slopes(2, H, W);
     const auto said = [&](Index y, Index x, auto down, auto across) {
@@ -189,7 +189,7 @@ void corner_disparities(Array<const float, 2> disparity, float tolerance, Array<
                 for (const Index j : {x + (across > 0) - 1, x + (across > 0)}) {
                     if (i < 0 || j < 0 || i >= H || j >= W) continue;
                     const float value = said(i, j, float(y - i) + float(down), float(x - j) + float(across));
-                    if (std::abs(value - mine) <= tolerance) total += value, ++count;
+                    if (std::abs(value - mine) <= TOLERANCE) total += value, ++count;
                 }
             }
             out(y, x, corner) = count > 0 ? total / count : float(mine);
@@ -197,8 +197,7 @@ void corner_disparities(Array<const float, 2> disparity, float tolerance, Array<
     });
 }
 
-void carry(Array<const float, 2> disparity, Array<const float, 3> corners, double v, double u, double most_stretched, Array<float, 2> nearest,
-           Array<std::int32_t, 2> origin) {
+void carry(Array<const float, 2> disparity, Array<const float, 3> corners, double v, double u, Array<float, 2> nearest, Array<std::int32_t, 2> origin) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     for (Index y = 0; y < H; ++y) {
         std::fill_n(nearest.at(y), W, EMPTY);
@@ -213,19 +212,18 @@ void carry(Array<const float, 2> disparity, Array<const float, 3> corners, doubl
             Point before = at(3);
             for (Index corner = 0; corner < 4; ++corner) {
                 const Point here = at(corner);
-                // twice the area of a quarter of a pixel
-                draw_triangle(middle, before, here, 0.5 * most_stretched, std::int32_t(y * W + x), nearest, origin);
+                draw_triangle(middle, before, here, std::int32_t(y * W + x), nearest, origin);
                 before = here;
             }
         }
     }
 }
 
-void maps_of_views(const Sources &sources, const Rules &rules, Array<const double, 2> baselines, Array<float, 3> disparity, Array<float, 3> confidence,
-                   Array<float, 4> bars, Array<bool, 3> extended) {
+void maps_of_views(const Sources &sources, Array<const double, 2> baselines, Array<float, 3> disparity, Array<float, 3> confidence, Array<float, 4> bars,
+                   Array<bool, 3> extended) {
     parallel_for(0, baselines.shape[0], [&](Index view) {
         const double v = baselines(view, 0), u = baselines(view, 1);
-        Fusion{sources, rules, v, u}.fuse(disparity[view], confidence[view], bars[view]);
+        Fusion{sources, v, u}.fuse(disparity[view], confidence[view], bars[view]);
         // gaps open beside the reference view's surfaces, for it is those that most of the maps are made of
         extend_background(v, u, disparity[view], extended[view]);
     });

@@ -12,7 +12,10 @@
 
 namespace sepi {
 
-constexpr float EMPTY = -1e9f;  // disparity where no surface is seen: nothing is nearer
+constexpr float EMPTY = -1e9f;          // disparity where no surface is seen: nothing is nearer
+constexpr float TOLERANCE = 0.1f;       // disparities that differ by no more are of one surface, pixels per view step
+constexpr double MOST_STRETCHED = 2;    // a surface that a view sees so many times larger is left to maps that saw it better
+constexpr float LEAST_WEIGHT = 0.05f;   // vote of a map where its confidence is 0: beside depth steps all are small, and there they differ
 
 // The maps that are carried: the fields of sepi.applications.all_views.Sources, in their order.
 struct Sources {
@@ -24,27 +27,18 @@ struct Sources {
     auto fields() { return std::tie(disparity, confidence, bars, corners, baselines); }
 };
 
-// When maps agree: the fields of sepi.applications.all_views.Rules, in their order.
-struct Rules {
-    double most_stretched;
-    float tolerance, least_weight;
-
-    auto fields() { return std::tie(most_stretched, tolerance, least_weight); }
-};
-
 // Disparity at the corners of each pixel of a map (H, W), clockwise from the top left, out (H, W, 4). Pixels that meet
 // in a corner belong together where what they say of it differs by no more than the tolerance.
-void corner_disparities(Array<const float, 2> disparity, float tolerance, Array<float, 3> out);
+void corner_disparities(Array<const float, 2> disparity, Array<float, 3> out);
 
 // The surfaces of a map as a view sees them that stands v down and u across from the map's: the nearest disparity
-// (H, W), EMPTY where there is none, and the number of the map's pixel that is seen, or -1. What it sees stretched more
-// than so many times is left out.
-void carry(Array<const float, 2> disparity, Array<const float, 3> corners, double v, double u, double most_stretched, Array<float, 2> nearest,
-           Array<std::int32_t, 2> origin);
+// (H, W), EMPTY where there is none, and the number of the map's pixel that is seen, or -1. What it sees stretched too
+// much is left out.
+void carry(Array<const float, 2> disparity, Array<const float, 3> corners, double v, double u, Array<float, 2> nearest, Array<std::int32_t, 2> origin);
 
 // The maps (V, H, W) of views with baselines (V, 2), bars (V, H, W, 3) where the sources have them, and where no source
 // shows anything and the background was extended.
-void maps_of_views(const Sources &sources, const Rules &rules, Array<const double, 2> baselines, Array<float, 3> disparity, Array<float, 3> confidence,
-                   Array<float, 4> bars, Array<bool, 3> extended);
+void maps_of_views(const Sources &sources, Array<const double, 2> baselines, Array<float, 3> disparity, Array<float, 3> confidence, Array<float, 4> bars,
+                   Array<bool, 3> extended);
 
 }  // namespace sepi

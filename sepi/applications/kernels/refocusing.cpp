@@ -8,31 +8,6 @@
 namespace sepi {
 namespace {
 
-// The neighbours of a sample along an axis of n pixels, and their weights. Beyond its border a view goes on as it ends.
-struct Neighbours {
-    Index offsets[4];
-    std::array<float, 4> weights;
-
-    Neighbours(double position, Index n, Index stride) : weights(cubic_weights(position - std::floor(position))) {
-        for (Index i = 0; i < 4; ++i) offsets[i] = stride * clamped(Index(position) + i - 1, n);
-    }
-};
-
-// Sample of all channels, less a colour: exactly 0 where all pixels equal it.
-template <int C>
-std::array<float, C> difference(const float *view, const Neighbours &rows, const Neighbours &columns, const float *colour) {
-    std::array<float, C> total = {};
-    for (Index i = 0; i < 4; ++i) {
-        std::array<float, C> part = {};
-        for (Index j = 0; j < 4; ++j) {
-            const float *pixel = view + rows.offsets[i] + columns.offsets[j];
-            for (Index c = 0; c < C; ++c) part[c] += columns.weights[j] * (pixel[c] - colour[c]);
-        }
-        for (Index c = 0; c < C; ++c) total[c] += rows.weights[i] * part[c];
-    }
-    return total;
-}
-
 // Over which a point moves while the camera moves through its cell, pixels.
 struct Box {
     float height, width;
@@ -48,34 +23,33 @@ struct Box {
     }
 };
 
-template <int C>
-void add_of_channels(Array<const float, 3> view, double v, double u, Array<const float, 2> disparity, Array<const float, 2> nearest, float margin,
-                     Array<const float, 3> centre, float scale2, Array<float, 3> sums, Array<float, 2> weights) {
-    const Index H = view.shape[0], W = view.shape[1];
-    parallel_for(0, H, [&](Index y) {
-        for (Index x = 0; x < W; ++x) {
-            const float d = disparity(y, x);
-            const double down = y - d * v, across = x - d * u;
-            // also false for NaN
-            if (!(0 <= down && down <= H - 1 && 0 <= across && across <= W - 1)) continue;
-            if (nearest(Index(down + 0.5), Index(across + 0.5)) > d + margin) continue;
-            const Neighbours rows(down, H, view.strides[0]), columns(across, W, view.strides[1]);
-            const auto found = difference<C>(view.data, rows, columns, centre.at(y, x));
-            float z = 0;
-            for (Index c = 0; c < C; ++c) z += found[c] * found[c];
-            const float ratio = scale2 / (scale2 + z), weight = ratio * ratio;
-            for (Index c = 0; c < C; ++c) sums(y, x, c) += weight * found[c];
-            weights(y, x) += weight;
-        }
-    });
-}
-
 }  // namespace
 
 void add_view(Array<const float, 3> view, double v, double u, Array<const float, 2> disparity, Array<const float, 2> nearest, float margin,
               Array<const float, 3> centre, float scale2, Array<float, 3> sums, Array<float, 2> weights) {
-    const auto add = view.shape[2] == 1 ? add_of_channels<1> : add_of_channels<3>;
-    add(view, v, u, disparity, nearest, margin, centre, scale2, sums, weights);
+    const Index H = view.shape[0], W = view.shape[1], C = view.shape[2];
+    parallel_for_pixels(H, W, [&](Index y, Index x) {
+        const float d = disparity(y, x);
+        const auto place = place_within(y - d * v, x - d * u, H, W);
+        if (!place) return;
+        if (const auto [row, column] = place->nearest(); nearest(row, column) > d + margin) return;
+        const auto down = cubic_weights(place->fy), across = cubic_weights(place->fx);
+        const float *expected = centre.at(y, x);
+        float found[3] = {}, z = 0;
+        for (Index i = 0; i < 4; ++i) {
+            float part[3] = {};
+            for (Index j = 0; j < 4; ++j) {
+                const float *pixel = view.at(clamped(place->row + i - 1, H), clamped(place->column + j - 1, W));
+                // exactly 0 where all pixels are as expected
+                for (Index c = 0; c < C; ++c) part[c] += across[j] * (pixel[c] - expected[c]);
+            }
+            for (Index c = 0; c < C; ++c) found[c] += down[i] * part[c];
+        }
+        for (Index c = 0; c < C; ++c) z += found[c] * found[c];
+        const float ratio = scale2 / (scale2 + z), weight = ratio * ratio;
+        for (Index c = 0; c < C; ++c) sums(y, x, c) += weight * found[c];
+        weights(y, x) += weight;
+    });
 }
 
 void fill_between(Array<const float, 3> sheared, Array<const float, 2> surfaces, float focus, Array<const float, 1> cell, float margin, Array<float, 3> out) {

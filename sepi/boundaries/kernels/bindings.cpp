@@ -3,10 +3,6 @@
 #include "specks.hpp"
 #include "surface_shares.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using sepi::Unlocked;
-
 // The kernels that look at the colours of views, of one type.
 template <class Colour>
 static void bind_of_colours(nb::module_ &background, nb::module_ &surface_shares) {

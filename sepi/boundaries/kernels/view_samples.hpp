@@ -19,7 +19,7 @@ template <class Colour>
 [[gnu::always_inline]] inline std::optional<Place> place_seen(const RimViews<Colour> &views, Index view, float d, Index y, Index x) {
     const auto place = place_in(views, view, d, y, x);
     if (!place) return place;
-    const Index row = place->row + (place->fy >= 0.5), column = place->column + (place->fx >= 0.5);
+    const auto [row, column] = place->nearest();
     return views.nearest(views.places(view, 0), views.places(view, 1), row - views.low, column) <= d + views.margin ? place : std::nullopt;
 }
 

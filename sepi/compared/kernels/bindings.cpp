@@ -9,10 +9,6 @@
 #include "spo.hpp"
 #include "weighted_median.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using sepi::Unlocked;
-
 void bind_compared(nb::module_ &kernels) {
     auto acc = kernels.def_submodule("acc");
     acc.def("turn_phases", &sepi::turn_phases, Unlocked(), "spectrum"_a, "rows"_a, "columns"_a, "out"_a);

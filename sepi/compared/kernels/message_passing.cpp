@@ -34,21 +34,16 @@ void pass_messages(Array<const float, 3> costs, Array<const float, 2> across, Ar
     const Index H = costs.shape[0], W = costs.shape[1], K = costs.shape[2];
     const Scratch<float, 1> beliefs(K);
     float *belief = beliefs.array().data;
-    const auto send_on = [&](Side back, Index y, Index x, float weight, Side out, Index to_y, Index to_x) {
-        send(belief, messages.at(back, y, x), weight, truncation, messages.at(out, to_y, to_x), K);
-    };
-    for (Index y = 0; y < H; ++y) {
-        for (Index x = 0; x < W; ++x) {
+    // forth to what is right and below, and back
+    for (const Index step : {1, -1}) {
+        for (Index n = step > 0 ? 0 : H * W - 1; 0 <= n && n < H * W; n += step) {
+            const Index y = n / W, x = n % W, to_y = y + step, to_x = x + step;
             believe(costs.at(y, x), messages, y, x, belief);
-            if (x + 1 < W) send_on(RIGHT, y, x, across(y, x), LEFT, y, x + 1);
-            if (y + 1 < H) send_on(BELOW, y, x, down(y, x), ABOVE, y + 1, x);
-        }
-    }
-    for (Index y = H - 1; y >= 0; --y) {
-        for (Index x = W - 1; x >= 0; --x) {
-            believe(costs.at(y, x), messages, y, x, belief);
-            if (x > 0) send_on(LEFT, y, x, across(y, x - 1), RIGHT, y, x - 1);
-            if (y > 0) send_on(ABOVE, y, x, down(y - 1, x), BELOW, y - 1, x);
+            const auto send_on = [&](float weight, Side back, Side out, Index i, Index j) {
+                send(belief, messages.at(step > 0 ? back : out, y, x), weight, truncation, messages.at(step > 0 ? out : back, i, j), K);
+            };
+            if (0 <= to_x && to_x < W) send_on(across(y, std::min(x, to_x)), RIGHT, LEFT, y, to_x);
+            if (0 <= to_y && to_y < H) send_on(down(std::min(y, to_y), x), BELOW, ABOVE, to_y, x);
         }
     }
 }

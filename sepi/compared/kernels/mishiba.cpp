@@ -80,24 +80,20 @@ void keep_least(Index k, Array<const float, 3> slopes, Array<const float, 2> con
     const Index last_row = constants.shape[0] - 1, last_column = constants.shape[1] - 1;
     parallel_for(0, labels.shape[0], [&](Index y) {
         const Index i = std::min(y / step, last_row), below = std::min(i + 1, last_row), W = labels.shape[1];
-        const float fy = float(double(y % step) / double(step)), *upper = constants.at(i), *lower = constants.at(below);
-        const auto upper_slopes = slopes[i], lower_slopes = slopes[below], colours = guide[y];
-        const auto kept_in_row = kept[y];
-        std::int64_t *__restrict label = labels.at(y);
+        const float fy = float(double(y % step) / double(step));
         for (Index x = 0, j = 0, beyond = 0; x < W; ++x, ++beyond) {
             if (beyond == step) ++j, beyond = 0;
             const Index right = std::min(j + 1, last_column);
-            const float fx = float(double(beyond) / double(step));
-            const auto [a, b, c, d] = bilinear_weights(fy, fx);
-            const float *colour = colours.at(x), *slope_a = upper_slopes.at(j), *slope_b = upper_slopes.at(right);
-            const float *slope_c = lower_slopes.at(j), *slope_d = lower_slopes.at(right);
-            float cost = a * upper[j] + b * upper[right] + c * lower[j] + d * lower[right];
-            for (Index m = 0; m < 3; ++m) cost += (a * slope_a[m] + b * slope_b[m] + (c * slope_c[m] + d * slope_d[m])) * colour[m];
-            float *own = kept_in_row.at(x);
+            const auto [a, b, c, d] = bilinear_weights(fy, float(double(beyond) / double(step)));
+            const float *slope_a = slopes.at(i, j), *slope_b = slopes.at(i, right), *slope_c = slopes.at(below, j), *slope_d = slopes.at(below, right);
+            float cost = a * constants(i, j) + b * constants(i, right) + c * constants(below, j) + d * constants(below, right);
+            for (Index m = 0; m < 3; ++m) cost += (a * slope_a[m] + b * slope_b[m] + (c * slope_c[m] + d * slope_d[m])) * guide(y, x, m);
+            float *own = kept.at(y, x);
+            std::int64_t &label = labels(y, x);
             if (k == 0 || cost < own[0]) {
-                label[x] = k;
+                label = k;
                 own[0] = cost, own[1] = own[3], own[2] = cost;
-            } else if (label[x] == k - 1) {
+            } else if (label == k - 1) {
                 own[2] = cost;
             }
             own[3] = cost;

@@ -8,24 +8,23 @@
 namespace sepi {
 namespace {
 
-// Bins of one EPI (W, N C), those of all channels numbered through: the lower ones of two, and what counts for the upper ones.
-struct Quantised {
-    Scratch<std::int32_t, 2> bins;
-    Scratch<float, 2> shares;
+// The lower of the two bins that a colour counts for, those of all channels numbered through, and what counts for the upper.
+struct Entry {
+    std::int32_t bin;
+    float share;
 };
 
-Quantised quantised(Array<const float, 4> lines, Index y, Index bins) {
+// Entries of one EPI (W, N C).
+Scratch<Entry, 2> quantised(Array<const float, 4> lines, Index y, Index bins) {
     const Index N = lines.shape[0], C = lines.shape[1], W = lines.shape[3];
-    const float scale = float(bins), most = float(bins - 1);
-    Quantised found{Scratch<std::int32_t, 2>(W, N * C), Scratch<float, 2>(W, N * C)};
+    Scratch<Entry, 2> found(W, N * C);
     for (Index n = 0; n < N; ++n) {
         for (Index c = 0; c < C; ++c) {
             const float *row = lines.at(n, c, y);
             for (Index x = 0; x < W; ++x) {
-                const float place = std::min(std::max(row[x] * scale - 0.5f, 0.0f), most);
+                const float place = std::clamp(row[x] * float(bins) - 0.5f, 0.0f, float(bins - 1));
                 const std::int32_t lower = std::min(std::int32_t(place), std::int32_t(bins - 2));
-                *found.bins.array().at(x, n * C + c) = std::int32_t(c * bins) + lower;
-                *found.shares.array().at(x, n * C + c) = place - float(lower);
+                found.array()(x, n * C + c) = {std::int32_t(c * bins) + lower, place - float(lower)};
             }
         }
     }
@@ -33,14 +32,12 @@ Quantised quantised(Array<const float, 4> lines, Index y, Index bins) {
 }
 
 // Histogram of column x of an EPI, in place of that of an earlier column.
-void count(const Quantised &epi, Index x, Index earlier, float *__restrict histogram) {
-    const Index number = epi.bins.array().shape[1];
-    const std::int32_t *before = epi.bins.array().at(earlier), *lower = epi.bins.array().at(x);
-    const float *share = epi.shares.array().at(x);
-    for (Index i = 0; i < number; ++i) histogram[before[i]] = histogram[before[i] + 1] = 0;
-    for (Index i = 0; i < number; ++i) {
-        histogram[lower[i]] += 1 - share[i];
-        histogram[lower[i] + 1] += share[i];
+void count(Array<Entry, 2> epi, Index x, Index earlier, float *__restrict histogram) {
+    for (Index i = 0; i < epi.shape[1]; ++i) histogram[epi(earlier, i).bin] = histogram[epi(earlier, i).bin + 1] = 0;
+    for (Index i = 0; i < epi.shape[1]; ++i) {
+        const auto [bin, share] = epi(x, i);
+        histogram[bin] += 1 - share;
+        histogram[bin + 1] += share;
     }
 }
 
@@ -78,12 +75,12 @@ void half_distances(Array<const float, 4> lines, Array<const float, 1> weights, 
     const Scratch<float, 1> shares(R);
     for (Index k = 0; k < R; ++k) shares.array()(k) = float(double(weights(k)) / (double(sum) * double(N)));
     parallel_for(0, lines.shape[2], [&](Index y) {
-        const Quantised epi = quantised(lines, y, bins);
+        const auto epi = quantised(lines, y, bins);
         const auto ring = zeros<float, 2>(size, C * bins);
         const Scratch<float, 2> sides(2, C * bins);
         float *left = sides.array().at(0), *right = sides.array().at(1);
         for (Index x = -R; x < W + R; ++x) {
-            count(epi, clamped(x, W), clamped(x - size, W), ring.array().at((x + size) % size));
+            count(epi.array(), clamped(x, W), clamped(x - size, W), ring.array().at((x + size) % size));
             const Index centre = x - R;
             if (centre < 0) continue;
             halves(ring.array(), centre, shares.array(), left, right);

@@ -1,10 +1,6 @@
 #include "kernels/arguments.hpp"
 #include "mixture.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using sepi::Unlocked;
-
 void bind_error_bars(nb::module_ &kernels) {
     auto mixture = kernels.def_submodule("mixture");
     mixture.attr("RIM_WIDTH") = sepi::RIM_WIDTH;

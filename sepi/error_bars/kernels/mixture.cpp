@@ -72,18 +72,16 @@ struct PixelError {
 void describe(const ErrorMixture &mixture, double tail, double close, Array<float, 3> out) {
     // standard deviation of a normal distribution, over its mean absolute value
     const double normal = std::sqrt(std::numbers::pi / 2);
-    parallel_for(0, out.shape[1], [&](Index y) {
-        for (Index x = 0; x < out.shape[2]; ++x) {
-            const auto with_other = [&](float above, float below) {
-                return PixelError{mixture.scale(y, x), mixture.outlier_scale(y, x), mixture.outlier(y, x), mixture.rim(y, x), above, below};
-            };
-            const float above = mixture.above(y, x), below = mixture.below(y, x);
-            const PixelError upwards = with_other(above, below), downwards = with_other(below, above);
-            out(0, y, x) = float(normal * upwards.expected());
-            out(1, y, x) = float(downwards.bound(tail));
-            out(2, y, x) = float(upwards.bound(tail));
-            out(3, y, x) = float(std::max(0.0, 1 - upwards.beyond(close).beyond - downwards.beyond(close).beyond));
-        }
+    parallel_for_pixels(out.shape[1], out.shape[2], [&](Index y, Index x) {
+        const auto with_other = [&](float above, float below) {
+            return PixelError{mixture.scale(y, x), mixture.outlier_scale(y, x), mixture.outlier(y, x), mixture.rim(y, x), above, below};
+        };
+        const float above = mixture.above(y, x), below = mixture.below(y, x);
+        const PixelError upwards = with_other(above, below), downwards = with_other(below, above);
+        out(0, y, x) = float(normal * upwards.expected());
+        out(1, y, x) = float(downwards.bound(tail));
+        out(2, y, x) = float(upwards.bound(tail));
+        out(3, y, x) = float(std::max(0.0, 1 - upwards.beyond(close).beyond - downwards.beyond(close).beyond));
     });
 }
 

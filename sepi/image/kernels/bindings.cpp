@@ -1,10 +1,6 @@
 #include "kernels/arguments.hpp"
 #include "mean_shift.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using sepi::Unlocked;
-
 void bind_image(nb::module_ &kernels) {
     auto mean_shift = kernels.def_submodule("mean_shift");
     mean_shift.def("patch_modes", &sepi::patch_modes, Unlocked(), "planes"_a, "mask"_a, "radius"_a, "unit"_a, "modes"_a);

@@ -31,36 +31,25 @@ Pixels load_pixels(Array<const float, 3> planes, Index y, Index x) {
     return {load(planes.at(0, y, x)), load(planes.at(1, y, x)), load(planes.at(2, y, x)), load(planes.at(3, y, x))};
 }
 
-// Sums over patches of size pixels a side that begin at (y, x), of weights by how near each pixel is to where.
-struct Patches {
-    Float8 total{};
-    Pixels sums{};
-
-    Patches(Array<const float, 3> planes, Index y, Index x, Index size, const Pixels &where) {
-        for (Index v = y; v < y + size; ++v) {
-            const float *rows[] = {planes.at(0, v), planes.at(1, v), planes.at(2, v), planes.at(3, v)};
-            for (Index u = x; u < x + size; ++u) {
-                const Pixels there{load(rows[0] + u), load(rows[1] + u), load(rows[2] + u), load(rows[3] + u)};
-                Float8 apart = there[0] - where[0], distance = apart * apart;
-                for (int c = 1; c < 4; ++c) {
-                    apart = there[c] - where[c];
-                    distance = fma(apart, apart, distance);
-                }
+// Disparities of the modes of eight pixels, whose patches begin at (y, x).
+Float8 modes_of(Array<const float, 3> planes, Index y, Index x, Index radius) {
+    Pixels where = load_pixels(planes, y + radius, x + radius);
+    for (int i = 0; i < ITERATIONS; ++i) {
+        // sums of weights by how near each pixel is to where
+        Float8 total{};
+        Pixels sums{};
+        for (Index v = y; v <= y + 2 * radius; ++v) {
+            for (Index u = x; u <= x + 2 * radius; ++u) {
+                const Pixels there = load_pixels(planes, v, u);
+                Float8 distance{};
+                for (int c = 0; c < 4; ++c) distance = fma(there[c] - where[c], there[c] - where[c], distance);
                 const Float8 weight = exp_of_negative(-distance);
                 total += weight;
                 for (int c = 0; c < 4; ++c) sums[c] = fma(weight, there[c], sums[c]);
             }
         }
-    }
-};
-
-// Disparities of the modes of eight pixels.
-Float8 modes_of(Array<const float, 3> planes, Index y, Index x, Index radius) {
-    Pixels where = load_pixels(planes, y + radius, x + radius);
-    for (int i = 0; i < ITERATIONS; ++i) {
-        const Patches patches(planes, y, x, 2 * radius + 1, where);
         // the pixel itself starts with weight one, so the total never vanishes at once
-        for (int c = 0; c < 4; ++c) where[c] = spread(1e-6f) <= patches.total ? patches.sums[c] / patches.total : where[c];
+        for (int c = 0; c < 4; ++c) where[c] = spread(1e-6f) <= total ? sums[c] / total : where[c];
     }
     return where[3];
 }

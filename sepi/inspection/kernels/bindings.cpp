@@ -2,10 +2,6 @@
 #include "kernels/arguments.hpp"
 #include "view_order.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using sepi::Unlocked;
-
 void bind_inspection(nb::module_ &kernels) {
     auto coarse_sweep = kernels.def_submodule("coarse_sweep");
     coarse_sweep.def("coarse_sweep", &sepi::coarse_sweep, Unlocked(), "reference"_a, "views"_a, "offsets"_a, "candidates"_a, "truncation"_a, "radius"_a,

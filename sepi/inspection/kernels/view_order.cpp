@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
 
 namespace sepi {
 namespace {
@@ -19,25 +20,17 @@ Array<const float, 2> patch_at(Array<const float, 2> picture, Index y, Index x, 
     return {picture.at(y, x), {side, side}, {picture.strides[0], 1}};
 }
 
-// Where samples begin: a pixel, and fractions to the next ones.
-struct Place {
-    Index row, column;
-    float fy, fx;
-
-    Place(double y, double x) : row(Index(std::floor(y))), column(Index(std::floor(x))), fy(float(y - double(row))), fx(float(x - double(column))) {}
-
-    bool within(Array<const float, 2> view, Index side) const {
-        return row >= 0 && column >= 0 && row + side < view.shape[0] && column + side < view.shape[1];
-    }
-};
+// Where a patch of the reference view begins in another, if that shows all of it.
+std::optional<Place> patch_within(Array<const float, 2> view, Index y, Index x, float d, float down, float across, Index side) {
+    return place_amid(double(y) - double(d * down), double(x) - double(d * across), view.shape[0] - side + 1, view.shape[1] - side + 1);
+}
 
 // Sum of the squared differences of a patch and the samples of a view that begin at a place.
 float squares_of(Array<const float, 2> patch, Array<const float, 2> view, const Place &place) {
-    const auto [row, column, fy, fx] = place;
-    const float a = (1 - fy) * (1 - fx), b = (1 - fy) * fx, c = fy * (1 - fx), d = fy * fx;
+    const auto [a, b, c, d] = bilinear_weights(float(place.fy), float(place.fx));
     float total = 0;
     for (Index i = 0; i < patch.shape[0]; ++i) {
-        const float *own = patch.at(i), *above = view.at(row + i, column), *below = view.at(row + i + 1, column);
+        const float *own = patch.at(i), *above = view.at(place.row + i, place.column), *below = view.at(place.row + i + 1, place.column);
         for (Index j = 0; j < patch.shape[1]; ++j) {
             const float r = a * above[j] + b * above[j + 1] + c * below[j] + d * below[j + 1] - own[j];
             total += r * r;
@@ -68,9 +61,9 @@ void layout_costs(Array<const float, 2> reference, Array<const float, 3> views, 
                 float total = 0;
                 Index seen = 0;
                 for (Index v = 0; v < V; ++v) {
-                    const Place place(double(y) - double(candidates(k) * offsets(n, v, 0)), double(x) - double(candidates(k) * offsets(n, v, 1)));
-                    if (!place.within(reference, side)) continue;
-                    const float found = squares_of(patch, views[v], place);
+                    const auto place = patch_within(reference, y, x, candidates(k), offsets(n, v, 0), offsets(n, v, 1), side);
+                    if (!place) continue;
+                    const float found = squares_of(patch, views[v], *place);
                     total += found / (found + variation);
                     ++seen;
                     // the mean stays above the lowest, whatever the views that are left say
@@ -90,16 +83,14 @@ void layout_costs(Array<const float, 2> reference, Array<const float, 3> views, 
 void residuals(Array<const float, 2> reference, Array<const float, 2> view, Array<const float, 1> baseline, Array<const float, 2> disparity,
                Array<const bool, 2> asked, Index radius, Array<float, 2> out) {
     const Index H = reference.shape[0], W = reference.shape[1], side = 2 * radius + 1;
-    const float down = baseline(0), across = baseline(1);
     parallel_for(0, H, [&](Index row) {
         std::fill_n(out.at(row), W, std::numeric_limits<float>::infinity());
         const Index y = row - radius;
         if (y < 0 || y > H - side) return;
         for (Index x = 0; x <= W - side; ++x) {
             if (!asked(row, x + radius)) continue;
-            const float d = disparity(row, x + radius);
-            const Place place(double(y) - double(d * down), double(x) - double(d * across));
-            if (place.within(view, side)) out(row, x + radius) = squares_of(patch_at(reference, y, x, side), view, place) / float(side * side);
+            const auto place = patch_within(view, y, x, disparity(row, x + radius), baseline(0), baseline(1), side);
+            if (place) out(row, x + radius) = squares_of(patch_at(reference, y, x, side), view, *place) / float(side * side);
         }
     });
 }

@@ -2,10 +2,6 @@
 #include "reprojection.hpp"
 #include "triangles.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using sepi::Unlocked;
-
 void bind_rendered(nb::module_ &kernels) {
     auto triangles = kernels.def_submodule("triangles");
     triangles.def("first_met", &sepi::first_met, Unlocked(), "corners"_a, "origin"_a, "rotation"_a, "frame"_a, "near"_a, "out"_a);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
@@ -32,32 +33,27 @@ bool covers(const Drawing &drawing, Array<const double, 2> boxes, Index p, doubl
     return odd;
 }
 
-// Centres of samples along a line, in pixels.
-Scratch<double, 1> places_of(Index number, Index samples) {
-    Scratch<double, 1> places(number);
-    for (Index i = 0; i < number; ++i) places.array()(i) = (double(i) + 0.5) / double(samples) - 0.5;
-    return places;
-}
+// Centre of a sample along a line, in pixels.
+double place_of(Index i, Index samples) { return (double(i) + 0.5) / double(samples) - 0.5; }
 
-// Nearest disparity and its surface at the places of one row at height y; crossings (E) is scratch. Even-odd rule;
-// intervals are closed on the left and open on the right, so that neighbours leave no gap.
-void fill_row(const Drawing &drawing, double y, Index samples, Array<const double, 1> places, double *crossings, double *__restrict depth,
-              std::int64_t *__restrict owner) {
-    const Index width = places.shape[0];
+// Nearest disparity and its surface at the samples of one row at height y. Even-odd rule; intervals are closed on the left
+// and open on the right, so that neighbours leave no gap.
+void fill_row(const Drawing &drawing, double y, Index samples, Index width, double *__restrict depth, std::int64_t *__restrict owner) {
+    std::vector<double> crossings;
     std::fill_n(depth, width, -INFINITE);
     std::fill_n(owner, width, -1);
     const auto sample = [&](double x) { return Index(std::ceil((x + 0.5) * double(samples) - 0.5)); };
     for (Index p = 0; p < drawing.planes.shape[0]; ++p) {
-        Index count = 0;
+        crossings.clear();
         for (Index e = drawing.first_edge(p); e < drawing.first_edge(p + 1); ++e)
-            if (const double *edge = drawing.edges.at(e); crosses(edge, y)) crossings[count++] = crossing(edge, y);
-        std::sort(crossings, crossings + count);
+            if (const double *edge = drawing.edges.at(e); crosses(edge, y)) crossings.push_back(crossing(edge, y));
+        std::sort(crossings.begin(), crossings.end());
         const double at_zero = drawing.planes(p, 0) + drawing.planes(p, 2) * y, slope = drawing.planes(p, 1);
-        for (Index i = 0; i + 1 < count; i += 2) {
+        for (std::size_t i = 0; i + 1 < crossings.size(); i += 2) {
             const Index first = std::max<Index>(0, sample(std::max(crossings[i], -1.0)));
             const Index last = std::min(width, sample(std::min(crossings[i + 1], double(width))));
             for (Index column = first; column < last; ++column) {
-                const double d = at_zero + slope * places.data[column];
+                const double d = at_zero + slope * place_of(column, samples);
                 const bool nearer = d > depth[column];
                 depth[column] = nearer ? d : depth[column];
                 owner[column] = nearer ? p : owner[column];
@@ -107,29 +103,23 @@ float colour_of(Float8 total, Index channel) { return total[channel] + total[4 +
 }  // namespace
 
 void nearest(const Drawing &drawing, Array<double, 2> disparity, Array<std::int64_t, 2> owner) {
-    const auto places = places_of(disparity.shape[1], 1);
-    parallel_for(0, disparity.shape[0], [&](Index row) {
-        const Scratch<double, 1> crossings(drawing.edges.shape[0]);
-        fill_row(drawing, double(row), 1, places.array(), crossings.array().data, disparity.at(row), owner.at(row));
-    });
+    parallel_for(0, disparity.shape[0], [&](Index row) { fill_row(drawing, double(row), 1, disparity.shape[1], disparity.at(row), owner.at(row)); });
 }
 
 void shade(const Drawing &drawing, double v, double u, Index samples, Array<float, 3> picture) {
     const Index size = picture.shape[0], width = size * samples;
-    const auto all_places = places_of(width, samples);
-    const double *places = all_places.array().data;
     parallel_for(0, size, [&](Index line) {
-        const Scratch<double, 1> crossings(drawing.edges.shape[0]), depth(width);
+        const Scratch<double, 1> depth(width);
         const Scratch<std::int64_t, 1> owner(width);
         std::fill_n(picture.at(line), 3 * size, 0.0f);
         for (Index row = line * samples; row < (line + 1) * samples; ++row) {
-            const double y = places[row];
-            fill_row(drawing, y, samples, all_places.array(), crossings.array().data, depth.array().data, owner.array().data);
+            const double y = place_of(row, samples);
+            fill_row(drawing, y, samples, width, depth.array().data, owner.array().data);
             for (Index pixel = 0; pixel < size; ++pixel) {
                 Float8 total{};
                 for (Index column = pixel * samples; column < (pixel + 1) * samples; ++column) {
                     const double d = depth.array()(column);
-                    if (const Index p = owner.array()(column); p >= 0) total = add_sample(drawing, p, places[column] + u * d, y + v * d, total);
+                    if (const Index p = owner.array()(column); p >= 0) total = add_sample(drawing, p, place_of(column, samples) + u * d, y + v * d, total);
                 }
                 for (Index c = 0; c < 3; ++c) picture(line, pixel, c) += colour_of(total, c);
             }
@@ -140,47 +130,34 @@ void shade(const Drawing &drawing, double v, double u, Index samples, Array<floa
 
 void hide(const Drawing &drawing, Array<const double, 2> boxes, Array<const double, 2> disparity, double v, double u, Array<bool, 2> hidden) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
-    parallel_for(0, H, [&](Index row) {
-        for (Index column = 0; column < W; ++column) {
-            const double d = disparity(row, column), x = double(column) - u * d, y = double(row) - v * d;
-            if (hidden(row, column) || !(-0.5 <= x && x < double(W) - 0.5 && -0.5 <= y && y < double(H) - 0.5)) continue;
-            bool found = false;
-            for (Index p = 0; p < drawing.planes.shape[0] && !found; ++p) {
-                const double *plane = drawing.planes.at(p);
-                found = plane[0] + plane[1] * x + plane[2] * y > d + TOLERANCE && covers(drawing, boxes, p, x, y);
-            }
-            hidden(row, column) = found;
+    parallel_for_pixels(H, W, [&](Index row, Index column) {
+        const double d = disparity(row, column), x = double(column) - u * d, y = double(row) - v * d;
+        if (!(-0.5 <= x && x < double(W) - 0.5 && -0.5 <= y && y < double(H) - 0.5)) return;
+        for (Index p = 0; p < drawing.planes.shape[0] && !hidden(row, column); ++p) {
+            const double *plane = drawing.planes.at(p);
+            hidden(row, column) = plane[0] + plane[1] * x + plane[2] * y > d + TOLERANCE && covers(drawing, boxes, p, x, y);
         }
     });
 }
 
 void cast(const Drawing &drawing, Array<const double, 2> boxes, Array<const double, 2> normals, Array<const double, 1> origin, Array<const double, 2> rays,
-          Array<const double, 1> pinhole, Array<std::int64_t, 1> owner, Array<double, 2> hits) {
+          Array<const double, 1> pinhole, Array<double, 1> depth, Array<double, 2> colours) {
     const auto product = [](const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
-    const Scratch<double, 1> ahead(normals.shape[0]);
-    for (Index p = 0; p < normals.shape[0]; ++p) ahead.array()(p) = 1 - product(normals.at(p), origin.data);
     parallel_for_blocks(0, rays.shape[0], RAYS_AT_ONCE, [&](Index i) {
         const double *ray = rays.at(i);
-        double least = INFINITE;
-        owner(i) = -1;
+        depth(i) = INFINITE;
+        Float8 colour{};
         for (Index p = 0; p < normals.shape[0]; ++p) {
-            const double along = product(normals.at(p), ray), away = ahead.array()(p);
+            const double along = product(normals.at(p), ray), away = 1 - product(normals.at(p), origin.data);
             if (along * away <= 0) continue;
             const double t = away / along, z = origin(2) + t * ray[2];
-            if (t >= least - TOLERANCE * t || z <= 0) continue;
+            if (t >= depth(i) - TOLERANCE * t || z <= 0) continue;
             const double x = pinhole(1) + pinhole(0) * (origin(0) + t * ray[0]) / z, y = pinhole(2) + pinhole(0) * (origin(1) + t * ray[1]) / z;
             if (!covers(drawing, boxes, p, x, y)) continue;
-            least = hits(i, 0) = t, hits(i, 1) = x, hits(i, 2) = y;
-            owner(i) = p;
+            depth(i) = t;
+            colour = add_sample(drawing, p, x, y, Float8{});
         }
-    });
-}
-
-void colours_at(const Drawing &drawing, Array<const std::int64_t, 1> owner, Array<const double, 2> hits, Array<double, 2> colours) {
-    parallel_for_blocks(0, owner.shape[0], RAYS_AT_ONCE, [&](Index i) {
-        const Index p = owner(i);
-        const Float8 found = p < 0 ? Float8{} : add_sample(drawing, p, hits(i, 1), hits(i, 2), Float8{});
-        for (Index c = 0; c < 3; ++c) colours(i, c) = double(colour_of(found, c));
+        for (Index c = 0; c < 3; ++c) colours(i, c) = double(colour_of(colour, c));
     });
 }
 

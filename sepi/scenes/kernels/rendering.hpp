@@ -31,14 +31,10 @@ void shade(const Drawing &drawing, double v, double u, Index samples, Array<floa
 // them, are given.
 void hide(const Drawing &drawing, Array<const double, 2> boxes, Array<const double, 2> disparity, double v, double u, Array<bool, 2> hidden);
 
-// Nearest surface along each ray (N, 3) from origin (3): its index, -1 for none, and (t, x, y) of the hit, which stays
-// as it is where there is none. Surface p lies where normals (P, 3) times a point are 1; edges and boxes are in pixels of
-// the view from the world's origin, whose (focal length, x, y) are pinhole, and so is the hit's place; t is in lengths of
-// the ray.
+// What rays (N, 3) from origin (3) meet first: depths (N) in lengths of the ray, infinite for nothing, and colours (N, 3) of
+// the textures there, black for nothing. Surface p lies where normals (P, 3) times a point are 1; edges and boxes are in
+// pixels of the view from the world's origin, whose (focal length, x, y) are pinhole.
 void cast(const Drawing &drawing, Array<const double, 2> boxes, Array<const double, 2> normals, Array<const double, 1> origin, Array<const double, 2> rays,
-          Array<const double, 1> pinhole, Array<std::int64_t, 1> owner, Array<double, 2> hits);
-
-// Texture of the surface that each ray hits, (N, 3); black where there is none.
-void colours_at(const Drawing &drawing, Array<const std::int64_t, 1> owner, Array<const double, 2> hits, Array<double, 2> colours);
+          Array<const double, 1> pinhole, Array<double, 1> depth, Array<double, 2> colours);
 
 }  // namespace sepi

@@ -1,10 +1,6 @@
 #include "kernels/arguments.hpp"
 #include "regions.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-using sepi::Unlocked;
-
 void bind_scoring(nb::module_ &kernels) {
     auto regions = kernels.def_submodule("regions");
     regions.def("occluded", &sepi::occluded, Unlocked(), "ground_truth"_a, "baselines"_a, "nearest"_a, "out"_a);

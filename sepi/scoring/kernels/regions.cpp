@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
 
 namespace sepi {
 namespace {
@@ -13,10 +14,9 @@ constexpr double STRETCH = 2;         // neighbours that land up to this many pi
 // Whether the view of baseline (v, u) does not see the pixel (y, x).
 bool hidden_in(Array<const double, 2> ground_truth, Index y, Index x, double v, double u, double nearest) {
     const Index H = ground_truth.shape[0], W = ground_truth.shape[1];
-    const auto within = [](double place, Index n) { return 0 <= place && place <= double(n - 1); };
     const double own = ground_truth(y, x);
     // not of unknown disparities, either
-    if (!within(double(y) - own * v, H) || !within(double(x) - own * u, W)) return false;
+    if (!place_within(double(y) - own * v, double(x) - own * u, H, W)) return false;
     const double steps_per_disparity = std::max(std::abs(v), std::abs(u));
     double before = 0;
     // the sight line rises by one pixel along the longer axis per step; no surface is above the nearest
@@ -36,11 +36,9 @@ bool hidden_in(Array<const double, 2> ground_truth, Index y, Index x, double v, 
 }  // namespace
 
 void occluded(Array<const double, 2> ground_truth, Array<const double, 2> baselines, double nearest, Array<bool, 2> out) {
-    parallel_for(0, out.shape[0], [&](Index y) {
-        for (Index x = 0; x < out.shape[1]; ++x) {
-            out(y, x) = false;
-            for (Index n = 0; n < baselines.shape[0] && !out(y, x); ++n) out(y, x) = hidden_in(ground_truth, y, x, baselines(n, 0), baselines(n, 1), nearest);
-        }
+    parallel_for_pixels(out.shape[0], out.shape[1], [&](Index y, Index x) {
+        out(y, x) = false;
+        for (Index n = 0; n < baselines.shape[0] && !out(y, x); ++n) out(y, x) = hidden_in(ground_truth, y, x, baselines(n, 0), baselines(n, 1), nearest);
     });
 }
 
