@@ -19,6 +19,7 @@ import sepi
 from bench.all_views import disagreement, moved_pixels
 from sepi.applications.all_views import (
     AllViews,
+    Sources,
     ViewMaps,
     _with_doubt,
     anchor_views,
@@ -39,6 +40,8 @@ from sepi.scenes import render, true_disparity, write_hci
 from sepi.stage import StageMaps
 
 pytestmark = pytest.mark.slow
+
+FloatArray = npt.NDArray[np.float64]
 
 SIZE, VIEWS = 96, 5
 LAYERS = "stripes"
@@ -171,6 +174,30 @@ def test_a_slanted_plane_is_carried_exactly(baseline: tuple[float, float]) -> No
     beyond = np.maximum(-0.5 - at, at - (SIZE - 0.5)).max(axis=0)
     assert seen[beyond < -0.01].all()
     assert not seen[beyond > 0.01].any()
+
+
+def maps_of_views(maps: FloatMap, baselines: FloatArray, views: FloatArray) -> tuple[FloatMap, npt.NDArray[np.bool_]]:
+    """Disparity, and where it is extended, of views by maps of the views at the baselines."""
+    nothing, corners = np.empty((0, *maps.shape[1:], 3), np.float32), np.stack([corner_disparities(m) for m in maps])
+    disparity, confidence = np.empty((2, len(views), *maps.shape[1:]), np.float32)
+    extended, bars = np.empty(disparity.shape, bool), np.empty((len(views), 0, 0, 3), np.float32)
+    sources = Sources(maps, np.ones_like(maps), nothing, corners, baselines)
+    kernels.maps_of_views(sources, views, disparity, confidence, bars, extended)
+    return disparity, extended
+
+
+@pytest.mark.parametrize("axis", [1, 2])
+def test_mirrored_maps_give_mirrored_views(axis: int) -> None:
+    """Surfaces that land on whole pixels, and gaps along any direction: nothing prefers the right, or what is below."""
+    maps = np.random.default_rng(0).integers(0, 3, (3, 8, 9)).repeat(4, 1).repeat(4, 2).astype(np.float32)
+    baselines = np.array([(0, 0), (-2, -2), (2, 2)], float)
+    views = np.array([(0, 1), (1, 0), (-1, 2), (1, 1), (2, -1)], float)
+    turned = np.where(np.arange(1, 3) == axis, -1.0, 1.0)
+    plain = maps_of_views(maps, baselines, views)
+    mirrored = maps_of_views(np.ascontiguousarray(np.flip(maps, axis)), baselines * turned, views * turned)
+    assert plain[1].any()
+    for one, other in zip(plain, mirrored, strict=True):
+        np.testing.assert_array_equal(np.flip(other, axis), one)
 
 
 def test_gaps_open_and_hidden_surfaces_stay_hidden() -> None:

@@ -274,6 +274,17 @@ def test_what_one_view_alone_sees_is_told() -> None:
     assert mask(shifted, "alone")[1].nonzero()[0].tolist() == [0, 1]
 
 
+def test_a_mirrored_scene_has_mirrored_masks() -> None:
+    """Points that land on whole pixels, in rows and columns of views as between them."""
+    disparities = np.random.default_rng(0).integers(0, 3, (9, 6, 7)).repeat(3, 1).repeat(3, 2).astype(np.float32) / 2
+    positions = np.array([(t, s) for t in (-1, 0, 1) for s in (-1, 0, 1)], float)
+    bits = seen_bits(disparities, positions)
+    assert {name for name in MASKS if mask(bits, name).any()} == {"occluded", "alone"}
+    for axis, turned in ((1, (-1, 1)), (2, (1, -1))):
+        mirrored = seen_bits(np.ascontiguousarray(np.flip(disparities, axis)), positions * turned)
+        np.testing.assert_array_equal(np.flip(mirrored, axis), bits)
+
+
 def test_noise_is_that_of_the_stated_sensor(plain: Render) -> None:
     """Electrons' variance is their number and what reading adds; a scene with a tenth of the light has a tenth."""
     linear = Exposure(gamma=1.0, bits=16)

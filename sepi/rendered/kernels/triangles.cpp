@@ -101,10 +101,6 @@ void painted(Array<const std::int32_t, 1> faces, Strided<const std::int64_t, 2> 
     parallel_for_blocks(0, faces.shape[0], AT_ONCE, [&](Index n) {
         const Index face = faces(n);
         const std::int64_t *start = paint.starts.at(paint.thing(face)), height = start[1], width = start[2];
-        if (height * width == 1) {
-            std::copy_n(paint.texels.at(start[0]), 3, out.at(n));
-            return;
-        }
         const double *normal = planes.normal.at(face), *corner = planes.corner.at(face), *uv = planes.uv.at(face);
         const double *u = planes.gradient.at(face, 0), *v = planes.gradient.at(face, 1);
         const double left = corner[0] - frame(0), top = corner[1] - frame(1), near = corner[2];
