@@ -57,7 +57,9 @@ void layout_costs(Array<const float, 2> reference, Array<const float, 3> views, 
         const float variation = HALF * squares + 1e-12f;
         for (Index n = 0; n < L; ++n) {
             float least = 1, best = 0;
-            for (Index k = 0; k < candidates.shape[0]; ++k) {
+            // from the middle outwards: most points move little, and what matches well ends the sums of the others early
+            for (Index i = 0; i < candidates.shape[0]; ++i) {
+                const Index k = candidates.shape[0] / 2 + (i % 2 ? -(i + 1) / 2 : i / 2);
                 float total = 0;
                 Index seen = 0;
                 for (Index v = 0; v < V; ++v) {
