@@ -1,6 +1,7 @@
 # What all rules share: the checked configuration, and the names, threads and memory that follow from it.
 
 import atexit
+import hashlib
 import json
 import os
 import re
@@ -225,9 +226,27 @@ def scene_of(wildcards):
     return SETTINGS.scene(wildcards.dataset, wildcards.scene)
 
 
-def source_files(scene, files):
-    """Files that a scene is read from, as inputs."""
-    return list(map(str if scene.is_rendered else own_file, files))
+def source_files(kind):
+    """Function of wildcards: files of a scene's views (``files``) or of its ground truth (``truth``), as inputs."""
+
+    def files(wildcards):
+        scene = scene_of(wildcards)
+        return list(map(str if scene.is_rendered else own_file, getattr(scene, kind)))
+
+    return files
+
+
+def dates_of(files):
+    """Function of wildcards: a digest of sizes and dates of files that no job makes.
+
+    Snakemake sees newer files alone, and what comes by unzip, rsync -a, cp -p or tar keeps an old date.
+    """
+
+    def digest(wildcards):
+        found = [os.stat(file) for file in files(wildcards) if not file.startswith(f"{RESULTS}/")]
+        return hashlib.sha256(repr([(file.st_size, file.st_mtime_ns) for file in found]).encode()).hexdigest()
+
+    return digest
 
 
 def ingest_source(wildcards):
@@ -253,13 +272,13 @@ def own_truth_size(wildcards):
     return scene_files(wildcards.dataset, wildcards.scene).light_field if scene_of(wildcards).own_truth else []
 
 
-def own_truth(wildcards, input):
-    """The user's own ground truth of a scene, as flags."""
+def own_truth(wildcards):
+    """The user's own ground truth of a scene, as flags. Of a function of the input Snakemake would see no change."""
     own = scene_of(wildcards).own_truth
     if own is None:
         return []
     scale = [] if own.scale is None else ["--truth-scale", str(own.scale)]
-    return ["--truth", str(own.path), *scale, "--light-field", input.light_field]
+    return ["--truth", str(own.path), *scale, "--light-field", placed(own_truth_size(wildcards))]
 
 
 # errors that the user asked to score

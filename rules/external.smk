@@ -23,6 +23,7 @@ rule external:
         maps=lambda wildcards: SETTINGS.external_json(wildcards.dataset, wildcards.scene),
         scene="{dataset}/{scene}",
         bad=BAD_THRESHOLDS,
+        dates=dates_of(external_inputs),
         code=code_digest("sepi.external"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: maps of external methods"

@@ -2,7 +2,7 @@
 # A scene's pictures are the inputs: a changed or new one is read again.
 rule ingest:
     input:
-        files=lambda wildcards: source_files(scene_of(wildcards), scene_of(wildcards).files),
+        files=source_files("files"),
     output:
         light_field=SCENE.light_field,
     log:
@@ -18,6 +18,7 @@ rule ingest:
     params:
         source=ingest_source,
         disparity_range=ingest_range,
+        dates=dates_of(source_files("files")),
         code=lambda wildcards: code_digest(*ingest_modules(scene_of(wildcards).reader)),
     message:
         "{wildcards.dataset}/{wildcards.scene}: reading the light field"

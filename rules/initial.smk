@@ -19,6 +19,7 @@ rule initial:
     params:
         choice=choice_for("initial"),
         parameters=parameters_of("initial"),
+        dates=dates_of(files_of("initial")),
         code=code_of("initial"),
     message:
         stage_message("initial", "initial depth")

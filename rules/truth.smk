@@ -2,7 +2,7 @@
 # gets a file that says so.
 rule truth:
     input:
-        files=lambda wildcards: source_files(scene_of(wildcards), scene_of(wildcards).truth),
+        files=source_files("truth"),
         light_field=own_truth_size,
     output:
         truth=SCENE.truth,
@@ -19,6 +19,7 @@ rule truth:
     params:
         source=truth_source,
         own=own_truth,
+        dates=dates_of(source_files("truth")),
         code=lambda wildcards: code_digest("sepi.truth", scene_of(wildcards).reader),
     message:
         "{wildcards.dataset}/{wildcards.scene}: ground truth"

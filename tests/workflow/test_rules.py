@@ -1,5 +1,6 @@
 """The rules, as Snakemake reads them: what would leave stale results, or jobs that a cluster ends, without a word."""
 
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -44,10 +45,12 @@ def read(tmp_path_factory: pytest.TempPathFactory) -> Any:
     (root / "maps").mkdir()
     (root / "maps/dots.pfm").touch()
     maps = {"there": str(root / "maps"), "absent": str(root / "nowhere")}
-    for name in ("mine.npy", "truth.png"):
+    for name in ("mine.npy", "truth.png", "net.onnx"):
         (root / name).touch()
+    network = {"initial": {"onnx": {"model": str(root / "net.onnx")}}}
     own = {"mine": {"path": str(root / "mine.npy"), "truth": str(root / "truth.png"), "truth_scale": 0.5}}
-    return Workflow(REPOSITORY, root / "run", TINY | {"external": maps, "light_fields": own}).read()
+    config = TINY | {"external": maps, "light_fields": own, "stages": TINY["stages"] | network}
+    return Workflow(REPOSITORY, root / "run", config).read()
 
 
 def of_size(size: int, folder: Path, **more: Any) -> dict[str, Any]:
@@ -113,14 +116,27 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
 
 
 def test_every_file_that_a_job_reads_is_an_input(read: Any) -> None:
-    """A new picture, a published figure that was mended, a map of another method, a template: none would be seen."""
+    """A new picture, a published figure that was mended, a map of another method, a template: none would be seen.
+
+    Those of the user's are seen by size and date: what another program unpacks has an old one.
+    """
     rules = {rule.name: rule for rule in read.rules}
-    (views,) = rules["ingest"].input.files(scene(dataset="own", scene="mine"))
-    assert views.endswith("mine.npy")
-    (truth,) = rules["truth"].input.files(scene(dataset="own", scene="mine"))
-    assert truth.endswith("truth.png")
-    (there,) = rules["external"].input.maps(scene())
-    assert there.endswith("maps/dots.pfm")
+    mine = scene(dataset="own", scene="mine", initial="onnx")
+    for rule, kind, of, name in (
+        ("ingest", "files", mine, "mine.npy"),
+        ("truth", "files", mine, "truth.png"),
+        ("initial", "files", mine, "net.onnx"),
+        ("external", "maps", scene(), "maps/dots.pfm"),
+    ):
+        (file,) = getattr(rules[rule].input, kind)(of)
+        assert file.endswith(name)
+        before = rules[rule].params.dates(of)
+        assert rules[rule].params.dates(of) == before
+        os.utime(file, ns=(0, 1))
+        older = rules[rule].params.dates(of)
+        Path(file).write_text("more")
+        os.utime(file, ns=(0, 1))
+        assert len({before, older, rules[rule].params.dates(of)}) == 3
     assert {Path(file) for file in rules["numbers"].input.published} == set(PUBLISHED.glob("*.csv"))
     assert {Path(file) for file in rules["page"].input.templates} == set(TEMPLATES)
 

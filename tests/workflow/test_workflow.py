@@ -241,12 +241,15 @@ class TestRerun:
             "all": 1,
         }
 
-    def test_a_changed_picture_reruns_its_scene(self, finished: Workflow) -> None:
+    @pytest.mark.parametrize("date", [None, 1_500_000_000])
+    def test_a_changed_picture_reruns_its_scene(self, finished: Workflow, date: int | None) -> None:
+        """Also one whose date is old: so unzip, rsync -a, cp -p and tar leave it."""
         picture = Path(finished.config["hci_root"]) / "training" / "box" / "input_Cam003.png"
         other = picture.with_name("input_Cam004.png")
         before, times = picture.read_bytes(), picture.stat()
         try:
             picture.write_bytes(other.read_bytes())
+            os.utime(picture, date and (date, date))
             plan = finished.stage_plan("all")
         finally:
             picture.write_bytes(before)
@@ -337,6 +340,8 @@ class TestRerun:
         whole = found["sepi/half_sepi/lti/wls"]["paper"]["all"]
         assert whole["pixels"] == disparity.size
         assert whole["badpix_0.25"] == pytest.approx(100 * (np.abs(disparity - 0.5) > 0.25).mean())
+        other_scale = run.with_config(light_fields={"box": entry | {"truth_scale": 0.25}})
+        assert (run.plan(scores), other_scale.plan(scores)) == ({}, {"truth": 1, "evaluate": 1})
         write_png(tmp_path / "truth.png", levels[1:])
         failed = run.run(scores).stdout
         assert f"{tmp_path / 'truth.png'}: ground truth is ({SIZE - 1}, {SIZE})" in failed
