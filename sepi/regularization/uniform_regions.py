@@ -5,8 +5,7 @@ gradients are no larger than that noise explains: then no view knows anything ab
 threshold on contrast says. (This takes the place of the paper's LTI, section IV-C of [1]_.)
 
 What is known lies on its border (:mod:`sepi.regularization.border_planes`), and in how the light changes over the whole
-of it (:mod:`sepi.regularization.lit_planes`). What floors mirror is put back onto them afterwards
-(:mod:`sepi.regularization.floor_reflections`), since their planes may go through such regions.
+of it (:mod:`sepi.regularization.lit_planes`).
 
 References
 ----------
@@ -29,7 +28,6 @@ from sepi.matching.denoising import DenoisedLightField, DenoisingParameters, den
 from sepi.matching.view_noise import variance_map
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
-from sepi.regularization.floor_reflections import FloorReflectionsParameters, without_reflections
 from sepi.regularization.lit_planes import LitPlane, lit_planes
 from sepi.regularization.plane_choice import LIT_AREA, Chosen, chosen_plane, kept_pixels
 from sepi.regularization.pockets import with_pockets
@@ -49,9 +47,7 @@ LIT_SHARE = 0.01
 """Of the picture, below which nothing is asked: it takes as long as a round of the optimisation."""
 
 
-class UniformPlanesParameters(
-    OcclusionMarginParameters, DenoisingParameters, BorderPlaneParameters, FloorReflectionsParameters
-):
+class UniformPlanesParameters(OcclusionMarginParameters, DenoisingParameters, BorderPlaneParameters):
     """Parameters of uniform regions and their planes."""
 
     colour_scale: float = Field(
@@ -80,7 +76,7 @@ class UniformPlanesParameters(
 def fill_uniform_regions(
     light_field: LightField, before: StageMaps, parameters: UniformPlanesParameters
 ) -> tuple[FloatMap, BoolMap]:
-    """Disparity with planes in uniform regions and where floors mirror, and where that is.
+    """Disparity with planes in uniform regions, and where that is.
 
     Parameters
     ----------
@@ -128,9 +124,6 @@ def fill_uniform_regions(
         # where noise hides faint texture, that may know the surface better than the plane of a border
         faint = noisy and chosen.source == "border" and 2 * core[place][pixels].sum() < pixels.sum()
         held[place] |= pixels & np.bool_(not faint)
-    if parameters.reflections:
-        disparity, mirrored = without_reflections(field.reference_view, disparity, known, parameters)
-        held |= mirrored
     return disparity, held
 
 
