@@ -79,7 +79,7 @@ def with_open_gaps(
     better = there < np.float32(parameters.gap_gain) * here
     # amid like colours: at edges residuals are of interpolation
     voters = asked & _plain(guide, parameters.gap_colour)
-    return np.where(asked & _outvoted(voters, better, seeing / others.sum()), farther, disparity)
+    return np.where(asked & _outvoted(voters, better, seeing, int(others.sum())), farther, disparity)
 
 
 def compared_depths(
@@ -119,10 +119,12 @@ def _plain(guide: FloatMap, distance: float) -> BoolMap:
     return np.asarray(largest_channel(cv2.dilate(guide, square) - cv2.erode(guide, square)) < np.float32(distance))
 
 
-def _outvoted(voters: BoolMap, better: BoolMap, seeing: FloatMap) -> BoolMap:
+def _outvoted(voters: BoolMap, better: BoolMap, seeing: FloatMap, others: int) -> BoolMap:
     """Where enough voters are about, enough views see what they vote on, and most find the farther depth better."""
+    # sums of whole numbers: exact, in whatever order
     voting, about, seen = (
-        cv2.blur(values.astype(np.float32), (_WINDOW, _WINDOW)) for values in (voters & better, voters, voters * seeing)
+        cv2.boxFilter(values.astype(np.float32), -1, (_WINDOW, _WINDOW), normalize=False)
+        for values in (voters & better, voters, voters * seeing)
     )
-    enough = (about > (_ASKED - 0.5) / _WINDOW**2) & (seen >= _SEEING * about)
+    enough = (about >= _ASKED) & (seen >= _SEEING * others * about)
     return np.asarray(enough & (voting > _MOST * about))

@@ -85,11 +85,11 @@ def z_buffer_twin(disparity, dt, ds):
     H, W = disparity.shape
     nearest = np.full((H, W), EMPTY)
     for y, x in np.ndindex(H, W):
-        top, left = int(np.floor(y - disparity[y, x] * dt)), int(np.floor(x - disparity[y, x] * ds))
-        for row in (top, top + 1):
-            for column in (left, left + 1):
-                if 0 <= row < H and 0 <= column < W:
-                    nearest[row, column] = max(nearest[row, column], disparity[y, x])
+        down, across = y - disparity[y, x] * dt, x - disparity[y, x] * ds
+        for row, column in np.ndindex(H, W):
+            # a whole position touches those on both sides
+            if abs(row - down) <= 1 and abs(column - across) <= 1:
+                nearest[row, column] = max(nearest[row, column], disparity[y, x])
     return nearest
 
 
@@ -123,8 +123,9 @@ def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales,
             inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (x <= W - 1)
             seen = np.ones((H, W))
             if nearest is not None:
-                # halves go down, as the kernel's comparison of fractions does
-                near = np.ceil(np.stack([y, x]) - 0.5).astype(int).clip(0, [[[H - 1]], [[W - 1]]])
+                # halves alike from either side
+                near = np.stack([rows - np.rint(np.float32(d * down)), columns - np.rint(np.float32(d * across))])
+                near = near.astype(int).clip(0, [[[H - 1]], [[W - 1]]])
                 seen = np.where(nearest[t, s][near[0], near[1]] <= np.float32(d + margin), 1, hidden)
             for values, scale, share in zip(planes, scales, shares, strict=False):
                 sample = np.stack([sampled(c, y, x) for c in values[t, s]])

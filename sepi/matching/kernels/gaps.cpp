@@ -1,5 +1,6 @@
 #include "gaps.hpp"
 
+#include <cmath>
 #include <vector>
 
 namespace sepi {
@@ -9,8 +10,9 @@ namespace {
 template <class Colour>
 auto squared_residual(Array<const Colour, 3> view, float unit, double row, double column, Array<const float, 1> reference) {
     using Number = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, float>;
-    const Index top = Index(row), left = Index(column), down = view.strides[0], right = view.strides[1];
+    const Index top = Index(row), left = Index(column);
     const float fy = float(row - double(top)), fx = float(column - double(left));
+    const Index down = fy > 0 ? view.strides[0] : 0, right = fx > 0 ? view.strides[1] : 0;
     const Colour *place = view.at(top, left);
     Number total = 0;
     for (Index c = 0; c < 3; ++c, place += view.strides[2]) {
@@ -76,9 +78,11 @@ void compare_depths(const Views &views, float unit, Array<const float, 2> dispar
             const double row = double(y) - f * down, column = double(x) - f * across;
             const double own_row = double(y) - d * down, own_column = double(x) - d * across;
             if (std::min(row, own_row) < 0 || std::min(column, own_column) < 0) continue;
-            if (std::max(row, own_row) >= bottom || std::max(column, own_column) >= right) continue;
-            const float *above = nearest.at(Index(row) - asked.low, Index(column)), *below = above + nearest.strides[0];
-            if (std::max(std::max(above[0], above[1]), std::max(below[0], below[1])) > f + asked.margin) continue;
+            if (std::max(row, own_row) > bottom || std::max(column, own_column) > right) continue;
+            const float *above = nearest.at(Index(row) - asked.low, Index(column));
+            const float *below = row > std::floor(row) ? above + nearest.strides[0] : above;
+            const Index beside = column > std::floor(column);
+            if (std::max(std::max(above[0], above[beside]), std::max(below[0], below[beside])) > f + asked.margin) continue;
             const auto colour = reference[y][x];
             sums(0, y, x) = float(sums(0, y, x) + squared_residual(view, unit, row, column, colour));
             sums(1, y, x) = float(sums(1, y, x) + squared_residual(view, unit, own_row, own_column, colour));
