@@ -87,7 +87,7 @@ inline void mirror_ends(float *line, Index n, Index beyond) {
     }
 }
 
-// Sums of n lines of products, into out: add(total, k, x) adds number k of eight of them. Four vectors at a time: each waits
+// Sums of n lines of products, into out: add(total, k, x) adds number k of eight of them. Several vectors at a time: each waits
 // for its last product, and the others need not; where how many there are is known beforehand, one loop becomes of all.
 // Lines have LANES numbers behind them.
 template <class Number, class Add>
@@ -99,6 +99,7 @@ void sum_products(Index n, Number products, float *out, Add add) {
         for (int i = 0; i < SIZE; ++i) store(out + x + i * LANES, totals[i]);
     };
     Index x = 0;
+    for (; x <= n - 8 * LANES; x += 8 * LANES) block(x, std::integral_constant<int, 8>());
     for (; x <= n - 4 * LANES; x += 4 * LANES) block(x, std::integral_constant<int, 4>());
     for (; x < n; x += LANES) block(x, std::integral_constant<int, 1>());
 }
