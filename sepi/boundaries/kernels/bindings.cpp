@@ -1,3 +1,4 @@
+#include "colour_mixture.hpp"
 #include "edge_lines.hpp"
 #include "kernels/arguments.hpp"
 #include "specks.hpp"
@@ -23,6 +24,10 @@ void bind_boundaries(nb::module_ &kernels) {
     surface_shares.attr("FEWEST_SAMPLES") = sepi::FEWEST_SAMPLES;
     surface_shares.attr("FEWEST_ALONE") = sepi::FEWEST_ALONE;
     surface_shares.attr("SHARES") = sepi::SHARES;
+
+    auto colour_mixture = kernels.def_submodule("colour_mixture");
+    colour_mixture.def("mixture_evidence", &sepi::mixture_evidence, Unlocked(), "disparity"_a, "around"_a, "guide"_a, "discontinuity"_a, "radius"_a,
+                       "contrast"_a, "threshold"_a, "least_variance"_a, "out"_a);
 
     auto edge_lines = kernels.def_submodule("edge_lines");
     edge_lines.def("evidence_of_lines", &sepi::evidence_of_lines, Unlocked(), "disparity"_a, "middle"_a, "number"_a, "costs"_a, "edges"_a, "pixels"_a,

@@ -1,0 +1,70 @@
+#include "colour_mixture.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
+
+namespace sepi {
+namespace {
+
+constexpr double WIDTH = 1;            // of the window's weights, pixels
+constexpr double APART = 0.019;        // squared distance of a colour from all mixtures at which it counts 1/e, in units of their variance
+constexpr double RAMP = 0.07;          // share below the threshold from which on there is no doubt
+constexpr double LEAST_WEIGHT = 0.05;  // of clean pixels of each side, in pixels right beside
+
+// Weighted sums over the clean pixels of one side.
+struct Side {
+    double weight = 0, colour[3] = {}, colour2 = 0;
+};
+
+double squared(double number) { return number * number; }
+
+}  // namespace
+
+void mixture_evidence(Array<const float, 2> disparity, const Surroundings &around, Strided<const float, 3> guide, double discontinuity, Index radius,
+                      double contrast, double threshold, double least_variance, Array<float, 2> out) {
+    const Index H = disparity.shape[0], W = disparity.shape[1];
+    std::vector<double> weights;  // by squared distance
+    for (Index distance2 = 0; distance2 <= 2 * radius * radius; ++distance2) weights.push_back(std::exp(double(-distance2) / (2 * WIDTH * WIDTH)));
+
+    parallel_for_pixels(H, W, [&](Index y, Index x) {
+        const float lowest = around.farthest(y, x), highest = around.nearest(y, x);
+        const double middle = double(lowest + highest) / 2;
+        if (highest - lowest < discontinuity || disparity(y, x) <= middle) return;
+        Side sides[2];
+        for_window(y, x, radius, H, W, [&](Index row, Index column) {
+            const float d = disparity(row, column);
+            const bool clean = around.farthest(row, column) > middle || around.nearest(row, column) <= middle;
+            // surfaces beyond the two do not count
+            if (!clean || d > highest + discontinuity || d < lowest - discontinuity) return;
+            const double weight = weights[(row - y) * (row - y) + (column - x) * (column - x)];
+            Side &side = sides[d > middle];
+            side.weight += weight;
+            for (Index c = 0; c < 3; ++c) {
+                const float colour = guide(row, column, c);
+                side.colour[c] += weight * colour;
+                side.colour2 += weight * (colour * colour);
+            }
+        });
+        const auto &[far, near] = sides;
+        if (far.weight < LEAST_WEIGHT || near.weight < LEAST_WEIGHT) return;
+        double distance = 0, projection = 0, apart = 0, variance = least_variance;
+        for (const Side &side : sides) variance += side.colour2 / side.weight;
+        for (Index c = 0; c < 3; ++c) {
+            const double of_far = far.colour[c] / far.weight, of_near = near.colour[c] / near.weight, own = guide(y, x, c) - of_far;
+            distance += squared(of_near - of_far);
+            projection += own * (of_near - of_far);
+            apart += squared(own);
+            variance -= of_far * of_far + of_near * of_near;
+        }
+        // what is left of the colour beside both: a surface darker towards its edge is no mixture
+        distance = std::max(distance, 1e-12);
+        apart -= squared(std::max(projection, 0.0)) / distance;
+        const double little = std::clamp((threshold - projection / distance) / RAMP, 0.0, 1.0);
+        out(y, x) = float(little * distance / (distance + contrast * variance) * std::exp(-apart / (APART * variance)));
+    });
+}
+
+}  // namespace sepi
