@@ -27,17 +27,17 @@ struct Box {
 
 void add_view(Array<const float, 3> view, double v, double u, Array<const float, 2> disparity, Array<const float, 2> nearest, float margin,
               Array<const float, 3> centre, float scale2, Array<float, 3> sums, Array<float, 2> weights) {
-    const Index H = view.shape[0], W = view.shape[1], C = view.shape[2];
-    parallel_for_pixels(H, W, [&](Index y, Index x) {
+    const Index H = view.shape[0], W = view.shape[1];
+    const auto add = [&]<Index C>(std::integral_constant<Index, C>, Index y, Index x) {
         const float d = disparity(y, x);
         const auto place = place_within(y - d * v, x - d * u, H, W);
         if (!place) return;
         if (const auto [row, column] = place->nearest(); nearest(row, column) > d + margin) return;
         const auto down = cubic_weights(place->fy), across = cubic_weights(place->fx);
         const float *expected = centre.at(y, x);
-        float found[3] = {}, z = 0;
+        float found[C] = {}, z = 0;
         for (Index i = 0; i < 4; ++i) {
-            float part[3] = {};
+            float part[C] = {};
             for (Index j = 0; j < 4; ++j) {
                 const float *pixel = view.at(clamped(place->row + i - 1, H), clamped(place->column + j - 1, W));
                 // exactly 0 where all pixels are as expected
@@ -49,6 +49,9 @@ void add_view(Array<const float, 3> view, double v, double u, Array<const float,
         const float ratio = scale2 / (scale2 + z), weight = ratio * ratio;
         for (Index c = 0; c < C; ++c) sums(y, x, c) += weight * found[c];
         weights(y, x) += weight;
+    };
+    parallel_for_pixels(H, W, [&](Index y, Index x) {
+        view.shape[2] == 1 ? add(std::integral_constant<Index, 1>(), y, x) : add(std::integral_constant<Index, 3>(), y, x);
     });
 }
 
