@@ -65,17 +65,17 @@ SYSTEM_TESTS = $(shell grep --recursive --files-with-matches --include 'test_*.p
 test-system: $(READY)
 	$(TESTS) -m "system and not faults" $(SYSTEM_TESTS)
 
-# by g++, whose libraries have what the checks need; in place of the built kernels, which the next `make` puts back. Python
-# does not free all at its end
+# by g++, whose libraries have what the checks need, for this very processor; in place of the built kernels of any, which the
+# next `make` puts back. Python does not free all at its end
 KERNEL_TESTS := tests/matching tests/boundaries tests/regularization tests/error_bars tests/inspection tests/compared tests/applications
 sanitize: $(READY)
 	CXX=g++ $(BUILD) -G Ninja -S . -B build/sanitized -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O1 \
-		-DSEPI_SANITIZE=address,undefined -DPython_EXECUTABLE="$(CURDIR)/$(BIN)/python" >build/sanitized.log
+		-DSEPI_SANITIZE=address,undefined -DSEPI_LEVELS=native -DPython_EXECUTABLE="$(CURDIR)/$(BIN)/python" >build/sanitized.log
 	$(BUILD) --build build/sanitized
 	touch CMakeLists.txt
 	$(BUILD) --install build/sanitized --prefix .
 	LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libubsan.so)" ASAN_OPTIONS=detect_leaks=0 \
-		$(ONE_THREAD) $(BIN)/python -m pytest -m "$(QUICK)" $(KERNEL_TESTS)
+		$(ONE_THREAD) SEPI_KERNELS=baseline $(BIN)/python -m pytest -m "$(QUICK)" $(KERNEL_TESTS)
 
 # what `make test` and `make test-system` do a few times, a hundred times; and what they leave to this
 faults: $(READY)
