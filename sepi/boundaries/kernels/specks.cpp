@@ -1,5 +1,6 @@
 #include "specks.hpp"
 
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <vector>
@@ -17,7 +18,7 @@ void specks_of(Array<const float, 2> disparity, float difference, Index most_pix
         return pixel;
     };
     const auto for_neighbours = [&](const auto &body) {
-        constexpr Index BEFORE[][2] = {{-1, -1}, {-1, 0}, {-1, 1}, {0, -1}};
+        constexpr std::array<std::array<Index, 2>, 4> BEFORE{{{-1, -1}, {-1, 0}, {-1, 1}, {0, -1}}};
         for (Index y = 0; y < H; ++y)
             for (Index x = 0; x < W; ++x)
                 for (const auto [down, across] : BEFORE)
