@@ -6,7 +6,8 @@
 namespace sepi {
 namespace {
 
-// Of a bilinear sample of a view (H, W, 3), from reference (3,). Products of 16 bits and a weight are exact as double.
+// Of a bilinear sample of a view (H, W, 3), from reference (3,), in units of what noise makes of it: samples between pixels
+// average noise. Products of 16 bits and a weight are exact as double.
 template <class Colour>
 auto squared_residual(Array<const Colour, 3> view, float unit, double row, double column, Array<const float, 1> reference) {
     using Number = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, float>;
@@ -21,7 +22,7 @@ auto squared_residual(Array<const Colour, 3> view, float unit, double row, doubl
         const Number residual = ((1 - fy) * above + fy * below) * unit - reference(c);
         total += residual * residual;
     }
-    return total;
+    return total / (1 + (fx * fx + (1 - fx) * (1 - fx)) * (fy * fy + (1 - fy) * (1 - fy)));
 }
 
 // How many of most steps from i stay in a line of n.
@@ -69,7 +70,7 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
 }
 
 void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float, 3> reference,
-                    const AskedViews &asked, Index begin, Index end, Array<float, 3> sums) {
+                    const AskedViews &asked, float most, Index begin, Index end, Array<float, 3> sums) {
     const Index W = disparity.shape[1];
     const double bottom = double(disparity.shape[0] - 1), right = double(W - 1);
     const auto add_view = [&](const auto &view, Array<const float, 2> nearest, double down, double across, Index y, const std::vector<Index> &columns) {
@@ -84,8 +85,8 @@ void compare_depths(const Views &views, float unit, Array<const float, 2> dispar
             const Index beside = column > std::floor(column);
             if (std::max(std::max(above[0], above[beside]), std::max(below[0], below[beside])) > f + asked.margin) continue;
             const auto colour = reference[y][x];
-            sums(0, y, x) = float(sums(0, y, x) + squared_residual(view, unit, row, column, colour));
-            sums(1, y, x) = float(sums(1, y, x) + squared_residual(view, unit, own_row, own_column, colour));
+            sums(0, y, x) += std::min(float(squared_residual(view, unit, row, column, colour)), most);
+            sums(1, y, x) += std::min(float(squared_residual(view, unit, own_row, own_column, colour)), most);
             ++sums(2, y, x);
         }
     };

@@ -9,30 +9,29 @@ constexpr float ROUNDING = 1.0f / 512;  // how far a position is from the same i
 constexpr float COLOUR_STEPS = 20000;   // from black to white, of colours as whole numbers of 16 bits
 constexpr std::int64_t ONE = 1 << 14;   // the sum of a sample's weights, which are whole numbers of 16 bits
 
-// Draws the W pixels of a row y of the reference view into a view: what is nearest at the positions no more than a pixel
-// away along either axis, which are two, or three where a pixel lies on one. Pixels of a smooth surface lie side by side in
-// the view, too: eight at once.
+// Draws the W pixels of a row y of the reference view into a view: what is nearest at the positions that their squares touch,
+// two along either axis. Pixels that lie on a position touch the one on this side or on that, as if the grid of views were
+// sheared a little: else all views of the reference view's row or column had it on the same side. Pixels of a smooth surface
+// lie side by side in the view, too: eight at once.
 void add_row(const float *row, Index W, Index y, double down, double across, Array<float, 2> nearest) {
-    const Index above = down == 0, before = across == 0;
-    const auto row_of = [=](Index x) { return double(y) - row[x] * down; };
-    const auto column_of = [=](Index x) { return double(x) - row[x] * across; };
+    const bool up = across < 0 || (across == 0 && down < 0), before = down < 0 || (down == 0 && across < 0);
+    const auto first_of = [](double position, bool earlier) { return Index(earlier ? std::ceil(position) - 1 : std::floor(position)); };
     // how far beyond where the first begins, of 0..1 if they lie side by side
     const auto between = [](Float8 beyond) { return least_of(smaller(beyond, 1.0f - beyond)) > ROUNDING; };
+    const auto square_of = [&](Index x) { return std::pair(first_of(double(y) - row[x] * down, up), first_of(double(x) - row[x] * across, before)); };
     for (Index begin = 0; begin < W; begin += LANES) {
-        const Index end = std::min(W, begin + LANES), top = Index(std::floor(row_of(begin))), left = Index(std::floor(column_of(begin)));
-        if (begin + LANES <= W && above <= top && top + 2 <= nearest.shape[0] && before <= left && left + 1 + LANES <= W) {
+        if (const auto [top, left] = square_of(begin); begin + LANES <= W && 0 <= top && top + 2 <= nearest.shape[0] && 0 <= left && left + 1 + LANES <= W) {
             const Float8 d = load(row + begin);
-            if ((above || between(float(y - top) - d * float(down))) && (before || between(float(begin - left) - d * float(across)))) {
-                for (Index i = top - above; i <= top + 1; ++i)
-                    for (Index j = left - before; j <= left + 1; ++j) store(nearest.at(i, j), larger(load(nearest.at(i, j)), d));
+            if ((down == 0 || between(float(y - top) - d * float(down))) && (across == 0 || between(float(begin - left) - d * float(across)))) {
+                for (Index i = top; i < top + 2; ++i)
+                    for (Index j = left; j < left + 2; ++j) store(nearest.at(i, j), larger(load(nearest.at(i, j)), d));
                 continue;
             }
         }
-        for (Index x = begin; x < end; ++x) {
-            const double v = row_of(x), u = column_of(x);
-            const Index bottom = std::min(nearest.shape[0] - 1, Index(std::floor(v)) + 1), right = std::min(W - 1, Index(std::floor(u)) + 1);
-            for (Index i = std::max<Index>(0, Index(std::ceil(v)) - 1); i <= bottom; ++i)
-                for (Index j = std::max<Index>(0, Index(std::ceil(u)) - 1); j <= right; ++j) nearest(i, j) = std::max(nearest(i, j), row[x]);
+        for (Index x = begin; x < std::min(W, begin + LANES); ++x) {
+            const auto [top, left] = square_of(x);
+            for (Index i = std::max<Index>(0, top); i < std::min(nearest.shape[0], top + 2); ++i)
+                for (Index j = std::max<Index>(0, left); j < std::min(W, left + 2); ++j) nearest(i, j) = std::max(nearest(i, j), row[x]);
         }
     }
 }
