@@ -24,7 +24,7 @@ from sepi.image.noise import BLACK, SATURATED, mask_energy
 from sepi.kernels import view_noise as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 
-VIEWS = 16
+VIEWS = 12
 """Nearest other views that are compared, at least: of those equally far away all."""
 
 MOST_MOVES = 400
