@@ -71,8 +71,8 @@ def chosen_plane(
     That of its border, where enough of that is known and its light does not contradict it. In noise only of a large
     region whose border is one plane, since faint texture, which noise hides, knows more than a few pixels beside it;
     and where what the region has lies about a plane, that one if it is nearer to the light's. Otherwise that of its
-    light, where it contradicts what the region has. Where the light is that of no plane, in noise that of a border that is clearly one, if what the
-    region has is no surface.
+    light, where it contradicts what the region has. Where the light is that of no plane, in noise that of a border that
+    is clearly one, if what the region has is no surface.
 
     Parameters
     ----------
