@@ -1,8 +1,8 @@
 """The arithmetic floor: what the multiply-adds of the plane sweep cost where nothing else does.
 
-The kernels of :mod:`sepi.kernels.floor` do the operations of the sweep (a sample: bilinear interpolation of three
-channels and the robust residual; a row of the window) on a few hundred numbers that stay in the first cache, at fixed
-places. A sweep cannot be faster than its operations at this price.
+The kernels of :mod:`sepi.kernels.floor` do the operations of the sweep (a sample: the polynomial of its squared
+difference, and the robust residual; a row of the window) on a few hundred numbers that stay in the first cache, at
+fixed places. A sweep cannot be faster than its operations at this price.
 """
 
 from __future__ import annotations

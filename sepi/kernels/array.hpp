@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -72,12 +73,14 @@ struct Array {
 template <class T, int N>
 struct Strided : Array<T, N> {};
 
+constexpr std::align_val_t ALIGNED{64};  // to lines of the cache
+
 // Memory of a C-contiguous array, not initialised, that goes when its owner does.
 template <class T, int N>
 class Scratch {
   public:
     template <class... Sizes>
-    explicit Scratch(Sizes... sizes) : size_((Index(sizes) * ...)), memory_(new T[size_]), array_{memory_.get(), {Index(sizes)...}, {}} {
+    explicit Scratch(Sizes... sizes) : size_((Index(sizes) * ...)), memory_(new (ALIGNED) T[size_]), array_{memory_.get(), {Index(sizes)...}, {}} {
         static_assert(sizeof...(Sizes) == N);
         Index stride = 1;
         for (int axis = N - 1; axis >= 0; --axis) {
@@ -94,8 +97,11 @@ class Scratch {
     const Array<T, N> &array() const { return array_; }
 
   private:
+    struct Free {
+        void operator()(T *memory) const { operator delete[](memory, ALIGNED); }
+    };
     Index size_;
-    std::unique_ptr<T[]> memory_;
+    std::unique_ptr<T[], Free> memory_;
     Array<T, N> array_;
 };
 

@@ -27,14 +27,10 @@ void add_passes(Index passes, Array<const float, 3> data, Array<float, 2> out, c
 }  // namespace
 
 void samples(Index passes, Array<const float, 3> data, Array<float, 2> out) {
-    add_passes(passes, data, out, [](Float8 weight, const Float8 *values, Float8 total) {
-        Float8 z{};
-        for (int channel = 0; channel < 3; ++channel) {
-            const auto value = [&](int k) { return values[(channel + k) % 5]; };
-            const Float8 upper = fma(spread(0.2f), value(1), fma(weight, value(0), -value(4)));
-            const Float8 residual = fma(spread(0.4f), value(3), fma(spread(0.3f), value(2), upper));
-            z = fma(residual, residual, z);
-        }
+    add_passes(passes, data, out, [](Float8 distance, const Float8 *values, Float8 total) {
+        Float8 z = values[4];
+        for (int power = 3; power >= 0; --power) z = fma(distance, z, values[power]);
+        z = larger(z, Float8{});
         return total + z / (z + spread(0.01f));
     });
 }

@@ -6,7 +6,7 @@
 
 namespace sepi {
 
-// Samples, bilinear in three channels, and their robust residuals: so many passes over data (threads, 7, N), added to
+// Samples, polynomials of their distance, and their robust residuals: so many passes over data (threads, 7, N), added to
 // out (threads, N). N is a multiple of LANES.
 void samples(Index passes, Array<const float, 3> data, Array<float, 2> out);
 

@@ -38,7 +38,7 @@ from sepi.threads import threads_used
 CANDIDATES = CandidateRule(usual=181, finest=0.02, coarsest=0.5)
 """The paper's number, for light fields like the paper's."""
 
-TILE_WIDTH = 512
+TILE_WIDTH = 128
 """Columns done at a time: bounds what a thread holds, whatever the width of the picture, and keeps it in the cache."""
 
 NOISE_LEFT_OUT = 0.9
@@ -92,12 +92,12 @@ class SweepParameters(CandidateParameters):
     def thread_bytes(self, number: int, width: int) -> int:
         """What a thread of :func:`sweep` holds with so many candidates, of pictures so wide.
 
-        Those are the costs and the numbers of samples in the rows of a window, and the costs of one row more, of every
-        candidate and group; and the weights of the windows of a row.
+        Those are the costs and the numbers of samples in the rows of a window, and their sums over the windows of a
+        block of pixels, of every candidate and group.
         """
-        size, columns, vectors = 2 * self.window_radius + 1, min(width, TILE_WIDTH), -(-number // LANES)
-        of_rows = (2 * size + 1) * (columns + 2 * self.window_radius + LANES) * self.groups * vectors * LANES
-        return 4 * (of_rows + size * size * columns)
+        size, vectors = 2 * self.window_radius + 1, -(-number // LANES)
+        columns = min(width, TILE_WIDTH) + 2 * self.window_radius + LANES
+        return 4 * 2 * (size * columns + kernels.BLOCK) * self.groups * vectors * LANES
 
 
 @dataclass(frozen=True)

@@ -234,7 +234,7 @@ def test_pixels_outside_the_mask_stay_unknown_and_those_inside_unchanged():
 
 def test_pixels_far_apart_equal_the_whole_picture():
     """Columns between are passed over: a window cut short there would change the depth of the pixels beside."""
-    gap = plane_sweep.SHORTEST_GAP
+    gap = plane_sweep.BLOCK
     light_field = random_light_field(grid=(3, 3), shape=(9, 4 * gap))
     parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=2, window_sigma=0.5)
     mask = np.zeros(light_field.shape, bool)

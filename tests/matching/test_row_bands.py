@@ -107,7 +107,7 @@ def test_a_limit_on_memory_leaves_the_rest_to_the_bands() -> None:
 
 
 def test_a_limit_on_memory_counts_what_each_thread_of_a_plane_sweep_holds(monkeypatch: pytest.MonkeyPatch) -> None:
-    """961 candidates of eight groups of views take hundreds of megabytes a thread, however small the picture."""
+    """961 candidates of eight groups of views take dozens of megabytes a thread, however small the picture."""
     field = LightField(np.zeros((3, 3, 64, 512, 3), np.uint8), "a", disparity_range=DisparityRange(-1, 1, "given"))
     many = {stage: {"num_disparities": 961} for stage in ("initial", "occlusion")}
     stages = list(stage_parameters(variant_named("paper"), many).values())
@@ -115,7 +115,7 @@ def test_a_limit_on_memory_counts_what_each_thread_of_a_plane_sweep_holds(monkey
     for threads in (1, 2):
         monkeypatch.setattr("sepi.matching.memory_limit.threads_used", lambda threads=threads: threads)
         left.append(bytes_of_bands(field, stages, 2**30))
-    assert 961 * 8 * (2 * 7 + 1) * 4 * 512 < left[0] - left[1] < 961 * 8 * 16 * 4 * 518
+    assert 961 * 8 * 2 * 7 * 4 * 128 < left[0] - left[1] < 961 * 8 * 2 * 7 * 4 * 150
 
 
 @pytest.mark.system

@@ -26,8 +26,8 @@ def test_a_wide_range_asks_for_its_cost_volume(tmp_path: Path) -> None:
     light_field = written(tmp_path / "lf.h5", 100)
     # 100 px to views 2 steps away, 0.4 px apart there
     assert candidates_mb(SCENE, light_field, FirstDepthParameters()) == round(410 * 8 * 300 * 400 / 2**20)
-    # 0.5 px apart, in vectors of 8; each thread has the rows of a window, their numbers of samples, and one row more
-    rows = (408 - 184) * (2 * 7 + 1) * 4 * (400 + 6 + 8)
+    # 0.5 px apart, in vectors of 8; each thread has the rows of a window and their numbers of samples, and sums of both
+    rows = (408 - 184) * 2 * 4 * (7 * (128 + 6 + 8) + 32)
     assert candidates_mb(SCENE, light_field, SweepParameters(), threads=3) == round(3 * rows / 2**20)
     assert candidates_mb(SCENE, light_field, HalfSepiParameters(), threads=3) == round(3 * 8 * rows / 2**20)
 

@@ -23,7 +23,7 @@ void bind_sweeps(nb::module_ &kernels) {
     bind_of_colours<std::uint8_t>(plane_sweep);
     bind_of_colours<std::uint16_t>(plane_sweep);
     bind_of_colours<float>(plane_sweep);
-    plane_sweep.attr("SHORTEST_GAP") = sepi::SHORTEST_GAP;
+    plane_sweep.attr("BLOCK") = sepi::BLOCK;
 
     auto visibility = kernels.def_submodule("visibility");
     visibility.attr("EMPTY") = sepi::EMPTY;

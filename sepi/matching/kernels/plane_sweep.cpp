@@ -1,6 +1,6 @@
-// One (candidate, view) has one sub-pixel weight for the whole picture, so a row is a run of contiguous multiply-adds.
-// Candidates next to each other mostly have their samples between the same four pixels. What lies between these is a
-// polynomial of the disparity: eight pixels' coefficients stay in registers while the candidates are gone through.
+// One (candidate, view) has one sub-pixel weight for the whole picture. Candidates next to each other mostly have their
+// samples between the same four pixels; what lies between these is a polynomial of the disparity, and so is the squared
+// difference: eight pixels' coefficients stay in registers while the candidates are gone through.
 //
 // No cost volume is ever held: a thread keeps the cost rows of one aggregation window, and the minimum is taken as soon
 // as a pixel is aggregated. Each pixel is summed by one thread in a fixed order: results do not depend on the number of
@@ -8,8 +8,11 @@
 #include "plane_sweep.hpp"
 
 #include <cmath>
+#include <cstring>
 #include <utility>
+#include <vector>
 
+#include "kernels/exponential.hpp"
 #include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
 #include "sample_polynomials.hpp"
@@ -17,14 +20,17 @@
 namespace sepi {
 namespace {
 
+constexpr Index BLOCK_ROW = BLOCK + LANES;  // the last vector reaches beyond a block
+constexpr Index AT_ONCE = 64;               // costs of a pixel, of all groups and candidates, that are aggregated at once
+
 // Columns begin..end of row y.
 struct Run {
     Index y, begin, end;
 };
 
-// Rows top..bottom of columns begin..end; views are counted nearer than margin to the border.
+// Rows top..bottom of columns begin..end.
 struct Tile {
-    Index top, bottom, begin, end, margin;
+    Index top, bottom, begin, end;
 };
 
 struct Span {
@@ -34,7 +40,7 @@ struct Span {
 // Columns of a run whose samples, below row top and left columns on, are in shown (H or 0, 2).
 Span seen_run(Array<const std::int64_t, 2> shown, Index W, Run run, Index top, Index left, float fx) {
     Index low = 0, high = W;
-    if (shown.shape[0] > 0 && 0 <= top && top <= shown.shape[0] - 2) {
+    if (shown.shape[0] > 0) {
         low = std::max(shown(top, 0), shown(top + 1, 0));
         high = std::min(shown(top, 1), shown(top + 1, 1));
     }
@@ -42,118 +48,92 @@ Span seen_run(Array<const std::int64_t, 2> shown, Index W, Run run, Index top, I
     return {std::max(run.begin, low - left), std::min(run.end, (fx == 0 ? high : high - 1) - left)};
 }
 
-template <class Colour>
-struct Sizes {
-    Index T, S, H, W, K, G;
-
-    Sizes(const ViewStack<Colour> &views, const Candidates &candidates)
-        : T(views.groups.shape[0]), S(views.groups.shape[1]), H(views.colours.shape[3]), W(views.colours.shape[4] - LANES), K(candidates.number()),
-          G(views.subsets.shape[1]) {}
+// Candidates begin..end whose samples are between the same four pixels, or the same of them.
+struct Segment {
+    Index begin, end, down, left;
+    Motion at;
 };
 
-// Add the residuals of one view to cost (K, n); distances (K,) is scratch.
+struct ComparedView {
+    Index t, s;
+    std::vector<Segment> segments;
+    std::vector<float> distances;  // of each candidate from the origin of its segment
+
+    ComparedView(const Candidates &candidates, Index t, Index s) : t(t), s(s), distances(candidates.number()) {
+        const Index r = candidates.row(t, s), c = candidates.column(t, s), K = candidates.number();
+        const auto *down = candidates.down.at(r), *across = candidates.across.at(c);
+        const float *fy = candidates.fy.at(r), *fx = candidates.fx.at(c), *disparities = candidates.disparities.data;
+        for (Index here = 0, next; here < K; here = next) {
+            next = end_of_same_pixels(here, K, down, fy, across, fx);
+            const Index origin = origin_of(disparities, here, next);
+            for (Index n = here; n < next; ++n) distances[n] = disparities[n] - disparities[origin];
+            segments.push_back({here, next, down[here], across[here], {fy[origin], fx[origin], candidates.sy(r), candidates.sx(c)}});
+        }
+    }
+};
+
+// Groups of views.
+struct Subset {
+    std::vector<Index> groups;
+    float views = 0;  // how many they are
+};
+
+struct ComparedViews {
+    std::vector<std::vector<ComparedView>> groups;
+    std::vector<Subset> subsets;
+
+    template <class Colour>
+    ComparedViews(const ViewStack<Colour> &views, const Candidates &candidates) : groups(views.subsets.shape[1]), subsets(views.subsets.shape[0]) {
+        for (Index t = 0; t < views.groups.shape[0]; ++t)
+            for (Index s = 0; s < views.groups.shape[1]; ++s)
+                if (const Index g = views.groups(t, s); g >= 0) groups[g].emplace_back(candidates, t, s);
+        for (Index n = 0; n < views.subsets.shape[0]; ++n)
+            for (Index g = 0; g < views.subsets.shape[1]; ++g)
+                if (views.subsets(n, g)) subsets[n].groups.push_back(g), subsets[n].views += float(groups[g].size());
+    }
+};
+
+// Add the residuals of one view to costs (K', BLOCK_ROW), and where it sees the pixels 1 to counts, unless that is null.
 template <class Colour>
-void add_view(const ViewStack<Colour> &views, const Candidates &candidates, Index t, Index s, Run run, float *distances, Array<float, 2> cost) {
-    const Sizes<Colour> sizes(views, candidates);
-    const auto colours = views.colours[t][s], reference = views.colours[views.t0][views.s0];
-    const auto shown = views.shown[t][s];
-    const Index r = candidates.row(t, s), c = candidates.column(t, s);
-    const auto *down = candidates.down.at(r), *across = candidates.across.at(c);
-    const float *fy = candidates.fy.at(r), *fx = candidates.fx.at(c), *disparities = candidates.disparities.data;
+void add_view(const ViewStack<Colour> &views, const ComparedView &view, Run run, float *costs, float *counts) {
+    const Index H = views.colours.shape[3], W = views.colours.shape[4] - LANES;
+    const auto colours = views.colours[view.t][view.s], reference = views.colours[views.t0][views.s0];
+    const auto shown = views.shown[view.t][view.s];
     const Float8 scale2 = spread(views.scale2);
-    for (Index here = 0, next; here < sizes.K; here = next) {
-        const UpperRow upper = upper_row(run.y, down[here], fy[here], sizes.H);
-        const Index top = upper.top, left = across[here];
-        const auto [first, last] = seen_run(shown, sizes.W, run, top, left, fx[here]);
-        next = here + 1;
-        if (top < 0 || top > sizes.H - 2 || last <= first) continue;
-        next = end_of_same_pixels(here, sizes.K, down, fy, across, fx);
-        const Index origin = origin_of(disparities, here, next);
-        for (Index n = here; n < next; ++n) distances[n] = disparities[n] - disparities[origin];
-        const Motion at{fy[here] == 0 ? upper.below : fy[origin], fx[origin], candidates.sy(r), candidates.sx(c)};
-        for (Index x = first; x < last; x += LANES) {
-            const auto of_channel = [&](Index channel) {
-                return difference(colours.at(channel, top, x + left), colours.at(channel, top + 1, x + left), reference.at(channel, run.y, x), at);
-            };
-            Polynomial red = of_channel(0), green = of_channel(1), blue = of_channel(2);
+    for (const auto &[begin, end, down, left, motion] : view.segments) {
+        const auto [top, below] = upper_row(run.y, down, motion.fy, H);
+        if (top < 0 || top > H - 2) continue;
+        const auto [first, last] = seen_run(shown, W, run, top, left, motion.fx);
+        const Motion at{below, motion.fx, motion.sy, motion.sx};
+        const auto squares_of = [&](Index x) {
+            SquaredDifferences squares;
+            for (Index c = 0; c < 3; ++c) squares.add(colours.at(c, top, x + left), colours.at(c, top + 1, x + left), reference.at(c, run.y, x), at);
             // differences of 0 add nothing to what others have added
-            if (last - x < LANES)
-                for (Polynomial *each : {&red, &green, &blue}) each->keep_first(last - x);
-            float *place = cost.at(here, x - run.begin);
-            for (Index n = here; n < next; ++n, place += cost.strides[0]) {
-                const Float8 e = spread(distances[n]);
-                const Float8 r0 = red.at(e), r1 = green.at(e), r2 = blue.at(e);
-                const Float8 z = fma(r2, r2, fma(r1, r1, r0 * r0));
-                store(place, load(place) + z / (z + scale2));
+            if (last - x < LANES) squares.keep_first(last - x);
+            return squares;
+        };
+        const auto add = [&](const SquaredDifferences &squares, Float8 distance, float *cost) {
+            const Float8 z = squares.at(distance);
+            store(cost, load(cost) + z / (z + scale2));
+        };
+        for (Index x = first; x < last; x += 2 * LANES) {
+            float *cost = costs + begin * BLOCK_ROW + x - run.begin;
+            const auto squares = squares_of(x);
+            if (last - x <= LANES) {
+                for (Index n = begin; n < end; ++n, cost += BLOCK_ROW) add(squares, spread(view.distances[n]), cost);
+                break;
+            }
+            // the next eight as well: what one waits for is time for the other
+            const auto next = squares_of(x + LANES);
+            for (Index n = begin; n < end; ++n, cost += BLOCK_ROW) {
+                const Float8 distance = spread(view.distances[n]);
+                add(squares, distance, cost);
+                add(next, distance, cost + LANES);
             }
         }
-    }
-}
-
-// Photo-consistency of a run of pixels, summed over each group of views, for every candidate, into
-// costs (G, K or more, n + LANES): sums of robust residuals, each 0..1, and 0 after them.
-template <class Colour>
-void cost_row(const ViewStack<Colour> &views, const Candidates &candidates, Run run, float *distances, Array<float, 3> costs) {
-    for (Index g = 0; g < costs.shape[0]; ++g)
-        for (Index k = 0; k < costs.shape[1]; ++k) std::fill_n(costs.at(g, k), run.end - run.begin + LANES, 0.0f);
-    for (Index t = 0; t < views.groups.shape[0]; ++t)
-        for (Index s = 0; s < views.groups.shape[1]; ++s)
-            if (const Index g = views.groups(t, s); g >= 0) add_view(views, candidates, t, s, run, distances, costs[g]);
-}
-
-// Number of views of each group that see each pixel of a run at each candidate, into counts (n, G K').
-template <class Colour>
-void count_views(const ViewStack<Colour> &views, const Candidates &candidates, Run run, Array<float, 2> counts) {
-    const Sizes<Colour> sizes(views, candidates);
-    const Index U = candidates.across.shape[0], width = counts.shape[1] / sizes.G;
-    // views of each group, and equally far across, that have the row, at each candidate
-    const auto having = zeros<float, 3>(sizes.G, U, sizes.K);
-    const auto some = zeros<bool, 2>(sizes.G, U);
-    for (Index t = 0; t < sizes.T; ++t) {
-        for (Index s = 0; s < sizes.S; ++s) {
-            const Index g = views.groups(t, s), r = candidates.row(t, s), u = candidates.column(t, s);
-            if (g < 0) continue;
-            some.array()(g, u) = true;
-            for (Index k = 0; k < sizes.K; ++k) {
-                const Index top = run.y + candidates.down(r, k);
-                if (top >= 0 && (top < sizes.H - 1 || (top == sizes.H - 1 && candidates.fy(r, k) == 0))) having.array()(g, u, k) += 1;
-            }
-        }
-    }
-    for (Index x = run.begin; x < run.end; ++x) {
-        std::fill_n(counts.at(x - run.begin), counts.shape[1], 0.0f);
-        for (Index g = 0; g < sizes.G; ++g) {
-            float *number = counts.at(x - run.begin, g * width);
-            for (Index u = 0; u < U; ++u) {
-                if (!some.array()(g, u)) continue;
-                const auto *left = candidates.across.at(u);
-                const float *fx = candidates.fx.at(u), *of_column = having.array().at(g, u);
-                for (Index k = 0; k < sizes.K; ++k) {
-                    const bool inside = x + left[k] >= 0 && x + left[k] < (fx[k] == 0 ? sizes.W : sizes.W - 1);
-                    number[k] += inside ? of_column[k] : 0.0f;
-                }
-            }
-        }
-    }
-}
-
-// count_views of views that do not show all of the picture.
-template <class Colour>
-void count_shown(const ViewStack<Colour> &views, const Candidates &candidates, Run run, Array<float, 2> counts) {
-    const Sizes<Colour> sizes(views, candidates);
-    const Index width = counts.shape[1] / sizes.G;
-    for (Index x = 0; x < run.end - run.begin; ++x) std::fill_n(counts.at(x), counts.shape[1], 0.0f);
-    for (Index t = 0; t < sizes.T; ++t) {
-        for (Index s = 0; s < sizes.S; ++s) {
-            const Index g = views.groups(t, s), r = candidates.row(t, s), c = candidates.column(t, s);
-            if (g < 0) continue;
-            for (Index k = 0; k < sizes.K; ++k) {
-                const Index top = upper_row(run.y, candidates.down(r, k), candidates.fy(r, k), sizes.H).top;
-                const auto [first, last] = seen_run(views.shown[t][s], sizes.W, run, top, candidates.across(c, k), candidates.fx(c, k));
-                if (top < 0 || top > sizes.H - 2) continue;
-                for (Index x = first; x < last; ++x) counts(x - run.begin, g * width + k) += 1;
-            }
-        }
+        if (!counts) continue;
+        for (Index n = begin; n < end; ++n)
+            for (Index x = first; x < last; ++x) counts[n * BLOCK_ROW + x - run.begin] += 1;
     }
 }
 
@@ -162,7 +142,7 @@ void window_weights(const Window &window, Run run, Array<float, 3> weights) {
     const Index H = window.guide.shape[1], W = window.guide.shape[2], size = weights.shape[0], n = run.end - run.begin;
     const auto totals = zeros<float, 1>(n);
     float *total = totals.array().data;
-    std::fill_n(weights.data, size * size * n, 0.0f);
+    std::fill_n(weights.data, size * weights.strides[0], 0.0f);
     const float falloff = -0.5f / window.variance;
     for (Index i = 0; i < size; ++i) {
         const Index row = run.y + i - window.radius;
@@ -178,7 +158,7 @@ void window_weights(const Window &window, Run run, Array<float, 3> weights) {
                     weight[x] += e * e;
                 }
             }
-            for (Index x = 0; x < last - first; ++x) weight[x] = std::exp(falloff * weight[x]);
+            for (Index x = 0; x < last - first; ++x) weight[x] = exp_of_negative(falloff * weight[x]);
             for (Index x = 0; x < last - first; ++x) sums[x] += weight[x];
         }
     }
@@ -189,50 +169,8 @@ void window_weights(const Window &window, Run run, Array<float, 3> weights) {
         }
 }
 
-// Weighted sum over the window of pixel (y, x), of all groups and candidates at once, into sums (G K').
-// ring (size, n, G K') is one of Rows, weights (size, size, n) are those of window_weights.
-void aggregate(Array<const float, 3> ring, Index y, Index x, Index H, Array<const float, 3> weights, float *__restrict sums) {
-    const Index size = weights.shape[0], number = ring.shape[2], step = weights.strides[1];
-    std::fill_n(sums, number, 0.0f);
-    for (Index i = 0; i < size; ++i) {
-        const Index row = y + i - size / 2;
-        if (row < 0 || row >= H) continue;
-        const float *source = ring.at(row % size, x), *w = weights.at(i, 0, x);
-        if (size == 7) {
-            // the usual window, a row of it at once: sums are loaded and stored once only
-            const float w0 = w[0], w1 = w[step], w2 = w[2 * step], w3 = w[3 * step], w4 = w[4 * step], w5 = w[5 * step], w6 = w[6 * step];
-            const float *a = source;
-            for (Index k = 0; k < number; ++k)
-                sums[k] += (w0 * a[k] + w1 * a[number + k]) + (w2 * a[2 * number + k] + w3 * a[3 * number + k]) +
-                           (w4 * a[4 * number + k] + w5 * a[5 * number + k]) + w6 * a[6 * number + k];
-        } else {
-            for (Index j = 0; j < size; ++j)
-                for (Index k = 0; k < number; ++k) sums[k] += w[j * step] * source[j * number + k];
-        }
-    }
-}
-
 struct Best {
     float disparity, cost, mean;
-};
-
-// Of one pixel and all groups: sums of the costs of its window, and of the views that have them, (G, K'); where
-// all_seen, all candidates have the samples of the first.
-struct Aggregated {
-    Array<const float, 2> sums, counts;
-    bool all_seen;
-
-    // Mean cost of the candidates from k on over the views of one subset of groups.
-    Float8 mean(const bool *subset, Index k) const {
-        Float8 total{}, number{};
-        for (Index g = 0; g < sums.shape[0]; ++g) {
-            if (!subset[g]) continue;
-            total = total + load(sums.at(g, k));
-            number = number + (all_seen ? spread(counts(g, 0)) : load(counts.at(g, k)));
-        }
-        // a candidate that no view of the subset sees is no match
-        return number <= Float8{} ? spread(1) : total / number;
-    }
 };
 
 // What noise takes of the costs of a pixel: moments of a subset of views (K'), times weights of the pixel.
@@ -243,27 +181,35 @@ struct TakenByNoise {
     Float8 at(Index k) const { return fma(spread(second_weight), load(second + k), spread(first_weight) * load(first + k)); }
 };
 
-// Disparity at the lowest of the costs, refined below the disparity sampling; that cost; the mean of all. costs (K') is
-// scratch.
-Best best_candidate(const Aggregated &found, const bool *subset, const TakenByNoise &noise, Array<const float, 1> disparities, float *costs) {
-    const Index K = disparities.shape[0];
+// Disparity at the lowest of the costs of a subset, refined below the disparity sampling; that cost; the mean of all.
+// sums, and counts unless all views see the pixel, are of its window (G, K'); costs (K') is scratch.
+Best best_candidate(const Subset &subset, const float *sums, const float *counts, const TakenByNoise &noise, Array<const float, 1> disparities,
+                    Array<float, 1> costs) {
+    const Index K = disparities.shape[0], padded = costs.shape[0];
     constexpr float MOST = 1e9f;
-    Float8 all_least = spread(MOST), sum{};
-    const Float8 one = spread(1);
+    Float8 all_least = spread(MOST), sum{}, number = spread(subset.views);
     for (Index k = 0; k < K; k += LANES) {
-        const Float8 mean = found.mean(subset, k), taken = noise.at(k);
-        const Float8 cost = fma(mean - one, taken / (one - taken), mean);
-        store(costs + k, cost);
+        const auto of_groups = [&](const float *values) {
+            Float8 total{};
+            for (const Index g : subset.groups) total = total + load(values + g * padded + k);
+            return total;
+        };
+        if (counts) number = of_groups(counts);
+        // (mean - taken) / (1 - taken); a candidate that no view of the subset sees is no match
+        const Float8 total = of_groups(sums), lost = number * noise.at(k);
+        const Float8 cost = number <= Float8{} ? spread(1) : (total - lost) / (number - lost);
+        store(costs.at(k), cost);
         all_least = smaller(all_least, first_lanes(cost, K - k, MOST));
         sum = sum + first_lanes(cost, K - k, 0);
     }
     const float lowest = least_of(all_least);
     Index best = 0;
-    while (best < K - 1 && costs[best] != lowest) ++best;
+    while (best < K - LANES && !any(load(costs.at(best)) == spread(lowest))) best += LANES;
+    while (best < K - 1 && costs(best) != lowest) ++best;
     double offset = 0;
     // a perfect match needs no parabola, and the ends of the range allow none
     if (lowest != 0 && 0 < best && best < K - 1) {
-        const float before = costs[best - 1], after = costs[best + 1];
+        const float before = costs(best - 1), after = costs(best + 1);
         const double curvature = before - 2 * double(lowest) + after;
         if (curvature > 0) offset = 0.5f * (before - after) / curvature;
     }
@@ -271,109 +217,111 @@ Best best_candidate(const Aggregated &found, const bool *subset, const TakenByNo
     return {float(disparities(best) + offset * sampling), lowest, sum_of(sum) / float(K)};
 }
 
-// Runs of columns of a row that windows of the mask's pixels touch, into runs, and how many. A short gap does not end a
-// run.
-Index needed_runs(Array<const bool, 2> mask, Index row, const Tile &tile, Index radius, Span *runs) {
-    const Index H = mask.shape[0], W = mask.shape[1];
-    Index number = 0;
-    for (Index x = tile.begin; x < tile.end; ++x) {
-        bool needed = false;
-        for (Index y = std::max<Index>(0, row - radius); y < std::min(H, row + radius + 1); ++y) needed |= mask(y, x);
-        if (!needed) continue;
-        const Index first = std::max<Index>(0, x - radius), last = std::min(W, x + radius + 1);
-        if (number && first - runs[number - 1].end < SHORTEST_GAP) {
-            runs[number - 1].end = last;
-        } else {
-            runs[number++] = {first, last};
-        }
-    }
-    return number;
-}
-
-// The first columns of costs (G, K', n), and some zeros after them, as target (n, G K').
-void transpose_costs(Array<const float, 3> costs, Index columns, Array<float, 2> target) {
-    const Index G = costs.shape[0], K = costs.shape[1];
-    for (Index x = 0; x < columns; x += LANES)
-        for (Index g = 0; g < G; ++g)
-            for (Index k = 0; k < K; k += LANES) {
-                Float8 rows[LANES];
-                for (Index i = 0; i < LANES; ++i) rows[i] = load(costs.at(g, k + i, x));
-                transpose(rows);
-                for (Index i = 0; i < LANES; ++i) store(target.at(x + i, g * K + k), rows[i]);
-            }
-}
-
 template <class Colour>
 class TileSweep {
   public:
-    TileSweep(const ViewStack<Colour> &views, const Candidates &candidates, const Window &window, const ExpectedCosts &expected, Array<const bool, 2> mask,
-              const Tile &tile, const BestMaps &maps)
-        : views_(views), candidates_(candidates), window_(window), expected_(expected), mask_(mask), tile_(tile), maps_(maps) {}
+    // Of tiles of at most so many columns.
+    TileSweep(const ViewStack<Colour> &views, const ComparedViews &compared, const Candidates &candidates, const Window &window, const ExpectedCosts &expected,
+              Array<const bool, 2> mask, Index width, const BestMaps &maps)
+        : views_(views), compared_(compared), candidates_(candidates), window_(window), expected_(expected), mask_(mask), maps_(maps),
+          columns_(width + 2 * window.radius + LANES) {}
 
-    // Sweep the pixels of the tile that are in the mask.
-    void run() {
-        for (Index g, t = 0; t < views_.groups.shape[0]; ++t)
-            for (Index s = 0; s < views_.groups.shape[1]; ++s)
-                if ((g = views_.groups(t, s)) >= 0)
-                    for (Index k = 0; k < padded_; ++k) all_of_group_.array()(g, k) += 1;
+    // Sweep the pixels of a tile that are in the mask.
+    void run(const Tile &tile) {
+        tile_ = tile;
+        const Index radius = window_.radius, last = std::min(W_, tile.end + radius);
         Index done = -1;  // last row whose costs are in the ring
-        for (Index y = tile_.top; y < tile_.bottom; ++y) {
-            const bool *wanted = mask_.at(y, 0);
-            if (std::none_of(wanted + tile_.begin, wanted + tile_.end, [](bool each) { return each; })) continue;
-            const Index reached = std::min(mask_.shape[0], y + window_.radius + 1);
-            for (Index row = std::max({Index(0), y - window_.radius, done + 1}); row < reached; ++row) fill_row(row), done = row;
-            window_weights(window_, {y, tile_.begin, tile_.end}, weights_.array());
-            sweep_row(y);
+        for (Index y = tile.top; y < tile.bottom; ++y) {
+            if (!wanted({y, tile.begin, tile.end}, 0)) continue;
+            const Index reached = std::min(H_, y + radius + 1);
+            for (Index row = std::max({Index(0), y - radius, done + 1}); row < reached; ++row)
+                for (Index x = std::max<Index>(0, tile.begin - radius); x < last; x += BLOCK) fill_run({row, x, std::min(last, x + BLOCK)});
+            done = reached - 1;
+            for (Index x = tile.begin; x < tile.end; x += BLOCK) sweep_run({y, x, std::min(tile.end, x + BLOCK)});
         }
     }
 
   private:
-    // Costs of one row where they are needed, and near the border the number of views that see it.
-    void fill_row(Index row) {
-        const Index H = mask_.shape[0], W = mask_.shape[1], radius = window_.radius, origin = tile_.begin - radius;
-        const auto from = [&](const Scratch<float, 3> &rows, Index column) {
-            auto part = rows.array()[row % size_];
-            part.data = part.at(column - origin);
-            return part;
-        };
-        const Index number = needed_runs(mask_, row, tile_, radius, runs_.array().data);
-        for (Index r = 0; r < number; ++r) {
-            const auto [first, last] = runs_.array()(r);
-            cost_row(views_, candidates_, {row, first, last}, distances_.array().data, costs_.array());
-            transpose_costs(costs_.array(), last - first, from(ring_, first));
-            // windows of pixels near the border reach this far
-            const Index inner = tile_.margin + radius;
-            Index left = last, right = last;
-            if (inner <= row && row < H - inner) {
-                left = std::min(last, inner);
-                right = std::max({first, left, W - inner});
-            }
-            for (const auto [begin, end] : {Span{first, left}, Span{right, last}}) {
-                if (begin >= end) continue;
-                if (views_.shown.shape[2] > 0) {
-                    count_shown(views_, candidates_, {row, begin, end}, from(counts_, begin));
-                } else {
-                    count_views(views_, candidates_, {row, begin, end}, from(counts_, begin));
-                }
+    // Whether the mask has a pixel of the tile in a run, or so near to it.
+    bool wanted(Run run, Index reach) const {
+        const Index begin = std::max(tile_.begin, run.begin - reach), end = std::min(tile_.end, run.end + reach);
+        for (Index y = std::max(tile_.top, run.y - reach); y < std::min(tile_.bottom, run.y + reach + 1); ++y)
+            if (begin < end && std::memchr(mask_.at(y, begin), true, end - begin)) return true;
+        return false;
+    }
+
+    // Whether every view sees what is within so many pixels of a pixel, at every candidate.
+    bool all_seen(Index y, Index x, Index reach) const {
+        const Index margin = margin_ + reach;
+        return margin <= y && y < H_ - margin && margin <= x && x < W_ - margin;
+    }
+
+    // Costs of a run where they are needed, and near the border the number of views that see it.
+    void fill_run(Run run) {
+        const Index radius = window_.radius;
+        while (run.begin < run.end && !wanted({run.y, run.begin, std::min(run.end, run.begin + LANES)}, radius)) run.begin += LANES;
+        while (run.begin < run.end && !wanted({run.y, run.end - 1, run.end}, radius)) --run.end;
+        if (run.begin >= run.end) return;
+        const bool count = !all_seen(run.y, run.begin, radius) || !all_seen(run.y, run.end - 1, radius);
+        float *costs = block_costs_.array().data, *counts = count ? block_counts_.array().data : nullptr;
+        for (Index g = 0; g < Index(compared_.groups.size()); ++g) {
+            for (float *each : {costs, counts})
+                if (each) std::fill_n(each, padded_ * BLOCK_ROW, 0.0f);
+            for (const ComparedView &view : compared_.groups[g]) add_view(views_, view, run, costs, counts);
+            turn(costs, run, g, ring_.array());
+            if (count) turn(counts, run, g, counts_.array());
+        }
+    }
+
+    // Costs of a run in one group, (K', BLOCK_ROW), and some zeros after them, to their place in a ring.
+    void turn(const float *costs, Run run, Index g, Array<float, 4> ring) const {
+        for (Index k = 0; k < padded_; k += LANES) {
+            const Index place = g * padded_ + k;
+            for (Index x = run.begin; x < run.end; x += LANES) {
+                Float8 rows[LANES];
+                for (Index i = 0; i < LANES; ++i) rows[i] = load(costs + (k + i) * BLOCK_ROW + x - run.begin);
+                transpose(rows);
+                float *target = ring.at(run.y % size_, place / AT_ONCE, x - tile_.begin + window_.radius, place % AT_ONCE);
+                for (Index i = 0; i < LANES; ++i) store(target + i * AT_ONCE, rows[i]);
             }
         }
     }
 
-    // Best candidates of the pixels of a row that are in the mask.
-    void sweep_row(Index y) {
-        const Index H = mask_.shape[0], W = mask_.shape[1];
-        const auto sums = sums_.array(), numbers = numbers_.array();
-        const auto weights = weights_.array();
-        for (Index x = tile_.begin; x < tile_.end; ++x) {
-            if (!mask_(y, x)) continue;
-            aggregate(ring_.array(), y, x - tile_.begin, H, weights, sums.data);
+    // Sums over the windows of pixels at columns of a run, whose weights are known, into sums (n, G K'), of rows in a ring.
+    void aggregate(Array<const float, 4> ring, Run run, const std::vector<Index> &columns, Array<float, 2> sums) const {
+        const Index radius = window_.radius, top = std::max<Index>(0, run.y - radius), bottom = std::min(H_, run.y + radius + 1);
+        const Array<const float, 3> weights = weights_.array();
+        for (Index part = 0; part < parts_; ++part)
+            for (const Index x : columns) {
+                Float8 total[AT_ONCE / LANES]{};
+                for (Index row = top; row < bottom; ++row) {
+                    const float *costs = ring.at(row % size_, part, run.begin + x - tile_.begin), *weight = weights.at(row - run.y + radius, 0, x);
+                    for (Index j = 0; j < size_; ++j, costs += AT_ONCE, weight += BLOCK)
+                        for (Index i = 0; i < AT_ONCE / LANES; ++i) total[i] = fma(spread(*weight), load(costs + i * LANES), total[i]);
+                }
+                for (Index i = 0; i < AT_ONCE / LANES; ++i) store(sums.at(x, part * AT_ONCE + i * LANES), total[i]);
+            }
+    }
+
+    // Best candidates of the pixels of a run that are in the mask.
+    void sweep_run(Run run) {
+        std::vector<Index> columns, counted;
+        for (Index x = run.begin; x < run.end; ++x) {
+            if (!mask_(run.y, x)) continue;
+            columns.push_back(x - run.begin);
             // away from the border every view sees every pixel of the window: nothing to count
-            const bool all_seen = tile_.margin <= y && y < H - tile_.margin && tile_.margin <= x && x < W - tile_.margin;
-            if (!all_seen) aggregate(counts_.array(), y, x - tile_.begin, H, weights, numbers.data);
-            const Aggregated found{sums, all_seen ? all_of_group_.array() : numbers, all_seen};
-            for (Index n = 0; n < views_.subsets.shape[0]; ++n) {
+            if (!all_seen(run.y, x, 0)) counted.push_back(x - run.begin);
+        }
+        if (columns.empty()) return;
+        window_weights(window_, run, weights_.array());
+        aggregate(ring_.array(), run, columns, sums_.array());
+        aggregate(counts_.array(), run, counted, numbers_.array());
+        for (const Index column : columns) {
+            const Index y = run.y, x = run.begin + column;
+            const float *counts = all_seen(y, x, 0) ? nullptr : numbers_.array().at(column);
+            for (Index n = 0; n < Index(compared_.subsets.size()); ++n) {
                 const TakenByNoise noise{expected_.moments.at(0, n), expected_.moments.at(1, n), expected_.weights(0, y, x), expected_.weights(1, y, x)};
-                const Best best = best_candidate(found, views_.subsets.at(n), noise, candidates_.disparities, pixel_costs_.array().data);
+                const Best best = best_candidate(compared_.subsets[n], sums_.array().at(column), counts, noise, candidates_.disparities, pixel_costs_.array());
                 maps_.disparity(n, y, x) = best.disparity;
                 maps_.cost(n, y, x) = best.cost;
                 maps_.mean(n, y, x) = best.mean;
@@ -382,23 +330,26 @@ class TileSweep {
     }
 
     const ViewStack<Colour> &views_;
+    const ComparedViews &compared_;
     const Candidates &candidates_;
     const Window &window_;
     const ExpectedCosts &expected_;
     const Array<const bool, 2> mask_;
-    const Tile tile_;
     const BestMaps &maps_;
+    Tile tile_;
 
-    const Index groups_ = views_.subsets.shape[1], padded_ = (candidates_.number() + LANES - 1) / LANES * LANES;
-    const Index size_ = 2 * window_.radius + 1, width_ = tile_.end - tile_.begin;
+    const Index H_ = mask_.shape[0], W_ = mask_.shape[1];
+    // where a view may show less than the picture, all pixels are as those near its border
+    const Index margin_ = views_.shown.shape[2] > 0 ? H_ + W_ : Index(std::ceil(candidates_.reach)) + window_.radius + 1;
+    const Index padded_ = (candidates_.number() + LANES - 1) / LANES * LANES, size_ = 2 * window_.radius + 1;
     // with the columns of the windows at both ends
-    const Index columns_ = width_ + 2 * window_.radius + LANES;
-    // rows of a window: row r at r % size, column x - radius of the tile at x; zero outside the picture
-    const Scratch<float, 3> ring_ = zeros<float, 3>(size_, columns_, groups_ * padded_), counts_ = zeros<float, 3>(size_, columns_, groups_ * padded_);
-    const Scratch<float, 3> costs_{groups_, padded_, columns_}, weights_{size_, size_, width_};
-    const Scratch<float, 2> sums_{groups_, padded_}, numbers_{groups_, padded_}, all_of_group_ = zeros<float, 2>(groups_, padded_);
-    const Scratch<float, 1> pixel_costs_{padded_}, distances_{candidates_.number()};
-    const Scratch<Span, 1> runs_{width_ / SHORTEST_GAP + 2};
+    const Index columns_, parts_ = (Index(compared_.groups.size()) * padded_ + AT_ONCE - 1) / AT_ONCE;
+    // rows of a window: row r at r % size, column x - radius of the tile at x; what is outside the picture is a number
+    const Scratch<float, 4> ring_ = zeros<float, 4>(size_, parts_, columns_, AT_ONCE), counts_ = zeros<float, 4>(size_, parts_, columns_, AT_ONCE);
+    const Scratch<float, 2> block_costs_{padded_, BLOCK_ROW}, block_counts_{padded_, BLOCK_ROW};
+    const Scratch<float, 3> weights_{size_, size_, BLOCK};
+    const Scratch<float, 2> sums_{BLOCK, parts_ * AT_ONCE}, numbers_{BLOCK, parts_ * AT_ONCE};
+    const Scratch<float, 1> pixel_costs_{padded_};
 };
 
 // The channels of a row of pixels, each by itself.
@@ -430,15 +381,12 @@ void planes_of(Strided<const Colour, 5> views, Array<Colour, 5> planes) {
 template <class Colour>
 void sweep_plane_rows(const ViewStack<Colour> &views, const Candidates &candidates, const Window &window, const ExpectedCosts &expected,
                       Array<const bool, 2> mask, Index begin, Index end, Index height, Index width, const BestMaps &maps) {
-    const Index H = mask.shape[0], W = mask.shape[1];
-    // where a view may show less than the picture, all pixels are as those near its border
-    const Index margin = views.shown.shape[2] > 0 ? H + W : Index(std::ceil(candidates.reach)) + window.radius + 1;
+    const Index W = mask.shape[1];
+    const ComparedViews compared(views, candidates);
     parallel_for(0, (end - begin + height - 1) / height, [&](Index task) {
         const Index top = begin + task * height;
-        for (Index left = 0; left < W; left += width) {
-            const Tile tile{top, std::min(end, top + height), left, std::min(W, left + width), margin};
-            TileSweep<Colour>(views, candidates, window, expected, mask, tile, maps).run();
-        }
+        TileSweep<Colour> sweep(views, compared, candidates, window, expected, mask, std::min(W, width), maps);
+        for (Index left = 0; left < W; left += width) sweep.run({top, std::min(end, top + height), left, std::min(W, left + width)});
     });
 }
 

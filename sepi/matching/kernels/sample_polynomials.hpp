@@ -6,41 +6,46 @@
 
 namespace sepi {
 
-// constant + distance (linear + distance quadratic), of eight pixels.
-struct Polynomial {
-    Float8 constant, linear, quadratic;
-
-    Float8 at(Float8 distance) const { return fma(distance, fma(distance, quadratic, linear), constant); }
-
-    // Have it be 0 but for the first pixels.
-    void keep_first(Index number) {
-        constant = first_lanes(constant, number, 0);
-        linear = first_lanes(linear, number, 0);
-        quadratic = first_lanes(quadratic, number, 0);
-    }
-};
-
 // Fractional pixels from the pixel above and to the left to the sample at the origin, and by how many pixels the sample
 // moves as the disparity rises by one.
 struct Motion {
     float fy, fx, sy, sx;
 };
 
-// How sample and reference pixel differ, as a polynomial of the distance from the origin; of eight pixels, whose upper
-// left neighbours begin at upper, lower left ones at lower.
-template <class Colour>
-Polynomial difference(const Colour *upper, const Colour *lower, const Colour *reference, Motion at) {
-    const Float8 left = load(upper), lower_left = load(lower);
-    const Float8 across = load(upper + 1) - left, lower_across = load(lower + 1) - lower_left;
-    const Float8 down = lower_left - left, both = lower_across - across;
-    const Float8 fx = spread(at.fx), fy = spread(at.fy);
-    const Float8 here = fma(fx, across, left - load(reference));
-    return {
-        fma(fy, fma(fx, both, down), here),
-        fma(both, spread(at.fx * at.sy + at.fy * at.sx), fma(down, spread(at.sy), across * spread(at.sx))),
-        both * spread(at.sy * at.sx),
-    };
-}
+// Squared colour differences of eight pixels: a polynomial of the distance from the origin, constant first.
+struct SquaredDifferences {
+    Float8 of[5]{};
+
+    // Add how sample and reference pixel differ in one channel. Upper left neighbours begin at upper, lower left ones at
+    // lower.
+    template <class Colour>
+    void add(const Colour *upper, const Colour *lower, const Colour *reference, Motion at) {
+        const Float8 left = load(upper), lower_left = load(lower);
+        const Float8 across = load(upper + 1) - left, lower_across = load(lower + 1) - lower_left;
+        const Float8 down = lower_left - left, both = lower_across - across;
+        const Float8 fx = spread(at.fx), fy = spread(at.fy);
+        const Float8 constant = fma(fy, fma(fx, both, down), fma(fx, across, left - load(reference)));
+        const Float8 linear = fma(both, spread(at.fx * at.sy + at.fy * at.sx), fma(down, spread(at.sy), across * spread(at.sx)));
+        const Float8 quadratic = both * spread(at.sy * at.sx), twice = linear + linear;
+        of[0] = fma(constant, constant, of[0]);
+        of[1] = fma(constant, twice, of[1]);
+        of[2] = fma(linear, linear, fma(constant + constant, quadratic, of[2]));
+        of[3] = fma(twice, quadratic, of[3]);
+        of[4] = fma(quadratic, quadratic, of[4]);
+    }
+
+    // Have them be 0 but for the first pixels.
+    void keep_first(Index number) {
+        for (Float8 &each : of) each = first_lanes(each, number, 0);
+    }
+
+    // Rounding makes none negative.
+    Float8 at(Float8 distance) const {
+        Float8 sum = of[4];
+        for (int power = 3; power >= 0; --power) sum = fma(distance, sum, of[power]);
+        return larger(sum, Float8{});
+    }
+};
 
 // Row above the samples of a row, and how far below it they are.
 struct UpperRow {
