@@ -7,6 +7,7 @@ Border that is nearer belongs to what stands before the region.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Self
 
@@ -53,7 +54,7 @@ class BorderPlane:
 
     def is_known(self, area: int) -> bool:
         """Whether it is on enough of the way round a region of so many pixels: from one side it leads anywhere."""
-        return self.pixels >= KNOWN_BORDER * area**0.5
+        return self.pixels >= KNOWN_BORDER * math.sqrt(area)
 
     def is_one_plane(self, area: int) -> bool:
         """Whether most of a border agrees that is known on enough of the way round."""
