@@ -85,10 +85,13 @@ def z_buffer_twin(disparity, dt, ds):
     H, W = disparity.shape
     nearest = np.full((H, W), EMPTY)
     for y, x in np.ndindex(H, W):
-        down, across = y - disparity[y, x] * dt, x - disparity[y, x] * ds
+        # whole positions touch the one before or after, as if views were sheared a little
+        down, across = (
+            y - disparity[y, x] * dt + 1e-9 * (ds + 1e-3 * dt),
+            x - disparity[y, x] * ds + 1e-9 * (dt + 1e-3 * ds),
+        )
         for row, column in np.ndindex(H, W):
-            # a whole position touches those on both sides
-            if abs(row - down) <= 1 and abs(column - across) <= 1:
+            if abs(row - down) < 1 and abs(column - across) < 1:
                 nearest[row, column] = max(nearest[row, column], disparity[y, x])
     return nearest
 
