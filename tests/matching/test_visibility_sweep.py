@@ -87,8 +87,8 @@ def z_buffer_twin(disparity, dt, ds):
     for y, x in np.ndindex(H, W):
         # whole positions touch the one before or after, as if views were sheared a little
         down, across = (
-            y - disparity[y, x] * dt + 1e-9 * (ds + 1e-3 * dt),
-            x - disparity[y, x] * ds + 1e-9 * (dt + 1e-3 * ds),
+            y - disparity[y, x] * dt + 1e-9 * (ds + 1e-3 * dt + 1e-4),
+            x - disparity[y, x] * ds + 1e-9 * (dt + 1e-3 * ds + 1e-4),
         )
         for row, column in np.ndindex(H, W):
             if abs(row - down) < 1 and abs(column - across) < 1:
