@@ -42,7 +42,7 @@ _MOST_SQUEEZED = 0.5
 """Of its width, by which a view may see a plane narrower than the reference does: at 1 it is seen from behind."""
 
 _PART = 24
-"""Width of the parts that are asked, nearly, pixels."""
+"""Width of the parts that are asked, pixels."""
 
 
 @dataclass(frozen=True)
@@ -218,13 +218,8 @@ class _Sums:
         return inverse @ sums @ inverse, self._misfit(varied)
 
     def _misfit(self, varied: npt.NDArray[np.float64]) -> float:
-        # of equal size, so that they do not hang on where the region begins
-        numbers = [max(1, round(size / _PART)) for size in self.region.shape]
-        down, across = (
-            (2 * at + 1) * n // (2 * size)
-            for at, n, size in zip(np.nonzero(self.region), numbers, self.region.shape, strict=True)
-        )
-        part = down * numbers[1] + across
+        y, x = np.nonzero(self.region)
+        part = (y // _PART) * (self.region.shape[1] // _PART + 1) + x // _PART
         asked, expected = (np.bincount(part, values) for values in (self.gradient, varied))
         many = np.bincount(part) >= _PART**2 // 2
         if not many.any():
