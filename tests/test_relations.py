@@ -170,8 +170,9 @@ def test_more_noise_and_fewer_views_are_no_better(variant: str) -> None:
     assert variant in FEWER_ARE_BETTER or wrong(few) >= usual - 0.3
 
 
-# denoised views keep as many bits as they had, so that other levels are rounded
-ROUNDED = 1.0
+# percent; denoised views keep as many bits as they had, so that other levels are rounded. Single pixels in noise go to
+# another depth, which detail or smoothing mends, where that is not switched off
+ROUNDED = {"": 1.0, "best_no_detail": 2.0, "best_no_smoothing": 2.0, "best_wls": 1.5}
 
 
 @pytest.mark.parametrize("variant", ESTIMATORS)
@@ -180,4 +181,4 @@ def test_noisy_views_have_the_same_map_in_another_number_format(variant: str) ->
     light_field = scene("dots")
     expected = estimate_depth(light_field, variant).disparity
     floats = replace(light_field, views=light_field.views.astype(np.float32) / np.float32(255))
-    assert unlike(estimate_depth(floats, variant).disparity, expected) <= ROUNDED
+    assert unlike(estimate_depth(floats, variant).disparity, expected) <= ROUNDED.get(variant, ROUNDED[""])
