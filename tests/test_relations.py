@@ -8,13 +8,11 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from real_scenes import part
 
 from sepi import estimate_depth
 from sepi.compared.methods import LEARNED
@@ -64,7 +62,7 @@ TURNS: dict[str, tuple[Callable[[npt.NDArray[Any]], npt.NDArray[Any]], Callable[
 }
 # percent of the pixels that may differ by more than 0.1 px; that of the variants which are not named here is 0.1
 SUPERPIXELS = "superpixels begin at the upper left, and grow together row by row"
-Z_BUFFERS = "a pixel that falls on a pixel of a view also covers a next one: the same by half a turn, not in a mirror"
+Z_BUFFERS = "a pixel that falls on a pixel of a view also covers the next one, to the right and below"
 UNLIKE = {
     **dict.fromkeys(("paper", "no_noise_correction", "no_sepi", "wang"), (SUPERPIXELS, 4.0)),
     "no_occlusion": (SUPERPIXELS, 8.0),
@@ -96,22 +94,6 @@ def test_a_turned_light_field_has_the_turned_map(variant: str) -> None:
         turned = replace(light_field, views=np.ascontiguousarray(of_views(light_field.views)))
         found = estimate_depth(turned, variant).disparity
         assert unlike(found, of_map(expected)) <= most, turn
-
-
-@pytest.mark.parametrize(("place", "corner"), [("hci_new/cotton", (60, 120)), ("rendered/desk", (100, 100))])
-@pytest.mark.parametrize("variant", ["best", "fast"])
-def test_nothing_real_hangs_on_which_way_is_up(
-    real_data: Path, place: str, corner: tuple[int, int], variant: str
-) -> None:
-    """A half turn, as if the camera had been held upside down, and a transposition; least share within 0.02 px."""
-    light_field = replace(part(real_data / place, 160, corner), ground_truth=None)
-    expected = estimate_depth(light_field, variant).disparity
-    for views, back in (
-        (light_field.views[::-1, ::-1, ::-1, ::-1], lambda disparity: disparity[::-1, ::-1]),
-        (light_field.views.transpose(1, 0, 3, 2, 4), np.transpose),
-    ):
-        found = estimate_depth(replace(light_field, views=np.ascontiguousarray(views)), variant).disparity
-        assert np.mean(np.abs(back(found) - expected) <= 0.02) >= 0.995
 
 
 # of these, others are parts switched off: what is left is in them
@@ -170,9 +152,8 @@ def test_more_noise_and_fewer_views_are_no_better(variant: str) -> None:
     assert variant in FEWER_ARE_BETTER or wrong(few) >= usual - 0.3
 
 
-# percent; denoised views keep as many bits as they had, so that other levels are rounded. Single pixels in noise go to
-# another depth, which detail or smoothing mends, where that is not switched off
-ROUNDED = {"": 1.0, "best_no_detail": 2.0, "best_no_smoothing": 2.0, "best_wls": 1.5}
+# denoised views keep as many bits as they had, so that other levels are rounded
+ROUNDED = 1.0
 
 
 @pytest.mark.parametrize("variant", ESTIMATORS)
@@ -181,4 +162,4 @@ def test_noisy_views_have_the_same_map_in_another_number_format(variant: str) ->
     light_field = scene("dots")
     expected = estimate_depth(light_field, variant).disparity
     floats = replace(light_field, views=light_field.views.astype(np.float32) / np.float32(255))
-    assert unlike(estimate_depth(floats, variant).disparity, expected) <= ROUNDED.get(variant, ROUNDED[""])
+    assert unlike(estimate_depth(floats, variant).disparity, expected) <= ROUNDED

@@ -70,8 +70,8 @@ def z_buffers(
     Returns
     -------
     ndarray, shape (T, S, high - low, W), float32
-        ``EMPTY`` where no pixel falls. A pixel occludes the positions that its square of two pixels' width touches,
-        since a bilinear sample beside it reads its colour too: two along an axis, three where it lies on one.
+        ``EMPTY`` where no pixel falls. A pixel occludes the up to four positions that its square touches, since a
+        bilinear sample beside it reads its colour too.
     """
     nearest = _with_margin(*present.shape, high - low, disparity.shape[1])
     kernels.z_buffers(np.ascontiguousarray(disparity), present, baselines, low, high, nearest)

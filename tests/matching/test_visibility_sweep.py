@@ -85,14 +85,11 @@ def z_buffer_twin(disparity, dt, ds):
     H, W = disparity.shape
     nearest = np.full((H, W), EMPTY)
     for y, x in np.ndindex(H, W):
-        # whole positions touch the one before or after, as if views were sheared a little
-        down, across = (
-            y - disparity[y, x] * dt + 1e-9 * (ds + 1e-3 * dt + 1e-4),
-            x - disparity[y, x] * ds + 1e-9 * (dt + 1e-3 * ds + 1e-4),
-        )
-        for row, column in np.ndindex(H, W):
-            if abs(row - down) < 1 and abs(column - across) < 1:
-                nearest[row, column] = max(nearest[row, column], disparity[y, x])
+        top, left = int(np.floor(y - disparity[y, x] * dt)), int(np.floor(x - disparity[y, x] * ds))
+        for row in (top, top + 1):
+            for column in (left, left + 1):
+                if 0 <= row < H and 0 <= column < W:
+                    nearest[row, column] = max(nearest[row, column], disparity[y, x])
     return nearest
 
 
@@ -126,9 +123,8 @@ def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales,
             inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (x <= W - 1)
             seen = np.ones((H, W))
             if nearest is not None:
-                # halves alike from either side
-                near = np.stack([rows - np.rint(np.float32(d * down)), columns - np.rint(np.float32(d * across))])
-                near = near.astype(int).clip(0, [[[H - 1]], [[W - 1]]])
+                # halves go down, as the kernel's comparison of fractions does
+                near = np.ceil(np.stack([y, x]) - 0.5).astype(int).clip(0, [[[H - 1]], [[W - 1]]])
                 seen = np.where(nearest[t, s][near[0], near[1]] <= np.float32(d + margin), 1, hidden)
             for values, scale, share in zip(planes, scales, shares, strict=False):
                 sample = np.stack([sampled(c, y, x) for c in values[t, s]])

@@ -1,22 +1,17 @@
 // Where views show a pixel of some disparity, and the colours between their pixels.
 #pragma once
 
-#include <cmath>
-
 #include "kernels/lanes.hpp"
 #include "kernels/sampling.hpp"
 #include "surface_shares.hpp"
 
 namespace sepi {
 
-// Where a pixel of disparity d lies in a view, if that is within it: beside the last row and column, not on them.
+// Where a pixel of disparity d lies in a view, if that is amid its pixels.
 template <class Colour>
 [[gnu::always_inline]] inline std::optional<Place> place_in(const RimViews<Colour> &views, Index view, float d, Index y, Index x) {
     const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
-    const Index H = views.lines.shape[2], W = views.nearest.shape[3];
-    if (!place_within(down, across, H, W)) return std::nullopt;
-    const Index row = std::min(Index(down), H - 2), column = std::min(Index(across), W - 2);
-    return Place{row, column, down - double(row), across - double(column)};
+    return place_amid(down, across, views.lines.shape[2], views.nearest.shape[3]);
 }
 
 // The same, if nothing hides it.
@@ -24,11 +19,8 @@ template <class Colour>
 [[gnu::always_inline]] inline std::optional<Place> place_seen(const RimViews<Colour> &views, Index view, float d, Index y, Index x) {
     const auto place = place_in(views, view, d, y, x);
     if (!place) return place;
-    // halves alike from either side
-    const Index row = y - Index(std::nearbyint(d * views.baselines(view, 0)));
-    const Index column = x - Index(std::nearbyint(d * views.baselines(view, 1)));
-    const float nearest = views.nearest(views.places(view, 0), views.places(view, 1), row - views.low, column);
-    return nearest <= d + views.margin ? place : std::nullopt;
+    const auto [row, column] = place->nearest();
+    return views.nearest(views.places(view, 0), views.places(view, 1), row - views.low, column) <= d + views.margin ? place : std::nullopt;
 }
 
 // Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since a bilinear sample takes from

@@ -39,7 +39,10 @@ class Stretch {
 
     void filter() {
         // the pixel itself
-        for (Index y = 0; y < number_; ++y) std::fill_n(sums_.array().at(1, y), width_, 1.0f);
+        for (Index y = 0; y < number_; ++y) {
+            std::copy_n(row(y, 3), width_, sums_.array().at(0, y));
+            std::fill_n(sums_.array().at(1, y), width_, 1.0f);
+        }
         for (Index y = -radius_; y < number_; ++y) {
             for (Index dy = std::max<Index>(0, -y); dy <= radius_; ++dy) {
                 Index half = radius_;
@@ -57,8 +60,8 @@ class Stretch {
     }
 
     void store_detail(Index y, float unit, std::int16_t *out) const {
-        const float *total = sums_.array().at(0, y), *weight = sums_.array().at(1, y);
-        for (Index x = 0; x < width_; ++x) out[x] = std::int16_t(rounded(-total[x] / weight[x] / unit));
+        const float *own = row(y, 3), *total = sums_.array().at(0, y), *weight = sums_.array().at(1, y);
+        for (Index x = 0; x < width_; ++x) out[x] = std::int16_t(rounded((own[x] - total[x] / weight[x]) / unit));
     }
 
   private:
@@ -82,18 +85,15 @@ class Stretch {
         }
     }
 
-    // Add weighted pixels of the window to every pixel of row y, in the order of dx: what they differ by from it, since that
-    // is rounded less than what they are.
+    // Add weighted pixels of the window to every pixel of row y, in the order of dx.
     template <class... Rows>
     void add_weighted(Index y, Index first, Index last, Rows... rows) {
         float *totals = sums_.array().at(0, y), *weights = sums_.array().at(1, y);
-        const float *means = row(y, 3);
         for (Index x = 0, end = width_; x < end; x += LANES) {
             Float8 total = load(totals + x), weight = load(weights + x);
-            const Float8 own = load(means + x);
             const auto add = [&](const Neighbours &of, Index dx) {
                 const Float8 w = load(of.weights + dx * of.next_weights + x);
-                total += w * (load(of.means + dx * of.next_means + x) - own);
+                total += w * load(of.means + dx * of.next_means + x);
                 weight += w;
             };
             for (Index dx = first; dx <= last; ++dx) (add(rows, dx), ...);
@@ -107,7 +107,7 @@ class Stretch {
     const Index number_, width_, radius_ = nearness_.shape[0] - 1, step_ = width_ + 2 * (radius_ + LANES);
     // the channels and their mean; weights look at twice the radius beyond the ends
     const Scratch<float, 3> rows_ = zeros<float, 3>(4, number_ + 2 * radius_, width_ + 4 * radius_ + LANES);
-    // weights of the pixel dx across, at dx + radius; what comes of them: weighted differences, and weights
+    // weights of the pixel dx across, at dx + radius; what comes of them: weighted pixels, and weights
     const Scratch<float, 2> pairs_ = zeros<float, 2>(2 * radius_ + 1, step_);
     const Scratch<float, 3> sums_ = zeros<float, 3>(2, number_, width_ + LANES);
 };

@@ -23,8 +23,8 @@ void bind_views(nb::module_ &kernels) {
 
     auto gaps = kernels.def_submodule("gaps");
     gaps.def("farther_alike", &sepi::farther_alike, Unlocked(), "disparity"_a, "lowest"_a, "colours"_a, "reach"_a, "least_step"_a, "distance2"_a, "farther"_a);
-    gaps.def("compare_depths", &sepi::compare_depths, Unlocked(), "views"_a, "unit"_a, "disparity"_a, "farther"_a, "reference"_a, "asked"_a, "most"_a, "begin"_a,
-             "end"_a, "sums"_a);
+    gaps.def("compare_depths", &sepi::compare_depths, Unlocked(), "views"_a, "unit"_a, "disparity"_a, "farther"_a, "reference"_a, "asked"_a, "begin"_a, "end"_a,
+             "sums"_a);
 
     auto view_noise = kernels.def_submodule("view_noise");
     view_noise.def("least_differences", &sepi::least_differences, Unlocked(), "views"_a, "t0"_a, "s0"_a, "moves"_a, "least"_a);

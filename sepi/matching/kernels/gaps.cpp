@@ -1,19 +1,16 @@
 #include "gaps.hpp"
 
-#include <cmath>
 #include <vector>
 
 namespace sepi {
 namespace {
 
-// Of a bilinear sample of a view (H, W, 3), from reference (3,), in units of what noise makes of it: samples between pixels
-// average noise. Products of 16 bits and a weight are exact as double.
+// Of a bilinear sample of a view (H, W, 3), from reference (3,). Products of 16 bits and a weight are exact as double.
 template <class Colour>
 auto squared_residual(Array<const Colour, 3> view, float unit, double row, double column, Array<const float, 1> reference) {
     using Number = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, float>;
-    const Index top = Index(row), left = Index(column);
+    const Index top = Index(row), left = Index(column), down = view.strides[0], right = view.strides[1];
     const float fy = float(row - double(top)), fx = float(column - double(left));
-    const Index down = fy > 0 ? view.strides[0] : 0, right = fx > 0 ? view.strides[1] : 0;
     const Colour *place = view.at(top, left);
     Number total = 0;
     for (Index c = 0; c < 3; ++c, place += view.strides[2]) {
@@ -22,7 +19,7 @@ auto squared_residual(Array<const Colour, 3> view, float unit, double row, doubl
         const Number residual = ((1 - fy) * above + fy * below) * unit - reference(c);
         total += residual * residual;
     }
-    return total / (1 + (fx * fx + (1 - fx) * (1 - fx)) * (fy * fy + (1 - fy) * (1 - fy)));
+    return total;
 }
 
 // How many of most steps from i stay in a line of n.
@@ -70,7 +67,7 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
 }
 
 void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float, 3> reference,
-                    const AskedViews &asked, float most, Index begin, Index end, Array<float, 3> sums) {
+                    const AskedViews &asked, Index begin, Index end, Array<float, 3> sums) {
     const Index W = disparity.shape[1];
     const double bottom = double(disparity.shape[0] - 1), right = double(W - 1);
     const auto add_view = [&](const auto &view, Array<const float, 2> nearest, double down, double across, Index y, const std::vector<Index> &columns) {
@@ -79,14 +76,12 @@ void compare_depths(const Views &views, float unit, Array<const float, 2> dispar
             const double row = double(y) - f * down, column = double(x) - f * across;
             const double own_row = double(y) - d * down, own_column = double(x) - d * across;
             if (std::min(row, own_row) < 0 || std::min(column, own_column) < 0) continue;
-            if (std::max(row, own_row) > bottom || std::max(column, own_column) > right) continue;
-            const float *above = nearest.at(Index(row) - asked.low, Index(column));
-            const float *below = row > std::floor(row) ? above + nearest.strides[0] : above;
-            const Index beside = column > std::floor(column);
-            if (std::max(std::max(above[0], above[beside]), std::max(below[0], below[beside])) > f + asked.margin) continue;
+            if (std::max(row, own_row) >= bottom || std::max(column, own_column) >= right) continue;
+            const float *above = nearest.at(Index(row) - asked.low, Index(column)), *below = above + nearest.strides[0];
+            if (std::max(std::max(above[0], above[1]), std::max(below[0], below[1])) > f + asked.margin) continue;
             const auto colour = reference[y][x];
-            sums(0, y, x) += std::min(float(squared_residual(view, unit, row, column, colour)), most);
-            sums(1, y, x) += std::min(float(squared_residual(view, unit, own_row, own_column, colour)), most);
+            sums(0, y, x) = float(sums(0, y, x) + squared_residual(view, unit, row, column, colour));
+            sums(1, y, x) = float(sums(1, y, x) + squared_residual(view, unit, own_row, own_column, colour));
             ++sums(2, y, x);
         }
     };

@@ -13,9 +13,8 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
 
 // Squared residuals at two depths of the pixels of rows begin..end, in views (T, S, H, W, 3), which unit makes span 0..1, from
 // the reference view (H, W, 3) in 0..1: added to sums (3, H, W) are those at the farther depth, at the other one, and of how
-// many views they are. Asked is where nothing hides the farther depth; where both are equal nothing is compared. A
-// squared residual counts at most so much.
+// many views they are. Asked is where nothing hides the farther depth; where both are equal nothing is compared.
 void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float, 3> reference,
-                    const AskedViews &asked, float most, Index begin, Index end, Array<float, 3> sums);
+                    const AskedViews &asked, Index begin, Index end, Array<float, 3> sums);
 
 }  // namespace sepi

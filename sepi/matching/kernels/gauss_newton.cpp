@@ -59,16 +59,13 @@ struct View {
 
     // Find pixels of a row.
     void find(Index row, Pixels &pixels) const {
-        const Float8 up = pixels.disparity * down, back = pixels.disparity * across;
-        Float8 y = float(row) - up, x = pixels.x - back;
+        Float8 y = float(row) - pixels.disparity * down, x = pixels.x - pixels.disparity * across;
         pixels.inside = (y >= 0.0f) & (y <= bottom_) & (x >= 0.0f) & (x <= right_);
-        // the nearest position, halves alike from either side
-        const Int8 nearest = (std::int32_t(row) - low_ - rounded(up)) * width_ + truncated(pixels.x) - rounded(back);
         // of what is outside, a corner is looked at
-        store(pixels.nearest, pixels.inside ? nearest : Int8{});
         y = pixels.inside ? y : spread(float(low_));
         x = pixels.inside ? x : Float8{};
         const Int8 top = truncated(y), left = truncated(x);
+        store(pixels.nearest, (truncated(y + 0.5f) - low_) * width_ + truncated(x + 0.5f));
         store(pixels.coefficients, (top - low_) * pitch_ + left * 4);
         const auto rows = coefficient_weights(y - __builtin_convertvector(top, Float8)), columns = coefficient_weights(x - __builtin_convertvector(left, Float8));
         for (Index n = 0; n < 4; ++n) store(pixels.weights[n], rows[n] | rows[n] << 16);

@@ -9,30 +9,25 @@ constexpr float ROUNDING = 1.0f / 512;  // how far a position is from the same i
 constexpr float COLOUR_STEPS = 20000;   // from black to white, of colours as whole numbers of 16 bits
 constexpr std::int64_t ONE = 1 << 14;   // the sum of a sample's weights, which are whole numbers of 16 bits
 
-// Draws the W pixels of a row y of the reference view into a view: what is nearest at the positions that their squares touch,
-// two along either axis. Pixels that lie on a position touch the one on this side or on that, as if the grid of views were
-// sheared a little: else all views of the reference view's row or column had it on the same side. Pixels of a smooth surface
-// lie side by side in the view, too: eight at once.
-void add_row(const float *row, Index W, Index y, double down, double across, Array<float, 2> nearest) {
-    const bool up = across < 0 || (across == 0 && down < 0), before = down < 0 || (down == 0 && across < 0);
-    const auto first_of = [](double position, bool earlier) { return Index(earlier ? std::ceil(position) - 1 : std::floor(position)); };
-    // how far beyond where the first begins, of 0..1 if they lie side by side
-    const auto between = [](Float8 beyond) { return least_of(smaller(beyond, 1.0f - beyond)) > ROUNDING; };
-    const auto square_of = [&](Index x) { return std::pair(first_of(double(y) - row[x] * down, up), first_of(double(x) - row[x] * across, before)); };
+// Add a row of the reference view, W pixels at y, to what is nearest of the pixels whose square begins at a position of a
+// view. Pixels of a smooth surface lie side by side in the view, too: eight at once.
+void add_row(const float *row, Index W, Index y, double down, double across, Array<float, 2> begun) {
+    const auto top_of = [=](Index x) { return Index(std::floor(double(y) - row[x] * down)); };
+    const auto left_of = [=](Index x) { return Index(std::floor(double(x + 1) - row[x] * across)); };
     for (Index begin = 0; begin < W; begin += LANES) {
-        if (const auto [top, left] = square_of(begin); begin + LANES <= W && 0 <= top && top + 2 <= nearest.shape[0] && 0 <= left && left + 1 + LANES <= W) {
-            const Float8 d = load(row + begin);
-            if ((down == 0 || between(float(y - top) - d * float(down))) && (across == 0 || between(float(begin - left) - d * float(across)))) {
-                for (Index i = top; i < top + 2; ++i)
-                    for (Index j = left; j < left + 2; ++j) store(nearest.at(i, j), larger(load(nearest.at(i, j)), d));
+        const Index end = std::min(W, begin + LANES), top = top_of(begin), left = left_of(begin);
+        if (begin + LANES <= W && 0 <= top && top < begun.shape[0] && 0 <= left && left + LANES <= begun.shape[1]) {
+            // how far beyond where the first begins, of 0..1 if they lie side by side
+            const Float8 d = load(row + begin), dy = float(y - top) - d * float(down), dx = float(begin + 1 - left) - d * float(across);
+            if (least_of(smaller(smaller(dy, 1.0f - dy), smaller(dx, 1.0f - dx))) > ROUNDING) {
+                float *place = begun.at(top, left);
+                store(place, larger(load(place), d));
                 continue;
             }
         }
-        for (Index x = begin; x < std::min(W, begin + LANES); ++x) {
-            const auto [top, left] = square_of(x);
-            for (Index i = std::max<Index>(0, top); i < std::min(nearest.shape[0], top + 2); ++i)
-                for (Index j = std::max<Index>(0, left); j < std::min(W, left + 2); ++j) nearest(i, j) = std::max(nearest(i, j), row[x]);
-        }
+        for (Index x = begin; x < end; ++x)
+            if (const Index i = top_of(x), j = left_of(x); 0 <= i && i < begun.shape[0] && 0 <= j && j < begun.shape[1])
+                begun(i, j) = std::max(begun(i, j), row[x]);
     }
 }
 
@@ -84,9 +79,6 @@ class VisibleRow {
         }
     }
 
-    // Whether a position beyond a whole one is nearer to the next; halves go to the even one, from either side.
-    static Index is_nearer_next(Index whole, float fraction) { return fraction > 0.5f || (fraction == 0.5f && whole % 2 != 0); }
-
     // Add one view, whose rows from low on are loaded, at every candidate of row y.
     void add_view(Index t, Index s, Index low, Index y) {
         const Index r = candidates_.row(t, s), c = candidates_.column(t, s), width = width_;
@@ -106,8 +98,7 @@ class VisibleRow {
             const auto lower_right = std::int64_t(below * double(fx) + 0.5);
             const Int8 upper = pair_of(ONE - below - right, right), lower = pair_of(below - lower_right, lower_right);
             const Float8 limit = spread(candidates_.disparities(k) + visibility_.occlusion_margin);
-            const Index lower_row = top - views_.low + is_nearer_next(candidates_.down(r, k), fy);
-            const float *before = some_hide ? nearest.at(lower_row, first + left + is_nearer_next(left, fx)) : nullptr;
+            const float *before = some_hide ? nearest.at(top - views_.low + (fy > 0.5f), first + left + (fx > 0.5f)) : nullptr;
             const std::int32_t *pairs = pairs_.array().at(top - low, 0, first + left);
             const float *reference = reference_.array().data + first;
             float *sum = sums_.array().at(k, 0, first);
@@ -168,20 +159,26 @@ void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, St
         // rows farther away do not get here
         const Index first = std::max<Index>(0, Index(std::floor(low - 1 + std::min(least * v, most * v))));
         const Index last = std::min(H, Index(std::ceil(high + std::max(least * v, most * v))) + 1);
-        const Array<float, 2> nearest = out[t][s];
-        std::fill_n(nearest.data, nearest.shape[0] * W, EMPTY);
-        for (Index y = first; y < last; ++y) add_row(disparity.at(y), W, y - low, v, u, nearest);
+        // of pixels that begin outside, too
+        const auto begun = Scratch<float, 2>(high - low + 1, W + 1).filled(EMPTY);
+        for (Index y = first; y < last; ++y) add_row(disparity.at(y), W, y + 1 - low, v, u, begun.array());
+        for (Index row = 0; row < high - low; ++row) {
+            const float *above = begun.array().at(row), *here = begun.array().at(row + 1);
+            float *target = out.at(t, s, row);
+            for (Index x = 0; x < W; ++x) target[x] = std::max(std::max(above[x], above[x + 1]), std::max(here[x], here[x + 1]));
+        }
     });
 }
 
 void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &views, Index begin, Index end, Array<bool, 2> out) {
-    const Index H = disparity.shape[0], W = disparity.shape[1];
+    const double H = double(disparity.shape[0]), W = double(disparity.shape[1]);
     parallel_for(begin, end, [&](Index y) {
         views.for_each([&](Index t, Index s, double down, double across) {
-            for (Index x = 0; x < W; ++x) {
+            for (Index x = 0; x < disparity.shape[1]; ++x) {
                 const float d = disparity(y, x);
-                const Index row = y - Index(std::nearbyint(d * down)), column = x - Index(std::nearbyint(d * across));
-                if (row >= 0 && column >= 0 && row < H && column < W) out(y, x) |= views.nearest(t, s, row - views.low, column) > d + views.margin;
+                const double row = double(y) - d * down + 0.5, column = double(x) - d * across + 0.5;
+                if (row >= 0 && column >= 0 && row < H && column < W)
+                    out(y, x) |= views.nearest(t, s, Index(row) - views.low, Index(column)) > d + views.margin;
             }
         });
     });
