@@ -13,7 +13,6 @@ using sepi::Unlocked;
 // The kernels that look at the colours of views, of one type.
 template <class Colour>
 static void bind_of_colours(nb::module_ &plane_sweep) {
-    plane_sweep.def("planes_of", &sepi::planes_of<Colour>, Unlocked(), "views"_a, "planes"_a);
     plane_sweep.def("sweep_plane_rows", &sepi::sweep_plane_rows<Colour>, Unlocked(), "views"_a, "candidates"_a, "window"_a, "expected"_a, "mask"_a, "begin"_a,
                     "end"_a, "height"_a, "width"_a, "maps"_a);
 }

@@ -352,31 +352,7 @@ class TileSweep {
     const Scratch<float, 1> pixel_costs_{padded_};
 };
 
-// The channels of a row of pixels, each by itself.
-template <class Colour, class Step, class Next>
-void split_channels(const Colour *pixels, Step step, Next next, Index W, Colour *__restrict red, Colour *__restrict green, Colour *__restrict blue) {
-    for (Index x = 0; x < W; ++x) red[x] = pixels[x * step], green[x] = pixels[x * step + next], blue[x] = pixels[x * step + 2 * next];
-}
-
 }  // namespace
-
-template <class Colour>
-void planes_of(Strided<const Colour, 5> views, Array<Colour, 5> planes) {
-    const Index S = views.shape[1], H = views.shape[2], W = views.shape[3];
-    const auto fill = [&](auto step, auto next) {
-        parallel_for(0, views.shape[0] * S, [&](Index view) {
-            const Index t = view / S, s = view % S;
-            for (Index y = 0; y < H; ++y)
-                split_channels(views.at(t, s, y), step, next, W, planes.at(t, s, 0, y), planes.at(t, s, 1, y), planes.at(t, s, 2, y));
-        });
-    };
-    if (views.strides[3] == 3 && views.strides[4] == 1) {
-        // known when this is compiled: several pixels at once
-        fill(std::integral_constant<Index, 3>(), std::integral_constant<Index, 1>());
-    } else {
-        fill(views.strides[3], views.strides[4]);
-    }
-}
 
 template <class Colour>
 void sweep_plane_rows(const ViewStack<Colour> &views, const Candidates &candidates, const Window &window, const ExpectedCosts &expected,
@@ -391,7 +367,6 @@ void sweep_plane_rows(const ViewStack<Colour> &views, const Candidates &candidat
 }
 
 #define INSTANTIATE(Colour)                                                                                                  \
-    template void planes_of(Strided<const Colour, 5>, Array<Colour, 5>);                                                     \
     template void sweep_plane_rows(const ViewStack<Colour> &, const Candidates &, const Window &, const ExpectedCosts &,      \
                                    Array<const bool, 2>, Index, Index, Index, Index, const BestMaps &);
 INSTANTIATE(std::uint8_t)
