@@ -29,6 +29,9 @@ LEVELS = 5
 COUNTED = 2
 """Every so many levels count; the others only lie between."""
 
+HALF = np.float32(0.5)
+"""Height of a hat where the next finer level has nodes beside its own."""
+
 
 def conjugate_gradients(
     stencil: FloatArray, inverse: Inverse, right: FloatArray, start: FloatArray, rtol: float, max_iterations: int
@@ -96,17 +99,37 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
     def apply(residual: FloatArray) -> tuple[FloatArray, float]:
         kernels.onto_finest(residual, levels[0])
         for i in range(1, LEVELS):
-            kernels.onto_coarser(levels[i - 1], levels[i])
+            _onto_coarser(levels[i - 1], levels[i])
         for i in reversed(range(LEVELS)):
             if i % COUNTED:
                 levels[i][:] = 0
             else:
                 levels[i] *= hats[i // COUNTED]
             if i + 1 < LEVELS:
-                kernels.add_coarser(levels[i + 1], levels[i])
+                _add_coarser(levels[i + 1], levels[i])
         return out, kernels.diagonal_and_finest(inverse, residual, levels[0], out)
 
     return apply
+
+
+def _onto_coarser(fine: FloatArray, out: FloatArray) -> None:
+    """Inner products with hats (h, w) from those (2 h - 1, 2 w - 1) with finer ones."""
+    rows, halves = fine[::2].copy(), HALF * fine[1::2]
+    rows[1:] += halves
+    rows[:-1] += halves
+    out[:] = 0
+    out[:, 1:] += rows[:, 1::2]
+    out[:, :-1] += rows[:, 1::2]
+    out *= HALF
+    out += rows[:, ::2]
+
+
+def _add_coarser(coarse: FloatArray, fine: FloatArray) -> None:
+    """Add hats of heights (h, w) to those of the finer level (2 h - 1, 2 w - 1)."""
+    rows = np.repeat(coarse, 2, axis=0)[:-1]
+    rows[1::2] = HALF * (coarse[:-1] + coarse[1:])
+    fine[:, ::2] += rows
+    fine[:, 1::2] += HALF * (rows[:, :-1] + rows[:, 1:])
 
 
 def _shapes(stencil: FloatArray) -> list[tuple[int, int]]:

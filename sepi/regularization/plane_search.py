@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sepi.kernels import plane_search as kernels
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.regularization.regions import Plane, basis_of
 
@@ -42,10 +41,9 @@ def support(
     positions: _Doubles, values: _Doubles, planes: _Doubles, tolerance: float, behind_penalty: float
 ) -> _Doubles:
     """How many of N pixels agree with each of P planes, less a weight for each that lies behind it; (P,)."""
-    places, levels, tried = (np.ascontiguousarray(each) for each in (positions.T, values, planes))
-    found = np.empty(len(planes))
-    kernels.support_of(places, levels, tried, tolerance, behind_penalty, found)
-    return found
+    residuals = residuals_of(positions, values, planes)
+    agreeing, behind = (abs(residuals) < tolerance).sum(axis=1), (residuals < -tolerance).sum(axis=1)
+    return np.asarray(agreeing - behind_penalty * behind)
 
 
 def fitted(positions: _Doubles, values: _Doubles, plane: Plane, tolerance: float) -> Plane:

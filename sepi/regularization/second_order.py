@@ -9,6 +9,7 @@ that is never put into a sparse matrix, and is solved in :mod:`sepi.regularizati
 
 from __future__ import annotations
 
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,14 @@ MARGIN: int = kernels.MARGIN
 LEAST_SINGLE_RTOL = 1e-5
 """Residual down to which single precision is enough for the solver."""
 
-_SECOND, _MIXED = (1.0, -2.0, 1.0), (1.0, -1.0, -1.0, 1.0)
+# along x, along y and across: rows and columns of the pixels that make a difference, and their factors
+_DIFFERENCES = (
+    (((0, 0), (0, 1), (0, 2)), (1.0, -2.0, 1.0)),
+    (((0, 0), (1, 0), (2, 0)), (1.0, -2.0, 1.0)),
+    (((0, 0), (0, 1), (1, 0), (1, 1)), (1.0, -1.0, -1.0, 1.0)),
+)
+# of the stencil: rows and columns from a pixel to the other that an entry belongs to
+_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 0), (2, 0), (1, 1), (1, -1))
 
 
 def colour_changes(guide: FloatMap) -> list[FloatArray]:
@@ -105,11 +113,7 @@ def smoothness_weights(
         kernels.weights_of_differences(disparity, reliability, apart, where, how, threshold, colour_variance, out)
         return out
 
-    return [
-        weight(((0, 0), (0, 1), (0, 2)), _SECOND, colours[0]),
-        weight(((0, 0), (1, 0), (2, 0)), _SECOND, colours[1]),
-        weight(((0, 0), (0, 1), (1, 0), (1, 1)), _MIXED, colours[2]),
-    ]
+    return [weight(*of, colour) for of, colour in zip(_DIFFERENCES, colours, strict=True)]
 
 
 def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int]) -> FloatArray:
@@ -128,9 +132,13 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
         Entries of each pixel with itself and with those to the right by 1 and 2, below by 1 and 2, below to the right,
         and below to the left; the matrix is symmetric. With a margin of zeros of :data:`MARGIN` pixels.
     """
-    stencil = np.empty((7, shape[0] + 2 * MARGIN, shape[1] + 2 * MARGIN))
-    along_x, along_y, across = (np.ascontiguousarray(each, np.float64) for each in weights)
-    kernels.stencil_of(along_x, along_y, across, stencil)
+    stencil = np.zeros((7, shape[0] + 2 * MARGIN, shape[1] + 2 * MARGIN))
+    for (corners, factors), weight in zip(_DIFFERENCES, weights, strict=True):
+        height, width = weight.shape
+        pairs = combinations_with_replacement(zip(corners, factors, strict=True), 2)
+        for ((y, x), of_one), ((below, right), of_other) in pairs:
+            entry = stencil[_ENTRIES.index((below - y, right - x)), MARGIN + y :, MARGIN + x :]
+            entry[:height, :width] += of_one * of_other * weight
     return stencil
 
 
@@ -165,8 +173,8 @@ def solve_smooth(
     inside = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
     # half the memory to go through, a third of the time; the solution is the same to a hundredth of its own error
     dtype: Any = np.float32 if rtol >= LEAST_SINGLE_RTOL else np.float64
-    packed = np.empty(smoothness.shape, dtype)
-    kernels.add_data(w, smoothness, packed)
+    smoothness[0][inside] += w
+    packed = smoothness.astype(dtype)
     inverse = multilevel_inverse(smoothness, dtype)
     # it is large, and goes unless the caller holds it
     del smoothness

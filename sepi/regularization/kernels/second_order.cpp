@@ -49,32 +49,6 @@ double in_order(const Scratch<Number, 1> &rows) {
     return total;
 }
 
-// Row y of stencil_of, of zeros so far.
-void stencil_row(Index y, Array<const double, 2> along_x, Array<const double, 2> along_y, Array<const double, 2> across, Array<double, 3> out) {
-    const Index H = along_x.shape[0], W = along_y.shape[1], row = y + MARGIN;
-    const auto entry = [&](Index k, Index first) { return out.at(k, row, MARGIN + first); };
-    constexpr double SQUARES[] = {1, 4, 1};
-    for (Index first = 0; first < 3; ++first) add(entry(0, first), SQUARES[first], along_x.at(y), W - 2);
-    add(entry(1, 0), -2.0, along_x.at(y), W - 2);
-    add(entry(1, 1), -2.0, along_x.at(y), W - 2);
-    add(entry(2, 0), 1.0, along_x.at(y), W - 2);
-    for (Index before = 0; before < 3; ++before)
-        if (0 <= y - before && y - before < H - 2) add(entry(0, 0), SQUARES[before], along_y.at(y - before), W);
-    for (Index before = 0; before < 2; ++before)
-        if (0 <= y - before && y - before < H - 2) add(entry(3, 0), -2.0, along_y.at(y - before), W);
-    if (y < H - 2) add(entry(4, 0), 1.0, along_y.at(y), W);
-    for (Index before = 0; before < 2; ++before) {
-        if (y - before < 0 || y - before >= H - 1) continue;
-        for (Index first = 0; first < 2; ++first) add(entry(0, first), 1.0, across.at(y - before), W - 1);
-        add(entry(1, 0), -1.0, across.at(y - before), W - 1);
-    }
-    if (y >= H - 1) return;
-    for (Index first = 0; first < 2; ++first) {
-        add(entry(3, first), -1.0, across.at(y), W - 1);
-        add(entry(5 + first, first), 1.0, across.at(y), W - 1);
-    }
-}
-
 // Row y, margin counted, of the matrix times a picture.
 template <class Number>
 void product_row(Array<const Number, 3> stencil, Array<const Number, 2> vector, Index y, Number *__restrict target) {
@@ -105,22 +79,6 @@ void weights_of_differences(Array<const float, 2> disparity, Array<const float, 
             difference /= threshold;
             out(y, x) = std::exp(-std::min(difference * difference * trust + 2 * colour(y, x) / variance, 30.0));
         }
-    });
-}
-
-void stencil_of(Array<const double, 2> along_x, Array<const double, 2> along_y, Array<const double, 2> across, Array<double, 3> out) {
-    parallel_for(0, out.shape[1], [&](Index row) {
-        for (Index k = 0; k < 7; ++k) std::fill_n(out.at(k, row), out.shape[2], 0.0);
-        const Index y = row - MARGIN;
-        if (0 <= y && y < along_x.shape[0]) stencil_row(y, along_x, along_y, across, out);
-    });
-}
-
-template <class Number>
-void add_data(Array<const double, 2> weight, Array<double, 3> stencil, Array<Number, 3> packed) {
-    parallel_for(0, stencil.shape[1], [&](Index y) {
-        if (MARGIN <= y && y < MARGIN + weight.shape[0]) add(stencil.at(0, y, MARGIN), 1.0, weight.at(y - MARGIN), weight.shape[1]);
-        for (Index k = 0; k < 7; ++k) std::copy_n(stencil.at(k, y), stencil.shape[2], packed.at(k, y));
     });
 }
 
@@ -170,40 +128,6 @@ void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
             if (const Index y = 2 * i + n - 2; 0 <= y && y < H) add(line + 2, shares[n], vector.at(y + MARGIN, MARGIN), W);
         Number *__restrict target = out.at(i);
         for (Index j = 0; j < w; ++j) target[j] = far * (line[2 * j] + line[2 * j + 3]) + near * (line[2 * j + 1] + line[2 * j + 2]);
-    }
-}
-
-template <class Number>
-void onto_coarser(Array<const Number, 2> fine, Array<Number, 2> out) {
-    constexpr Number half = Number(0.5);
-    const Index w = fine.shape[1];
-    const auto lines = zeros<Number, 1>(w + 2);
-    Number *line = lines.array().data;
-    for (Index i = 0; i < out.shape[0]; ++i) {
-        std::copy_n(fine.at(2 * i), w, line + 1);
-        for (const Index y : {2 * i - 1, 2 * i + 1})
-            if (0 <= y && y < fine.shape[0]) add(line + 1, half, fine.at(y), w);
-        Number *__restrict target = out.at(i);
-        for (Index j = 0; j < out.shape[1]; ++j) target[j] = line[2 * j + 1] + half * (line[2 * j] + line[2 * j + 2]);
-    }
-}
-
-template <class Number>
-void add_coarser(Array<const Number, 2> coarse, Array<Number, 2> fine) {
-    constexpr Number half = Number(0.5);
-    const Index w = coarse.shape[1];
-    const Scratch<Number, 1> lines(w);
-    Number *__restrict line = lines.array().data;
-    for (Index i = 0; i < fine.shape[0]; ++i) {
-        const Number *above = coarse.at(i / 2), *below = coarse.at((i + 1) / 2);
-        for (Index j = 0; j < w; ++j) line[j] = half * (above[j] + below[j]);
-        Number *__restrict target = fine.at(i);
-        for (Index j = 0; j < w - 1; ++j) {
-            // in this order the loop vectorises
-            target[2 * j + 1] += half * (line[j] + line[j + 1]);
-            target[2 * j] += line[j];
-        }
-        target[2 * w - 2] += line[w - 1];
     }
 }
 
@@ -258,12 +182,9 @@ void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<doubl
 }
 
 #define INSTANTIATE(Number)                                                                                                                          \
-    template void add_data(Array<const double, 2>, Array<double, 3>, Array<Number, 3>);                                                              \
     template double turn_and_bend(Array<const Number, 3>, Array<const Number, 2>, Number, Array<Number, 2>, Array<Number, 2>);                        \
     template double step(Number, Array<const Number, 2>, Array<const Number, 2>, Array<Number, 2>, Array<Number, 2>);                                 \
     template void onto_finest(Array<const Number, 2>, Array<Number, 2>);                                                                             \
-    template void onto_coarser(Array<const Number, 2>, Array<Number, 2>);                                                                            \
-    template void add_coarser(Array<const Number, 2>, Array<Number, 2>);                                                                             \
     template double diagonal_and_finest(Array<const Number, 2>, Array<const Number, 2>, Array<const Number, 2>, Array<Number, 2>);
 INSTANTIATE(float)
 INSTANTIATE(double)

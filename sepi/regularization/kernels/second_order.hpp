@@ -17,14 +17,6 @@ constexpr Index SPACING = 2;  // pixels from node to node of the finest hats
 void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const double, 2> colour,
                             Array<const std::int64_t, 2> corners, Array<const double, 1> factors, double threshold, double variance, Array<double, 2> out);
 
-// Matrix of weighted second differences; along_x (H, W - 2), along_y (H - 2, W), across (H - 1, W - 1),
-// out (7, H + 2 MARGIN, W + 2 MARGIN).
-void stencil_of(Array<const double, 2> along_x, Array<const double, 2> along_y, Array<const double, 2> across, Array<double, 3> out);
-
-// Add the data's weights (H, W) to a matrix with its margin; packed becomes the same.
-template <class Number>
-void add_data(Array<const double, 2> weight, Array<double, 3> stencil, Array<Number, 3> packed);
-
 // direction becomes ratio * direction + ahead, and out the matrix times that; returns the inner product of both.
 template <class Number>
 double turn_and_bend(Array<const Number, 3> stencil, Array<const Number, 2> ahead, Number ratio, Array<Number, 2> direction, Array<Number, 2> out);
@@ -37,14 +29,6 @@ double step(Number length, Array<const Number, 2> direction, Array<const Number,
 // Inner products of a picture with the finest hats, out (h, w).
 template <class Number>
 void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out);
-
-// Inner products with the hats (h, w) of the next level from those (2 h - 1, 2 w - 1) with finer ones.
-template <class Number>
-void onto_coarser(Array<const Number, 2> fine, Array<Number, 2> out);
-
-// Add hats of heights coarse (h, w) to those of the finer level, fine (2 h - 1, 2 w - 1).
-template <class Number>
-void add_coarser(Array<const Number, 2> coarse, Array<Number, 2> fine);
 
 // out becomes inverse * vector, plus the finest hats; returns the inner product of vector and out.
 template <class Number>
