@@ -3,8 +3,10 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/variant.h>
 
 #include <tuple>
+#include <vector>
 
 #include "array.hpp"
 
@@ -80,6 +82,19 @@ namespace sepi {
 
 // Kernels run outside Python's lock.
 using Unlocked = nanobind::call_guard<nanobind::gil_scoped_release>;
+
+// What Python sees of a source of kernels. Each source has one, and fills it when the extension module is made.
+struct Submodule {
+    Submodule(const char *name, void (*fill)(nanobind::module_ &)) : name(name), fill(fill) { all().push_back(*this); }
+
+    static std::vector<Submodule> &all() {
+        static std::vector<Submodule> submodules;
+        return submodules;
+    }
+
+    const char *name;
+    void (*fill)(nanobind::module_ &);
+};
 
 }  // namespace sepi
 

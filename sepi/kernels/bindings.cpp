@@ -1,4 +1,4 @@
-// The extension module: a submodule for each source of kernels, by the bindings that stand beside them.
+// The extension module: a submodule for each source of kernels, by what it says itself or the bindings beside it.
 #include "arguments.hpp"
 #include "floor.hpp"
 #include "lanes.hpp"
@@ -11,10 +11,7 @@
 namespace nb = nanobind;
 using namespace nb::literals;
 
-void bind_sweeps(nb::module_ &);
-void bind_views(nb::module_ &);
 void bind_boundaries(nb::module_ &);
-void bind_regularization(nb::module_ &);
 void bind_error_bars(nb::module_ &);
 void bind_image(nb::module_ &);
 void bind_inspection(nb::module_ &);
@@ -45,9 +42,13 @@ NB_MODULE(_native, m) {
     m.def("has_x86_64_v3", &has_x86_64_v3, "Whether this processor can use kernels that are built for x86-64-v3.");
     m.def("thread_count", &sepi::thread_count, "Threads of a loop, the caller's among them.");
     m.def("set_thread_count", &sepi::set_thread_count, "count"_a, "Have each loop use so many threads.");
-    for (const auto bind : {bind_sweeps, bind_views, bind_boundaries, bind_regularization, bind_error_bars, bind_image, bind_inspection,
-                            bind_scoring, bind_scenes, bind_compared, bind_rendered, bind_applications})
+    for (const auto bind : {bind_boundaries, bind_error_bars, bind_image, bind_inspection, bind_scoring, bind_scenes, bind_compared,
+                            bind_rendered, bind_applications})
         bind(m);
+    for (const auto &[name, fill] : sepi::Submodule::all()) {
+        auto submodule = m.def_submodule(name);
+        fill(submodule);
+    }
 
     auto floor = m.def_submodule("floor");
     floor.def("samples", &sepi::samples, sepi::Unlocked(), "passes"_a, "data"_a, "out"_a);

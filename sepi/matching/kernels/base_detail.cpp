@@ -1,6 +1,9 @@
+// Base-detail decomposition: a bilateral filter whose result is taken away at once.
+//
 // The weight exp(-q) of a difference is computed as (1 - q / 32)^32, which differs from it by 0.01 at most, ends, and is
 // made of multiplications. Each pair of pixels is weighed once, for both.
-#include "base_detail.hpp"
+#include "kernels/arguments.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 namespace {
@@ -112,8 +115,10 @@ class Stretch {
     const Scratch<float, 3> sums_ = zeros<float, 3>(2, number_, width_ + LANES);
 };
 
-}  // namespace
-
+// Mean of the channels without its edge-preserving mean, in detail_unit, of rows from low on of the views that are
+// present: views (T, S, H, W, 3), which unit makes span 0..1, out (T, S, n, W). Other views are left as they are.
+// The window is a disc of pixels so far down and across, whose weights are nearness (radius + 1, radius + 1); of colours they
+// fall off by 1 / (64 s^2), s being the sum of the RGB differences that is an edge.
 void detail_of_views(const Views &views, float unit, Array<const bool, 2> present, Index low, Array<const float, 2> nearness, float falloff, float detail_unit,
                      Array<std::int16_t, 4> out) {
     over_stretches(present.shape, out.shape[2], ROWS_AT_ONCE, [&](Index t, Index s, Index first, Index number) {
@@ -125,4 +130,10 @@ void detail_of_views(const Views &views, float unit, Array<const bool, 2> presen
     });
 }
 
+const Submodule submodule("base_detail", [](nb::module_ &m) {
+    m.def("detail_of_views", &detail_of_views, Unlocked(), "views"_a, "unit"_a, "present"_a, "low"_a, "nearness"_a, "falloff"_a, "detail_unit"_a,
+          "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

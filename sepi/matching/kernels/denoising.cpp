@@ -1,7 +1,12 @@
-#include "denoising.hpp"
+// Denoising: the detail of each view, kept as far as it exceeds the noise.
+#include "kernels/arguments.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 namespace {
+
+// Views that are written to, (T, S, H, W, C).
+using NewViews = std::variant<Array<std::uint8_t, 5>, Array<std::uint16_t, 5>, Array<float, 5>>;
 
 constexpr Index ROWS_AT_ONCE = 32;  // of a view, that a thread does at a stretch
 constexpr float SHARE = 0.640625f;  // of white noise's variance, what the binomial mean takes away
@@ -86,8 +91,10 @@ class Stretch {
     const Scratch<float, 1> energies_ = zeros<float, 1>(width_ + 2 * REACH + LANES), least_ = zeros<float, 1>(width_ + LANES);
 };
 
-}  // namespace
-
+// Views (T, S, H, W, C) without what noise alone explains, of those that are present, into out, of the same type. full is
+// the value of white. noise (N, 4) says from which brightness on, which rises, the noise of one channel has a variance of
+// noise[2] + (brightness - noise[0]) / noise[1] * noise[3]; the first is below all. Detail is kept as far as its energy exceeds
+// least (H, W) times that. Whole numbers are rounded and cut off at black and white.
 void denoise_views(const Views &views, Array<const bool, 2> present, float full, Array<const float, 2> noise, Array<const float, 2> least, const NewViews &out) {
     const Index H = shape_of(views)[2], W = shape_of(views)[3], C = shape_of(views)[4];
     over_stretches(present.shape, H, ROWS_AT_ONCE, [&](Index t, Index s, Index first, Index number) {
@@ -112,4 +119,9 @@ void denoise_views(const Views &views, Array<const bool, 2> present, float full,
     });
 }
 
+const Submodule submodule("denoising", [](nb::module_ &m) {
+    m.def("denoise_views", &denoise_views, Unlocked(), "views"_a, "present"_a, "full"_a, "noise"_a, "least"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

@@ -1,6 +1,8 @@
-#include "gaps.hpp"
-
+// What is seen through gaps: farther surfaces of a like colour, and how well both depths fit.
 #include <vector>
+
+#include "kernels/arguments.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 namespace {
@@ -25,8 +27,9 @@ auto squared_residual(Array<const Colour, 3> view, float unit, double row, doubl
 // How many of most steps from i stay in a line of n.
 Index steps_within(Index i, Index direction, Index n, Index most) { return std::min(most, direction < 0 ? i : direction > 0 ? n - 1 - i : most); }
 
-}  // namespace
-
+// Disparity (H, W) of the closest farther pixel of a like colour, straight or at 45 degrees from each, its own if none;
+// of two that are as close the farther. lowest (H, W) is the least within reach pixels across and down; farther is more
+// than least_step away, and colours (H, W, 3) are alike below a squared distance2.
 void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest, Strided<const float, 3> colours, Index reach, float least_step,
                    float distance2, Array<float, 2> farther) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
@@ -66,6 +69,9 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
     });
 }
 
+// Squared residuals at two depths of the pixels of rows begin..end, in views (T, S, H, W, 3), which unit makes span 0..1, from
+// the reference view (H, W, 3) in 0..1: added to sums (3, H, W) are those at the farther depth, at the other one, and of how
+// many views they are. Asked is where nothing hides the farther depth; where both are equal nothing is compared.
 void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float, 3> reference,
                     const AskedViews &asked, Index begin, Index end, Array<float, 3> sums) {
     const Index W = disparity.shape[1];
@@ -95,4 +101,11 @@ void compare_depths(const Views &views, float unit, Array<const float, 2> dispar
     });
 }
 
+const Submodule submodule("gaps", [](nb::module_ &m) {
+    m.def("farther_alike", &farther_alike, Unlocked(), "disparity"_a, "lowest"_a, "colours"_a, "reach"_a, "least_step"_a, "distance2"_a, "farther"_a);
+ m.def("compare_depths", &compare_depths, Unlocked(), "views"_a, "unit"_a, "disparity"_a, "farther"_a, "reference"_a, "asked"_a, "begin"_a, "end"_a,
+          "sums"_a);
+});
+
+}  // namespace
 }  // namespace sepi

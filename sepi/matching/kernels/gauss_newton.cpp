@@ -1,13 +1,45 @@
+// The Gauss-Newton refinement: sums over the views that see a pixel, of rows begin..end.
+//
 // A sample of a cubic spline is a sum of 4 x 4 coefficients. The four channels of a coefficient lie side by side, so that a
 // row of four coefficients is one vector of sixteen numbers. Coefficients and weights are whole numbers of 16 bits, of
 // which processors multiply twice as many at once as of floats; what the rounding of the sums of columns leaves is a tenth
 // of the steps of an 8-bit picture. All else is done for eight pixels at once.
-#include "gauss_newton.hpp"
-
-#include "splines.hpp"
+#include "kernels/arguments.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 namespace {
+
+// Pixels of a row that are done together: all that is known of them stays in the first cache.
+constexpr Index AT_ONCE = 128;
+
+// What an iteration needs of the views: the fields of sepi.matching.spline_views.SplineViews, in their order.
+struct SplineViews {
+    Array<const std::int16_t, 5> splines;    // (T, S, n + 2 SPLINE_MARGIN, W + 2 SPLINE_MARGIN, 4)
+    float unit;                              // what they are multiplied with
+    Index low;                               // the row after the margin
+    Array<const float, 3> reference;         // (H, W, 4)
+    Strided<const std::int64_t, 2> places;   // (N, 2), of the views that are compared, in the grid
+    Array<const float, 2> baselines;         // (N, 2), theirs, down and across
+    Array<const float, 1> scales2, shares;   // of colours and of detail
+
+    auto fields() { return std::tie(splines, unit, low, reference, places, baselines, scales2, shares); }
+};
+
+// Where views are hidden: the fields of sepi.matching.aligned_views.Seeing.
+struct Seeing {
+    Array<const float, 4> nearest;  // (T, S, n, W), rows from the splines' low on
+    float occlusion_margin;
+
+    auto fields() { return std::tie(nearest, occlusion_margin); }
+};
+
+// Mean of the views and its derivatives along y and x, (H, W, 4).
+struct MeanView {
+    Array<const float, 3> mean, down, across;
+
+    auto fields() { return std::tie(mean, down, across); }
+};
 
 using Four = std::array<Float8, 4>;
 
@@ -158,8 +190,7 @@ void over_views(const SplineViews &views, const Seeing &seeing, Array<const floa
     });
 }
 
-}  // namespace
-
+// Mean of the views that see each pixel, those unlike the reference view counting less, into out (H, W, 4).
 void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index begin, Index end, Array<float, 3> out) {
     struct Mean : Pixels {
         Four channels;           // times their weights
@@ -232,9 +263,19 @@ static void add_equations(const SplineViews &views, const Seeing &seeing, Array<
         });
 }
 
+// Sums of each pixel, into out (2 or 14, H, W): gradient and curvature, whose ratio is the update towards less cost. And what
+// else the views say, if it is asked: the same by the views to the left, to the right, above and below alone, misfit,
+// agreement, detail's agreement and number of views.
 void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
                         Array<float, 3> out) {
     (out.shape[0] > 2 ? add_equations<true> : add_equations<false>)(views, seeing, disparity, image, begin, end, out);
 }
 
+const Submodule submodule("gauss_newton", [](nb::module_ &m) {
+    m.attr("AT_ONCE") = AT_ONCE;
+    m.def("mean_of_views", &mean_of_views, Unlocked(), "views"_a, "seeing"_a, "disparity"_a, "begin"_a, "end"_a, "out"_a);
+    m.def("equations_of_views", &equations_of_views, Unlocked(), "views"_a, "seeing"_a, "disparity"_a, "image"_a, "begin"_a, "end"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

@@ -14,6 +14,9 @@ namespace sepi {
 // Views (T, S, H, W, C), of any of the types that pictures have.
 using Views = std::variant<Strided<const std::uint8_t, 5>, Strided<const std::uint16_t, 5>, Strided<const float, 5>>;
 
+// Coefficients of a spline beyond each side of a view.
+constexpr Index SPLINE_MARGIN = 2;
+
 inline const Index *shape_of(const Views &views) {
     return std::visit([](const auto &some) { return some.shape; }, views);
 }

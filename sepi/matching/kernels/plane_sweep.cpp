@@ -1,3 +1,5 @@
+// The plane sweep: photo-consistency, its aggregation over windows, and the best candidate.
+//
 // One (candidate, view) has one sub-pixel weight for the whole picture. Candidates next to each other mostly have their
 // samples between the same four pixels; what lies between these is a polynomial of the disparity, and so is the squared
 // difference: eight pixels' coefficients stay in registers while the candidates are gone through.
@@ -5,20 +7,21 @@
 // No cost volume is ever held: a thread keeps the cost rows of one aggregation window, and the minimum is taken as soon
 // as a pixel is aggregated. Each pixel is summed by one thread in a fixed order: results do not depend on the number of
 // threads.
-#include "plane_sweep.hpp"
-
 #include <cmath>
 #include <cstring>
 #include <utility>
 #include <vector>
 
+#include "kernels/arguments.hpp"
 #include "kernels/exponential.hpp"
-#include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
 #include "sample_polynomials.hpp"
 
 namespace sepi {
 namespace {
+
+// Columns of a row whose costs are found, and aggregated, together.
+constexpr Index BLOCK = 32;
 
 constexpr Index BLOCK_ROW = BLOCK + LANES;  // the last vector reaches beyond a block
 constexpr Index AT_ONCE = 64;               // costs of a pixel, of all groups and candidates, that are aggregated at once
@@ -352,8 +355,7 @@ class TileSweep {
     const Scratch<float, 1> pixel_costs_{padded_};
 };
 
-}  // namespace
-
+// Sweep the rows begin..end of the mask (H, W) in tiles of at most height rows, width columns.
 template <class Colour>
 void sweep_plane_rows(const ViewStack<Colour> &views, const Candidates &candidates, const Window &window, const ExpectedCosts &expected,
                       Array<const bool, 2> mask, Index begin, Index end, Index height, Index width, const BestMaps &maps) {
@@ -366,12 +368,18 @@ void sweep_plane_rows(const ViewStack<Colour> &views, const Candidates &candidat
     });
 }
 
-#define INSTANTIATE(Colour)                                                                                                  \
-    template void sweep_plane_rows(const ViewStack<Colour> &, const Candidates &, const Window &, const ExpectedCosts &,      \
-                                   Array<const bool, 2>, Index, Index, Index, Index, const BestMaps &);
-INSTANTIATE(std::uint8_t)
-INSTANTIATE(std::uint16_t)
-INSTANTIATE(float)
-#undef INSTANTIATE
+template <class Colour>
+void bind_of_colours(nb::module_ &m) {
+    m.def("sweep_plane_rows", &sweep_plane_rows<Colour>, Unlocked(), "views"_a, "candidates"_a, "window"_a, "expected"_a, "mask"_a, "begin"_a, "end"_a,
+          "height"_a, "width"_a, "maps"_a);
+}
 
+const Submodule submodule("plane_sweep", [](nb::module_ &m) {
+    bind_of_colours<std::uint8_t>(m);
+    bind_of_colours<std::uint16_t>(m);
+    bind_of_colours<float>(m);
+    m.attr("BLOCK") = BLOCK;
+});
+
+}  // namespace
 }  // namespace sepi

@@ -1,10 +1,14 @@
-#include "semi_global.hpp"
-
+// Semi-global smoothing of a cost volume, after averaging over pixels of one's own colour. Smoothed are volumes of the
+// shape (H, W, K'): candidates lie side by side, as many as fill vectors, and those too many are out of reach.
+#include "kernels/arguments.hpp"
 #include "kernels/exponential.hpp"
 #include "pixels.hpp"
 
 namespace sepi {
 namespace {
+
+// Paths from row to row that a thread follows together: their costs lie side by side, and fit in its cache.
+constexpr Index PATHS_AT_ONCE = 32;
 
 constexpr float UNREACHABLE = 1e9f;
 
@@ -129,8 +133,7 @@ float margin_of(const float *costs, Index K, const float *disparities, float fou
     return least < UNREACHABLE ? least - least_of(own) : 0.0f;
 }
 
-}  // namespace
-
+// Mean over a window with weights exp(-|colour difference|^2 / (2 variance)); cost (K, H, W), guide (3, H, W), out (H, W, K').
 void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index radius, float variance, Array<float, 3> out) {
     const Index K = cost.shape[0], H = cost.shape[1], W = cost.shape[2], size = 2 * radius + 1;
     parallel_for(0, H, [&](Index y) {
@@ -164,6 +167,8 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
     });
 }
 
+// Sum of the smoothed costs along eight paths, into out; cost and out (H, W, K'), guide (3, H, W). All paths of a direction go through
+// band rows before any goes on, so that costs and sums come from memory once for the paths down and once for those up.
 void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float small, float large, float weakening, Index band, Array<float, 3> out) {
     const Index H = cost.shape[0], W = cost.shape[1], K = cost.shape[2];
     const Smoothing smoothing{cost, guide, small, large, weakening, out};
@@ -188,6 +193,9 @@ void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float 
     }
 }
 
+// Winner of each pixel, refined by a parabola, and by how much the averaged cost of other minima exceeds its own:
+// negative where another minimum is lower before smoothing, 0 where there is no other. Candidates closer than same to
+// the winner belong to its minimum; smoothed and averaged (H, W, K'), disparities (K).
 void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Array<const float, 1> disparities, float same, Array<float, 2> disparity,
             Array<float, 2> margin) {
     const Index H = smoothed.shape[0], W = smoothed.shape[1], K = disparities.shape[0], padded = smoothed.shape[2];
@@ -211,4 +219,12 @@ void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Arra
     });
 }
 
+const Submodule submodule("semi_global", [](nb::module_ &m) {
+    m.attr("PATHS_AT_ONCE") = PATHS_AT_ONCE;
+    m.def("aggregate", &aggregate, Unlocked(), "cost"_a, "guide"_a, "radius"_a, "variance"_a, "out"_a);
+    m.def("semi_global", &semi_global, Unlocked(), "cost"_a, "guide"_a, "small"_a, "large"_a, "weakening"_a, "band"_a, "out"_a);
+    m.def("choose", &choose, Unlocked(), "smoothed"_a, "averaged"_a, "disparities"_a, "same"_a, "disparity"_a, "margin"_a);
+});
+
+}  // namespace
 }  // namespace sepi

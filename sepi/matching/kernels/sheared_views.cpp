@@ -1,7 +1,7 @@
-#include "sheared_views.hpp"
-
+// Whole views, moved by fractions of a pixel.
 #include <cmath>
 
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
@@ -21,8 +21,8 @@ struct Shift {
     float sum(float a, float b, float c, float d) const { return weights[0] * a + weights[1] * b + weights[2] * c + weights[3] * d; }
 };
 
-}  // namespace
-
+// out[n, c, y, x] = views[n, c, y + offsets[n, 0], x + offsets[n, 1]]; views and out (N, C, H, W), offsets (N, 2).
+// Samples between pixels by cubic convolution, or bilinear; a view goes on as it ends.
 void shear(Array<const float, 4> views, Strided<const double, 2> offsets, bool cubic, Array<float, 4> out) {
     const Index C = views.shape[1], H = views.shape[2], W = views.shape[3];
     parallel_for(0, views.shape[0], [&](Index n) {
@@ -45,4 +45,9 @@ void shear(Array<const float, 4> views, Strided<const double, 2> offsets, bool c
     });
 }
 
+const Submodule submodule("sheared_views", [](nb::module_ &m) {
+    m.def("shear", &shear, Unlocked(), "views"_a, "offsets"_a, "cubic"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

@@ -1,9 +1,16 @@
-#include "splines.hpp"
-
+// Cubic splines of the views. Coefficients are a convolution with sqrt(3) (sqrt(3) - 2)^|k| along each axis, mirrored at
+// the ends (Unser 1999, doi:10.1109/79.799930); cut off where it is below single precision, so that a row's coefficients
+// do not depend on rows far away.
 #include <numbers>
+
+#include "kernels/arguments.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 namespace {
+
+// How far the convolution of the views' coefficients reaches; beyond it is a tenth of what rounding to int16 does.
+constexpr Index SPLINE_REACH = 8;
 
 // How far the convolution reaches where nothing is rounded: beyond it is less than 1e-6.
 constexpr Index FULL_REACH = 12;
@@ -47,8 +54,7 @@ class Lines {
     Scratch<float, 1> padded_;
 };
 
-}  // namespace
-
+// Coefficients of an image (H, W, C), into out (C, H, W).
 void spline_coefficients(Strided<const float, 3> image, Array<float, 3> out) {
     const Index H = image.shape[0], W = image.shape[1], C = image.shape[2];
     over_stretches({1, 1}, H, ROWS_AT_ONCE, [&](Index, Index, Index first, Index number) {
@@ -64,6 +70,12 @@ void spline_coefficients(Strided<const float, 3> image, Array<float, 3> out) {
     });
 }
 
+// Coefficients of views' colours (T, S, H, W, 3) and detail (T, S, n or 0, W), rounded, into
+// out (T, S, n + 2 SPLINE_MARGIN, W + 2 SPLINE_MARGIN, 4), mirrored in the margins.
+//
+// Colours and detail are multiplied with their units first. Rows of detail begin at detail_low, and reach SPLINE_REACH
+// farther than those that are wanted, or to the picture's end; low is the row after the first SPLINE_MARGIN ones of out.
+// of_colours and of_detail (T, S) have the views whose colours, and whose detail, are wanted; what out has of others stays.
 void view_splines(const Views &views, float colour_unit, Array<const std::int16_t, 4> detail, float detail_unit, Index detail_low,
                   Array<const bool, 2> of_colours, Array<const bool, 2> of_detail, Index low, Array<std::int16_t, 5> out) {
     const Index H = shape_of(views)[2], width = out.shape[3], W = width - 2 * SPLINE_MARGIN;
@@ -88,4 +100,13 @@ void view_splines(const Views &views, float colour_unit, Array<const std::int16_
     });
 }
 
+const Submodule submodule("splines", [](nb::module_ &m) {
+    m.attr("MARGIN") = SPLINE_MARGIN;
+    m.attr("REACH") = SPLINE_REACH;
+    m.def("spline_coefficients", &spline_coefficients, Unlocked(), "image"_a, "out"_a);
+    m.def("view_splines", &view_splines, Unlocked(), "views"_a, "colour_unit"_a, "detail"_a, "detail_unit"_a, "detail_low"_a, "of_colours"_a,
+          "of_detail"_a, "low"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

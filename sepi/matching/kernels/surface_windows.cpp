@@ -1,5 +1,5 @@
-#include "surface_windows.hpp"
-
+// Sums over windows that hold one surface.
+#include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi {
@@ -11,8 +11,11 @@ constexpr Index ROWS_AT_ONCE = 32;
 // How far two things are alike, 1 up to half a width from each other, 0 from one and a half on.
 Float8 alike(Float8 apart, float width) { return smaller(larger(1.5f - apart / width, Float8{}), spread(1)); }
 
-}  // namespace
-
+// Sums of gradient and curvature (H, W) over those pixels of a window of 2 radius + 1 that are of the surface of its
+// middle, into sums (2, H, W).
+//
+// Differences of disparity (H, W) over width, and of colours (3, H, W) over colour_width, make a pixel count less and
+// less, from half of it on; one of the same disparity counts least whatever its colour. Colours (3, 0, 0) are not asked.
 void sums_of_surface(Array<const float, 2> gradient, Array<const float, 2> curvature, Array<const float, 2> disparity, Array<const float, 3> colours,
                      Index radius, float width, float colour_width, float least, Array<float, 3> sums) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
@@ -50,4 +53,10 @@ void sums_of_surface(Array<const float, 2> gradient, Array<const float, 2> curva
     });
 }
 
+const Submodule submodule("surface_windows", [](nb::module_ &m) {
+    m.def("sums_of_surface", &sums_of_surface, Unlocked(), "gradient"_a, "curvature"_a, "disparity"_a, "colours"_a, "radius"_a, "width"_a,
+          "colour_width"_a, "least"_a, "sums"_a);
+});
+
+}  // namespace
 }  // namespace sepi

@@ -1,9 +1,14 @@
-#include "view_noise.hpp"
-
+// Noise of the views: blocks of the reference view against blocks of others, at whole pixels.
 #include <limits>
+
+#include "kernels/arguments.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 namespace {
+
+// Width of a block, pixels.
+constexpr Index BLOCK = 8;
 
 static_assert(BLOCK == LANES);
 
@@ -25,8 +30,9 @@ float energy_of(const float *own, const float *other, Index next_row) {
     return in_order(squares) - sum * sum / float(BLOCK * BLOCK);
 }
 
-}  // namespace
-
+// Least mean squared difference, in squared units of the colours, of each block of view (t0, s0) from what other views
+// have at some whole pixels from it; infinite where no other view holds the block. Grey counts as three equal channels.
+// moves (N, 4): row and column of a view in the grid, pixels down and across; least (H / BLOCK, W / BLOCK).
 void least_differences(const Views &views, Index t0, Index s0, Array<const std::int64_t, 2> moves, Array<float, 2> least) {
     const Index H = shape_of(views)[2], W = shape_of(views)[3], C = shape_of(views)[4];
     parallel_for(0, least.shape[0], [&](Index i) {
@@ -52,4 +58,10 @@ void least_differences(const Views &views, Index t0, Index s0, Array<const std::
     });
 }
 
+const Submodule submodule("view_noise", [](nb::module_ &m) {
+    m.def("least_differences", &least_differences, Unlocked(), "views"_a, "t0"_a, "s0"_a, "moves"_a, "least"_a);
+    m.attr("BLOCK") = BLOCK;
+});
+
+}  // namespace
 }  // namespace sepi

@@ -1,9 +1,47 @@
-#include "visibility.hpp"
-
+// The visibility sweep: z-buffers of every view, and costs over the views that see a pixel.
+#include "kernels/arguments.hpp"
+#include "pixels.hpp"
 #include "sample_polynomials.hpp"
 
 namespace sepi {
 namespace {
+
+constexpr float EMPTY = -1e9f;   // in a z-buffer where no pixel of the reference view falls: nothing is nearer
+constexpr float MISSING = 1e9f;  // where the view shows nothing: not even a view that hides a pixel counts less
+
+// Colours and detail of all views: the fields of sepi.matching.base_detail.BaseDetail, in their order.
+struct BaseDetail {
+    Views colours;  // (T, S, H, W, 3): grey views have three equal channels
+    float colour_unit;
+    Array<const std::int16_t, 4> detail;  // (T, S, n or 0, W)
+    float detail_unit;
+    Index low;                       // first row of the detail
+    Array<const bool, 2> present;    // (T, S)
+    Index t0, s0;
+    double noise;
+    Strided<const float, 3> guide;                   // (H, W, 3)
+    Array<const std::int16_t, 2> reference_detail;  // (n or 0, W)
+    double edge;
+
+    auto fields() {
+        return std::tie(colours, colour_unit, detail, detail_unit, low, present, t0, s0, noise, guide, reference_detail, edge);
+    }
+};
+
+// In which views a pixel is seen.
+struct Visibility {
+    Array<const float, 4> nearest;  // (T, S, n, W) or (T, S, n, 0), and LANES numbers behind it; rows as those of the detail
+    float occlusion_margin, occluded_view_weight;
+
+    auto fields() { return std::tie(nearest, occlusion_margin, occluded_view_weight); }
+};
+
+// Square of the robust scale, and share in the cost, of colours and of detail.
+struct RobustCost {
+    Array<const float, 1> scales2, shares;
+
+    auto fields() { return std::tie(scales2, shares); }
+};
 
 constexpr float ROUNDING = 1.0f / 512;  // how far a position is from the same in single precision, at most, pixels
 constexpr float COLOUR_STEPS = 20000;   // from black to white, of colours as whole numbers of 16 bits
@@ -148,8 +186,8 @@ class VisibleRow {
     const Scratch<float, 3> sums_ = zeros<float, 3>(K_, 2, width_);  // of the costs, and of their weights
 };
 
-}  // namespace
-
+// Disparity map of the reference view as each view sees it, rows low..high: the nearest of the pixels that touch a
+// position; out (T, S, high - low, W).
 void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, Strided<const double, 3> baselines, Index low, Index high, Array<float, 4> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const auto [least, most] = std::minmax_element(disparity.data, disparity.data + H * W);
@@ -170,6 +208,8 @@ void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, St
     });
 }
 
+// Pixels that something nearer occludes in one of the views that could see them, of rows begin..end of the map: those of
+// out (H, W) that it sets.
 void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &views, Index begin, Index end, Array<bool, 2> out) {
     const double H = double(disparity.shape[0]), W = double(disparity.shape[1]);
     parallel_for(begin, end, [&](Index y) {
@@ -184,9 +224,21 @@ void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &vie
     });
 }
 
+// Cost of every candidate for rows begin..end, into cost (K, H, W), over the views in which nothing nearer occludes the
+// pixel: 0..1; 1 where no view is left.
 void sweep_visible_rows(const BaseDetail &views, const Visibility &visibility, const RobustCost &robust, const Candidates &candidates, Index begin, Index end,
                         Array<float, 3> cost) {
     parallel_for(begin, end, [&](Index y) { VisibleRow(views, visibility, robust, candidates, cost).sweep(y); });
 }
 
+const Submodule submodule("visibility", [](nb::module_ &m) {
+    m.attr("EMPTY") = EMPTY;
+    m.attr("MISSING") = MISSING;
+    m.def("z_buffers", &z_buffers, Unlocked(), "disparity"_a, "present"_a, "baselines"_a, "low"_a, "high"_a, "out"_a);
+    m.def("occluded_in_any_view", &occluded_in_any_view, Unlocked(), "disparity"_a, "views"_a, "begin"_a, "end"_a, "out"_a);
+    m.def("sweep_visible_rows", &sweep_visible_rows, Unlocked(), "views"_a, "visibility"_a, "robust"_a, "candidates"_a, "begin"_a, "end"_a,
+          "cost"_a);
+});
+
+}  // namespace
 }  // namespace sepi

@@ -1,9 +1,12 @@
-#include "planes.hpp"
-
+// Planes of superpixels. labels (H W) say whose a pixel is, design (H W, 3) is each plane parameter's value there.
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
 namespace sepi {
+namespace {
 
+// Weighted least squares of each superpixel's data, in the order of the pixels, added to left (N, 3, 3) and
+// right (N, 3) of zeros; weight and disparity (H W).
 void add_normal_equations(Array<const std::int64_t, 1> labels, Array<const double, 2> design, Array<const float, 1> weight, Array<const float, 1> disparity,
                           Array<double, 3> left, Array<double, 2> right) {
     for (Index i = 0; i < labels.shape[0]; ++i) {
@@ -20,6 +23,7 @@ void add_normal_equations(Array<const std::int64_t, 1> labels, Array<const doubl
             for (Index q = 0; q < p; ++q) left(label, p, q) = left(label, q, p);
 }
 
+// Disparity of every pixel by the plane of its superpixel, out (H W); planes (N, 3).
 void values_of_planes(Array<const std::int64_t, 1> labels, Array<const double, 2> design, Array<const double, 2> planes, Array<float, 1> out) {
     constexpr Index TOGETHER = 4096;
     const Index n = labels.shape[0];
@@ -31,4 +35,10 @@ void values_of_planes(Array<const std::int64_t, 1> labels, Array<const double, 2
     });
 }
 
+const Submodule submodule("planes", [](nb::module_ &m) {
+    m.def("add_normal_equations", &add_normal_equations, Unlocked(), "labels"_a, "design"_a, "weight"_a, "disparity"_a, "left"_a, "right"_a);
+    m.def("values_of_planes", &values_of_planes, Unlocked(), "labels"_a, "design"_a, "planes"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

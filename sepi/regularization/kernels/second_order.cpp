@@ -1,11 +1,19 @@
-#include "second_order.hpp"
-
+// Second-order smoothing: its matrix, as a stencil, and the hats of its preconditioner.
+//
+// Pictures have a margin of MARGIN pixels of zeros on each side, so that no loop has to look where it is; hats have
+// none. Node i of the finest lies at SPACING i - 0.5 pixels; a coarser level has every other node, and each of its hats
+// is one of the finer level and half of each of its neighbours. Sums are those of rows, taken one after the other, to
+// the same bits on any number of threads. Number is float or double.
 #include <cmath>
 
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
 namespace sepi {
 namespace {
+
+constexpr Index MARGIN = 2;   // how far second differences reach, pixels
+constexpr Index SPACING = 2;  // pixels from node to node of the finest hats
 
 // The finest hats at the pixels beside a node and at the next ones.
 template <class Number>
@@ -64,8 +72,7 @@ void product_row(Array<const Number, 3> stencil, Array<const Number, 2> vector, 
     }
 }
 
-}  // namespace
-
+// Weights of second differences in one direction; corners (n, 2) and factors (n) say what pixels make a difference.
 void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const double, 2> colour,
                             Array<const std::int64_t, 2> corners, Array<const double, 1> factors, double threshold, double variance, Array<double, 2> out) {
     parallel_for(0, out.shape[0], [&](Index y) {
@@ -82,6 +89,7 @@ void weights_of_differences(Array<const float, 2> disparity, Array<const float, 
     });
 }
 
+// direction becomes ratio * direction + ahead, and out the matrix times that; returns the inner product of both.
 template <class Number>
 double turn_and_bend(Array<const Number, 3> stencil, Array<const Number, 2> ahead, Number ratio, Array<Number, 2> direction, Array<Number, 2> out) {
     const Index H = direction.shape[0] - 2 * MARGIN, W = direction.shape[1] - 2 * MARGIN;
@@ -98,6 +106,8 @@ double turn_and_bend(Array<const Number, 3> stencil, Array<const Number, 2> ahea
     return in_order(along);
 }
 
+// Add a direction, so many times, to a solution, and take what the matrix makes of it, bent, from the residual; returns
+// the squared norm of the residual.
 template <class Number>
 double step(Number length, Array<const Number, 2> direction, Array<const Number, 2> bent, Array<Number, 2> solution, Array<Number, 2> residual) {
     const Scratch<Number, 1> squares(solution.shape[0]);
@@ -114,6 +124,7 @@ double step(Number length, Array<const Number, 2> direction, Array<const Number,
     return in_order(squares);
 }
 
+// Inner products of a picture with the finest hats, out (h, w).
 template <class Number>
 void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = out.shape[1];
@@ -131,6 +142,7 @@ void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
     }
 }
 
+// out becomes inverse * vector, plus the finest hats; returns the inner product of vector and out.
 template <class Number>
 double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2> vector, Array<const Number, 2> fine, Array<Number, 2> out) {
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = fine.shape[1];
@@ -154,6 +166,7 @@ double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2
     return total;
 }
 
+// What the matrix has on its diagonal as hats spacing pixels apart see it, out (h, w).
 void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<double, 2> out) {
     const Index H = stencil.shape[1] - 2 * MARGIN, W = stencil.shape[2] - 2 * MARGIN, w = out.shape[1], reach = 2 * spacing;
     // a hat at its own pixels, and zeros, to where entries lead that leave it
@@ -181,13 +194,24 @@ void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<doubl
     });
 }
 
-#define INSTANTIATE(Number)                                                                                                                          \
-    template double turn_and_bend(Array<const Number, 3>, Array<const Number, 2>, Number, Array<Number, 2>, Array<Number, 2>);                        \
-    template double step(Number, Array<const Number, 2>, Array<const Number, 2>, Array<Number, 2>, Array<Number, 2>);                                 \
-    template void onto_finest(Array<const Number, 2>, Array<Number, 2>);                                                                             \
-    template double diagonal_and_finest(Array<const Number, 2>, Array<const Number, 2>, Array<const Number, 2>, Array<Number, 2>);
-INSTANTIATE(float)
-INSTANTIATE(double)
-#undef INSTANTIATE
+// The kernels of the second-order smoothing that work in single or double precision.
+template <class Number>
+void bind_of_numbers(nb::module_ &m) {
+    m.def("turn_and_bend", &turn_and_bend<Number>, Unlocked(), "stencil"_a, "ahead"_a, "ratio"_a, "direction"_a, "out"_a);
+    m.def("step", &step<Number>, Unlocked(), "length"_a, "direction"_a, "bent"_a, "solution"_a, "residual"_a);
+    m.def("onto_finest", &onto_finest<Number>, Unlocked(), "vector"_a, "out"_a);
+    m.def("diagonal_and_finest", &diagonal_and_finest<Number>, Unlocked(), "inverse"_a, "vector"_a, "fine"_a, "out"_a);
+}
 
+const Submodule submodule("second_order", [](nb::module_ &m) {
+    m.attr("MARGIN") = MARGIN;
+    m.attr("SPACING") = SPACING;
+    m.def("weights_of_differences", &weights_of_differences, Unlocked(), "disparity"_a, "reliability"_a, "colour"_a, "corners"_a, "factors"_a,
+          "threshold"_a, "variance"_a, "out"_a);
+    bind_of_numbers<float>(m);
+    bind_of_numbers<double>(m);
+    m.def("diagonal_of_hats", &diagonal_of_hats, Unlocked(), "stencil"_a, "spacing"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi
