@@ -101,7 +101,7 @@ class GaussNewton(AlignedViews):
         return gradient, curvature, Evidence(sums[2:10].reshape(4, 2, *disparity.shape), *rest[8:])
 
     def _sums(self, number: int, disparity: FloatMap, *image: FloatMap) -> FloatMap:
-        """The first sums of ``kernels/gauss_newton.hpp``, with a mean and its derivatives."""
+        """The first sums of ``kernels/gauss_newton.cpp``, with a mean and its derivatives."""
         sums = np.empty((number, *disparity.shape), np.float32)
 
         def add(views: SplineViews, seeing: Seeing, band: Band) -> None:

@@ -30,7 +30,7 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.matching.denoising import sure_noise
 from sepi.matching.expected_costs import expected_costs
 from sepi.matching.nearest_surfaces import shown_columns
-from sepi.matching.sweep_arrays import BestMaps, ViewStack, Window, sampled_candidates
+from sepi.matching.sweep_arrays import ViewStack, Window, sampled_candidates
 from sepi.matching.view_noise import ViewNoise
 from sepi.stage import Progress, no_progress
 from sepi.threads import threads_used
@@ -194,7 +194,7 @@ def sweep(
     expected = expected_costs(light_field, to_correct, candidates, groups, subsets, squared_scale, LANES)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     window = Window(guide, parameters.window_radius, np.float32(parameters.window_sigma**2 + noise))
-    maps = BestMaps(*(np.full((len(subsets), H, W), np.nan, np.float32) for _ in range(3)))
+    maps = np.full((3, len(subsets), H, W), np.nan, np.float32)
     height = _rows_at_a_stretch(H, threads_used())
     strip = height * threads_used()
     for begin in range(0, H, strip):

@@ -27,7 +27,7 @@ class SplineViews(NamedTuple):
     Attributes
     ----------
     splines : ndarray, shape (T, S, n + 4, W + 4, 4), int16
-        Spline coefficients of colours and detail (``kernels/splines.hpp``), with a margin; zero where the detail has
+        Spline coefficients of colours and detail (``kernels/splines.cpp``), with a margin; zero where the detail has
         no share.
     unit : float32
         What they are multiplied with.

@@ -110,14 +110,6 @@ class ExpectedCosts(NamedTuple):
     anywhere: FloatMap
 
 
-class BestMaps(NamedTuple):
-    """What is found of each subset of views: the best disparity, its cost, and the mean cost; (N, H, W), float32."""
-
-    disparity: FloatMap
-    cost: FloatMap
-    mean: FloatMap
-
-
 class Visibility(NamedTuple):
     """In which views a pixel is seen.
 

@@ -5,6 +5,7 @@
 #include <tuple>
 #include <variant>
 
+#include "kernels/exponential.hpp"
 #include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
@@ -80,6 +81,39 @@ template <int C, int STEP = C, class Number, class Convert>
 void store_interleaved(const float *lines, Index stride, Index n, Number *__restrict out, Convert convert) {
     for (Index x = 0; x < n; ++x)
         for (Index c = 0; c < C; ++c) out[STEP * x + c] = convert(lines[c * stride + x]);
+}
+
+// Weights of the windows of pixels begin..end of row y, summing to one, into weights ((2 radius + 1)^2, end - begin or more);
+// zero outside. They are exponentials of what exponent makes of squared distances in the guide (3, H, W).
+template <class Exponent>
+void window_weights(Array<const float, 3> guide, Index y, Index begin, Index end, Index radius, Array<float, 2> weights, Exponent exponent) {
+    const Index H = guide.shape[1], W = guide.shape[2], size = 2 * radius + 1;
+    const auto totals = zeros<float, 1>(end - begin);
+    float *__restrict total = totals.array().data;
+    std::fill_n(weights.data, size * size * weights.strides[0], 0.0f);
+    for (Index i = std::max<Index>(0, radius - y); i < std::min(size, H - y + radius); ++i) {
+        for (Index j = 0; j < size; ++j) {
+            const Index dx = j - radius, first = std::max(begin, -dx), last = std::min(end, W - dx);
+            const float *here[3], *there[3];
+            for (Index c = 0; c < 3; ++c) here[c] = guide.at(c, y, begin), there[c] = guide.at(c, y + i - radius, begin + dx);
+            float *__restrict weight = weights.at(i * size + j);
+            for (Index x = first - begin; x < last - begin; ++x) {
+                const float r = here[0][x] - there[0][x], g = here[1][x] - there[1][x], b = here[2][x] - there[2][x];
+                weight[x] = exp_of_negative(exponent(r * r + g * g + b * b));
+                total[x] += weight[x];
+            }
+        }
+    }
+    for (Index n = 0; n < size * size; ++n) {
+        float *__restrict weight = weights.at(n);
+        for (Index x = 0; x < end - begin; ++x) weight[x] /= total[x];
+    }
+}
+
+// Where the parabola through three costs side by side is least, from the middle one; 0 if it bends by no more than so much.
+inline double vertex(const float *middle, double least) {
+    const double bend = middle[-1] - 2 * double(middle[0]) + middle[1];
+    return bend > least ? 0.5f * (middle[-1] - middle[1]) / bend : 0;
 }
 
 // Have a line of n go on mirrored at its ends, by so many numbers.

@@ -9,12 +9,10 @@
 // threads.
 #include <cmath>
 #include <cstring>
-#include <utility>
 #include <vector>
 
 #include "kernels/arguments.hpp"
-#include "kernels/exponential.hpp"
-#include "kernels/parallel.hpp"
+#include "pixels.hpp"
 #include "sample_polynomials.hpp"
 
 namespace sepi {
@@ -36,12 +34,8 @@ struct Tile {
     Index top, bottom, begin, end;
 };
 
-struct Span {
-    Index begin, end;
-};
-
 // Columns of a run whose samples, below row top and left columns on, are in shown (H or 0, 2).
-Span seen_run(Array<const std::int64_t, 2> shown, Index W, Run run, Index top, Index left, float fx) {
+std::array<Index, 2> seen_run(Array<const std::int64_t, 2> shown, Index W, Run run, Index top, Index left, float fx) {
     Index low = 0, high = W;
     if (shown.shape[0] > 0) {
         low = std::max(shown(top, 0), shown(top + 1, 0));
@@ -85,8 +79,7 @@ struct ComparedViews {
     std::vector<std::vector<ComparedView>> groups;
     std::vector<Subset> subsets;
 
-    template <class Colour>
-    ComparedViews(const ViewStack<Colour> &views, const Candidates &candidates) : groups(views.subsets.shape[1]), subsets(views.subsets.shape[0]) {
+    ComparedViews(const ViewStack &views, const Candidates &candidates) : groups(views.subsets.shape[1]), subsets(views.subsets.shape[0]) {
         for (Index t = 0; t < views.groups.shape[0]; ++t)
             for (Index s = 0; s < views.groups.shape[1]; ++s)
                 if (const Index g = views.groups(t, s); g >= 0) groups[g].emplace_back(candidates, t, s);
@@ -96,147 +89,41 @@ struct ComparedViews {
     }
 };
 
-// Add the residuals of one view to costs (K', BLOCK_ROW), and where it sees the pixels 1 to counts, unless that is null.
+// Of tiles of at most so many columns; maps (3, N, H, W) are of the best disparity, its cost, and the mean cost.
 template <class Colour>
-void add_view(const ViewStack<Colour> &views, const ComparedView &view, Run run, float *costs, float *counts) {
-    const Index H = views.colours.shape[3], W = views.colours.shape[4] - LANES;
-    const auto colours = views.colours[view.t][view.s], reference = views.colours[views.t0][views.s0];
-    const auto shown = views.shown[view.t][view.s];
-    const Float8 scale2 = spread(views.scale2);
-    for (const auto &[begin, end, down, left, motion] : view.segments) {
-        const auto [top, below] = upper_row(run.y, down, motion.fy, H);
-        if (top < 0 || top > H - 2) continue;
-        const auto [first, last] = seen_run(shown, W, run, top, left, motion.fx);
-        const Motion at{below, motion.fx, motion.sy, motion.sx};
-        const auto squares_of = [&](Index x) {
-            SquaredDifferences squares;
-            for (Index c = 0; c < 3; ++c) squares.add(colours.at(c, top, x + left), colours.at(c, top + 1, x + left), reference.at(c, run.y, x), at);
-            // differences of 0 add nothing to what others have added
-            if (last - x < LANES) squares.keep_first(last - x);
-            return squares;
-        };
-        const auto add = [&](const SquaredDifferences &squares, Float8 distance, float *cost) {
-            const Float8 z = squares.at(distance);
-            store(cost, load(cost) + z / (z + scale2));
-        };
-        for (Index x = first; x < last; x += 2 * LANES) {
-            float *cost = costs + begin * BLOCK_ROW + x - run.begin;
-            const auto squares = squares_of(x);
-            if (last - x <= LANES) {
-                for (Index n = begin; n < end; ++n, cost += BLOCK_ROW) add(squares, spread(view.distances[n]), cost);
-                break;
-            }
-            // the next eight as well: what one waits for is time for the other
-            const auto next = squares_of(x + LANES);
-            for (Index n = begin; n < end; ++n, cost += BLOCK_ROW) {
-                const Float8 distance = spread(view.distances[n]);
-                add(squares, distance, cost);
-                add(next, distance, cost + LANES);
-            }
-        }
-        if (!counts) continue;
-        for (Index n = begin; n < end; ++n)
-            for (Index x = first; x < last; ++x) counts[n * BLOCK_ROW + x - run.begin] += 1;
-    }
-}
+struct TileSweep {
+    const Array<const Colour, 5> all_colours;
+    const ViewStack &views;
+    const ComparedViews &compared;
+    const Candidates &candidates;
+    const Window &window;
+    const ExpectedCosts &expected;
+    const Array<const bool, 2> mask;
+    const Index width;
+    const Array<float, 4> maps;
+    Tile tile{};
 
-// Weights of the windows of a run of pixels, summing to one, into weights (size, size, n); zero outside.
-void window_weights(const Window &window, Run run, Array<float, 3> weights) {
-    const Index H = window.guide.shape[1], W = window.guide.shape[2], size = weights.shape[0], n = run.end - run.begin;
-    const auto totals = zeros<float, 1>(n);
-    float *total = totals.array().data;
-    std::fill_n(weights.data, size * weights.strides[0], 0.0f);
-    const float falloff = -0.5f / window.variance;
-    for (Index i = 0; i < size; ++i) {
-        const Index row = run.y + i - window.radius;
-        if (row < 0 || row >= H) continue;
-        for (Index j = 0; j < size; ++j) {
-            const Index dx = j - window.radius;
-            const Index first = std::max(run.begin, -dx), last = std::min(run.end, W - dx);
-            float *weight = weights.at(i, j, first - run.begin), *sums = total + first - run.begin;
-            for (Index c = 0; c < 3; ++c) {
-                const float *here = window.guide.at(c, run.y, first), *there = window.guide.at(c, row, first + dx);
-                for (Index x = 0; x < last - first; ++x) {
-                    const float e = here[x] - there[x];
-                    weight[x] += e * e;
-                }
-            }
-            for (Index x = 0; x < last - first; ++x) weight[x] = exp_of_negative(falloff * weight[x]);
-            for (Index x = 0; x < last - first; ++x) sums[x] += weight[x];
-        }
-    }
-    for (Index i = 0; i < size; ++i)
-        for (Index j = 0; j < size; ++j) {
-            float *weight = weights.at(i, j);
-            for (Index x = 0; x < n; ++x) weight[x] /= total[x];
-        }
-}
-
-struct Best {
-    float disparity, cost, mean;
-};
-
-// What noise takes of the costs of a pixel: moments of a subset of views (K'), times weights of the pixel.
-struct TakenByNoise {
-    const float *first, *second;
-    float first_weight, second_weight;
-
-    Float8 at(Index k) const { return fma(spread(second_weight), load(second + k), spread(first_weight) * load(first + k)); }
-};
-
-// Disparity at the lowest of the costs of a subset, refined below the disparity sampling; that cost; the mean of all.
-// sums, and counts unless all views see the pixel, are of its window (G, K'); costs (K') is scratch.
-Best best_candidate(const Subset &subset, const float *sums, const float *counts, const TakenByNoise &noise, Array<const float, 1> disparities,
-                    Array<float, 1> costs) {
-    const Index K = disparities.shape[0], padded = costs.shape[0];
-    constexpr float MOST = 1e9f;
-    Float8 all_least = spread(MOST), sum{}, number = spread(subset.views);
-    for (Index k = 0; k < K; k += LANES) {
-        const auto of_groups = [&](const float *values) {
-            Float8 total{};
-            for (const Index g : subset.groups) total = total + load(values + g * padded + k);
-            return total;
-        };
-        if (counts) number = of_groups(counts);
-        // (mean - taken) / (1 - taken); a candidate that no view of the subset sees is no match
-        const Float8 total = of_groups(sums), lost = number * noise.at(k);
-        const Float8 cost = number <= Float8{} ? spread(1) : (total - lost) / (number - lost);
-        store(costs.at(k), cost);
-        all_least = smaller(all_least, first_lanes(cost, K - k, MOST));
-        sum = sum + first_lanes(cost, K - k, 0);
-    }
-    const float lowest = least_of(all_least);
-    Index best = 0;
-    while (best < K - LANES && !any(load(costs.at(best)) == spread(lowest))) best += LANES;
-    while (best < K - 1 && costs(best) != lowest) ++best;
-    double offset = 0;
-    // a perfect match needs no parabola, and the ends of the range allow none
-    if (lowest != 0 && 0 < best && best < K - 1) {
-        const float before = costs(best - 1), after = costs(best + 1);
-        const double curvature = before - 2 * double(lowest) + after;
-        if (curvature > 0) offset = 0.5f * (before - after) / curvature;
-    }
-    const float sampling = (disparities(K - 1) - disparities(0)) / float(K - 1);
-    return {float(disparities(best) + offset * sampling), lowest, sum_of(sum) / float(K)};
-}
-
-template <class Colour>
-class TileSweep {
-  public:
-    // Of tiles of at most so many columns.
-    TileSweep(const ViewStack<Colour> &views, const ComparedViews &compared, const Candidates &candidates, const Window &window, const ExpectedCosts &expected,
-              Array<const bool, 2> mask, Index width, const BestMaps &maps)
-        : views_(views), compared_(compared), candidates_(candidates), window_(window), expected_(expected), mask_(mask), maps_(maps),
-          columns_(width + 2 * window.radius + LANES) {}
+    const Index H = mask.shape[0], W = mask.shape[1];
+    // where a view may show less than the picture, all pixels are as those near its border
+    const Index border = views.shown.shape[2] > 0 ? H + W : Index(std::ceil(candidates.reach)) + window.radius + 1;
+    const Index padded = (candidates.number() + LANES - 1) / LANES * LANES, size = 2 * window.radius + 1;
+    // with the columns of the windows at both ends
+    const Index columns = width + 2 * window.radius + LANES, parts = (Index(compared.groups.size()) * padded + AT_ONCE - 1) / AT_ONCE;
+    // rows of a window: row r at r % size, column x - radius of the tile at x; what is outside the picture is a number
+    const Scratch<float, 4> cost_ring = zeros<float, 4>(size, parts, columns, AT_ONCE), count_ring = zeros<float, 4>(size, parts, columns, AT_ONCE);
+    const Scratch<float, 2> block_costs{padded, BLOCK_ROW}, block_counts{padded, BLOCK_ROW};
+    const Scratch<float, 2> weights{size * size, BLOCK};
+    const Scratch<float, 2> sums{BLOCK, parts * AT_ONCE}, numbers{BLOCK, parts * AT_ONCE};
+    const Scratch<float, 1> pixel_costs{padded};
 
     // Sweep the pixels of a tile that are in the mask.
-    void run(const Tile &tile) {
-        tile_ = tile;
-        const Index radius = window_.radius, last = std::min(W_, tile.end + radius);
+    void run(const Tile &next) {
+        tile = next;
+        const Index radius = window.radius, last = std::min(W, tile.end + radius);
         Index done = -1;  // last row whose costs are in the ring
         for (Index y = tile.top; y < tile.bottom; ++y) {
             if (!wanted({y, tile.begin, tile.end}, 0)) continue;
-            const Index reached = std::min(H_, y + radius + 1);
+            const Index reached = std::min(H, y + radius + 1);
             for (Index row = std::max({Index(0), y - radius, done + 1}); row < reached; ++row)
                 for (Index x = std::max<Index>(0, tile.begin - radius); x < last; x += BLOCK) fill_run({row, x, std::min(last, x + BLOCK)});
             done = reached - 1;
@@ -244,47 +131,46 @@ class TileSweep {
         }
     }
 
-  private:
     // Whether the mask has a pixel of the tile in a run, or so near to it.
     bool wanted(Run run, Index reach) const {
-        const Index begin = std::max(tile_.begin, run.begin - reach), end = std::min(tile_.end, run.end + reach);
-        for (Index y = std::max(tile_.top, run.y - reach); y < std::min(tile_.bottom, run.y + reach + 1); ++y)
-            if (begin < end && std::memchr(mask_.at(y, begin), true, end - begin)) return true;
+        const Index begin = std::max(tile.begin, run.begin - reach), end = std::min(tile.end, run.end + reach);
+        for (Index y = std::max(tile.top, run.y - reach); y < std::min(tile.bottom, run.y + reach + 1); ++y)
+            if (begin < end && std::memchr(mask.at(y, begin), true, end - begin)) return true;
         return false;
     }
 
     // Whether every view sees what is within so many pixels of a pixel, at every candidate.
     bool all_seen(Index y, Index x, Index reach) const {
-        const Index margin = margin_ + reach;
-        return margin <= y && y < H_ - margin && margin <= x && x < W_ - margin;
+        const Index margin = border + reach;
+        return margin <= y && y < H - margin && margin <= x && x < W - margin;
     }
 
     // Costs of a run where they are needed, and near the border the number of views that see it.
     void fill_run(Run run) {
-        const Index radius = window_.radius;
+        const Index radius = window.radius;
         while (run.begin < run.end && !wanted({run.y, run.begin, std::min(run.end, run.begin + LANES)}, radius)) run.begin += LANES;
         while (run.begin < run.end && !wanted({run.y, run.end - 1, run.end}, radius)) --run.end;
         if (run.begin >= run.end) return;
         const bool count = !all_seen(run.y, run.begin, radius) || !all_seen(run.y, run.end - 1, radius);
-        float *costs = block_costs_.array().data, *counts = count ? block_counts_.array().data : nullptr;
-        for (Index g = 0; g < Index(compared_.groups.size()); ++g) {
+        float *costs = block_costs.array().data, *counts = count ? block_counts.array().data : nullptr;
+        for (Index g = 0; g < Index(compared.groups.size()); ++g) {
             for (float *each : {costs, counts})
-                if (each) std::fill_n(each, padded_ * BLOCK_ROW, 0.0f);
-            for (const ComparedView &view : compared_.groups[g]) add_view(views_, view, run, costs, counts);
-            turn(costs, run, g, ring_.array());
-            if (count) turn(counts, run, g, counts_.array());
+                if (each) std::fill_n(each, padded * BLOCK_ROW, 0.0f);
+            for (const ComparedView &view : compared.groups[g]) add_view(view, run, costs, counts);
+            turn(costs, run, g, cost_ring.array());
+            if (count) turn(counts, run, g, count_ring.array());
         }
     }
 
     // Costs of a run in one group, (K', BLOCK_ROW), and some zeros after them, to their place in a ring.
     void turn(const float *costs, Run run, Index g, Array<float, 4> ring) const {
-        for (Index k = 0; k < padded_; k += LANES) {
-            const Index place = g * padded_ + k;
+        for (Index k = 0; k < padded; k += LANES) {
+            const Index place = g * padded + k;
             for (Index x = run.begin; x < run.end; x += LANES) {
                 Float8 rows[LANES];
                 for (Index i = 0; i < LANES; ++i) rows[i] = load(costs + (k + i) * BLOCK_ROW + x - run.begin);
                 transpose(rows);
-                float *target = ring.at(run.y % size_, place / AT_ONCE, x - tile_.begin + window_.radius, place % AT_ONCE);
+                float *target = ring.at(run.y % size, place / AT_ONCE, x - tile.begin + window.radius, place % AT_ONCE);
                 for (Index i = 0; i < LANES; ++i) store(target + i * AT_ONCE, rows[i]);
             }
         }
@@ -292,14 +178,13 @@ class TileSweep {
 
     // Sums over the windows of pixels at columns of a run, whose weights are known, into sums (n, G K'), of rows in a ring.
     void aggregate(Array<const float, 4> ring, Run run, const std::vector<Index> &columns, Array<float, 2> sums) const {
-        const Index radius = window_.radius, top = std::max<Index>(0, run.y - radius), bottom = std::min(H_, run.y + radius + 1);
-        const Array<const float, 3> weights = weights_.array();
-        for (Index part = 0; part < parts_; ++part)
+        const Index radius = window.radius, top = std::max<Index>(0, run.y - radius), bottom = std::min(H, run.y + radius + 1);
+        for (Index part = 0; part < parts; ++part)
             for (const Index x : columns) {
                 Float8 total[AT_ONCE / LANES]{};
                 for (Index row = top; row < bottom; ++row) {
-                    const float *costs = ring.at(row % size_, part, run.begin + x - tile_.begin), *weight = weights.at(row - run.y + radius, 0, x);
-                    for (Index j = 0; j < size_; ++j, costs += AT_ONCE, weight += BLOCK)
+                    const float *costs = ring.at(row % size, part, run.begin + x - tile.begin), *weight = weights.array().at((row - run.y + radius) * size, x);
+                    for (Index j = 0; j < size; ++j, costs += AT_ONCE, weight += BLOCK)
                         for (Index i = 0; i < AT_ONCE / LANES; ++i) total[i] = fma(spread(*weight), load(costs + i * LANES), total[i]);
                 }
                 for (Index i = 0; i < AT_ONCE / LANES; ++i) store(sums.at(x, part * AT_ONCE + i * LANES), total[i]);
@@ -308,76 +193,125 @@ class TileSweep {
 
     // Best candidates of the pixels of a run that are in the mask.
     void sweep_run(Run run) {
-        std::vector<Index> columns, counted;
+        std::vector<Index> asked, counted;
         for (Index x = run.begin; x < run.end; ++x) {
-            if (!mask_(run.y, x)) continue;
-            columns.push_back(x - run.begin);
+            if (!mask(run.y, x)) continue;
+            asked.push_back(x - run.begin);
             // away from the border every view sees every pixel of the window: nothing to count
             if (!all_seen(run.y, x, 0)) counted.push_back(x - run.begin);
         }
-        if (columns.empty()) return;
-        window_weights(window_, run, weights_.array());
-        aggregate(ring_.array(), run, columns, sums_.array());
-        aggregate(counts_.array(), run, counted, numbers_.array());
-        for (const Index column : columns) {
+        if (asked.empty()) return;
+        const float falloff = -0.5f / window.variance;
+        window_weights(window.guide, run.y, run.begin, run.end, window.radius, weights.array(), [=](float apart2) { return falloff * apart2; });
+        aggregate(cost_ring.array(), run, asked, sums.array());
+        aggregate(count_ring.array(), run, counted, numbers.array());
+        for (const Index column : asked) {
             const Index y = run.y, x = run.begin + column;
-            const float *counts = all_seen(y, x, 0) ? nullptr : numbers_.array().at(column);
-            for (Index n = 0; n < Index(compared_.subsets.size()); ++n) {
-                const TakenByNoise noise{expected_.moments.at(0, n), expected_.moments.at(1, n), expected_.weights(0, y, x), expected_.weights(1, y, x)};
-                const Best best = best_candidate(compared_.subsets[n], sums_.array().at(column), counts, noise, candidates_.disparities, pixel_costs_.array());
-                maps_.disparity(n, y, x) = best.disparity;
-                maps_.cost(n, y, x) = best.cost;
-                maps_.mean(n, y, x) = best.mean;
+            const float *counts = all_seen(y, x, 0) ? nullptr : numbers.array().at(column);
+            for (Index n = 0; n < maps.shape[1]; ++n) {
+                const auto best = best_candidate(n, y, x, sums.array().at(column), counts);
+                for (Index i = 0; i < 3; ++i) maps(i, n, y, x) = best[i];
             }
         }
     }
 
-    const ViewStack<Colour> &views_;
-    const ComparedViews &compared_;
-    const Candidates &candidates_;
-    const Window &window_;
-    const ExpectedCosts &expected_;
-    const Array<const bool, 2> mask_;
-    const BestMaps &maps_;
-    Tile tile_;
+    // Add the residuals of one view to costs (K', BLOCK_ROW), and where it sees the pixels 1 to counts, unless that is null.
+    void add_view(const ComparedView &view, Run run, float *costs, float *counts) const {
+        const auto colours = all_colours[view.t][view.s], reference = all_colours[views.t0][views.s0];
+        const auto shown = views.shown[view.t][view.s];
+        const Float8 scale2 = spread(views.scale2);
+        for (const auto &[begin, end, down, left, motion] : view.segments) {
+            const auto [top, below] = upper_row(run.y, down, motion.fy, H);
+            if (top < 0 || top > H - 2) continue;
+            const auto [first, last] = seen_run(shown, W, run, top, left, motion.fx);
+            const Motion at{below, motion.fx, motion.sy, motion.sx};
+            const auto squares_of = [&](Index x) {
+                SquaredDifferences squares;
+                for (Index c = 0; c < 3; ++c) squares.add(colours.at(c, top, x + left), colours.at(c, top + 1, x + left), reference.at(c, run.y, x), at);
+                // differences of 0 add nothing to what others have added
+                if (last - x < LANES) squares.keep_first(last - x);
+                return squares;
+            };
+            const auto add = [&](const SquaredDifferences &squares, Float8 distance, float *cost) {
+                const Float8 z = squares.at(distance);
+                store(cost, load(cost) + z / (z + scale2));
+            };
+            for (Index x = first; x < last; x += 2 * LANES) {
+                float *cost = costs + begin * BLOCK_ROW + x - run.begin;
+                const auto squares = squares_of(x);
+                if (last - x <= LANES) {
+                    for (Index n = begin; n < end; ++n, cost += BLOCK_ROW) add(squares, spread(view.distances[n]), cost);
+                    break;
+                }
+                // the next eight as well: what one waits for is time for the other
+                const auto next = squares_of(x + LANES);
+                for (Index n = begin; n < end; ++n, cost += BLOCK_ROW) {
+                    const Float8 distance = spread(view.distances[n]);
+                    add(squares, distance, cost);
+                    add(next, distance, cost + LANES);
+                }
+            }
+            if (!counts) continue;
+            for (Index n = begin; n < end; ++n)
+                for (Index x = first; x < last; ++x) counts[n * BLOCK_ROW + x - run.begin] += 1;
+        }
+    }
 
-    const Index H_ = mask_.shape[0], W_ = mask_.shape[1];
-    // where a view may show less than the picture, all pixels are as those near its border
-    const Index margin_ = views_.shown.shape[2] > 0 ? H_ + W_ : Index(std::ceil(candidates_.reach)) + window_.radius + 1;
-    const Index padded_ = (candidates_.number() + LANES - 1) / LANES * LANES, size_ = 2 * window_.radius + 1;
-    // with the columns of the windows at both ends
-    const Index columns_, parts_ = (Index(compared_.groups.size()) * padded_ + AT_ONCE - 1) / AT_ONCE;
-    // rows of a window: row r at r % size, column x - radius of the tile at x; what is outside the picture is a number
-    const Scratch<float, 4> ring_ = zeros<float, 4>(size_, parts_, columns_, AT_ONCE), counts_ = zeros<float, 4>(size_, parts_, columns_, AT_ONCE);
-    const Scratch<float, 2> block_costs_{padded_, BLOCK_ROW}, block_counts_{padded_, BLOCK_ROW};
-    const Scratch<float, 3> weights_{size_, size_, BLOCK};
-    const Scratch<float, 2> sums_{BLOCK, parts_ * AT_ONCE}, numbers_{BLOCK, parts_ * AT_ONCE};
-    const Scratch<float, 1> pixel_costs_{padded_};
+    // Disparity at the lowest of the costs of a pixel by subset n, refined below the disparity sampling; that cost; the mean
+    // of all. sums, and counts unless all views see the pixel, are of its window (G, K').
+    std::array<float, 3> best_candidate(Index n, Index y, Index x, const float *sums, const float *counts) const {
+        const auto disparities = candidates.disparities;
+        const Index K = disparities.shape[0];
+        const Subset &subset = compared.subsets[n];
+        const Array<float, 1> costs = pixel_costs.array();
+        // what noise takes of the costs: moments of the subset, times weights of the pixel
+        const float *first = expected.moments.at(0, n), *second = expected.moments.at(1, n);
+        const Float8 first_weight = spread(expected.weights(0, y, x)), second_weight = spread(expected.weights(1, y, x));
+        constexpr float MOST = 1e9f;
+        Float8 all_least = spread(MOST), sum{}, number = spread(subset.views);
+        for (Index k = 0; k < K; k += LANES) {
+            const auto of_groups = [&](const float *values) {
+                Float8 total{};
+                for (const Index g : subset.groups) total = total + load(values + g * padded + k);
+                return total;
+            };
+            if (counts) number = of_groups(counts);
+            // (mean - taken) / (1 - taken); a candidate that no view of the subset sees is no match
+            const Float8 lost = number * fma(second_weight, load(second + k), first_weight * load(first + k));
+            const Float8 cost = number <= Float8{} ? spread(1) : (of_groups(sums) - lost) / (number - lost);
+            store(costs.at(k), cost);
+            all_least = smaller(all_least, first_lanes(cost, K - k, MOST));
+            sum = sum + first_lanes(cost, K - k, 0);
+        }
+        const float lowest = least_of(all_least);
+        Index best = 0;
+        while (best < K - LANES && !any(load(costs.at(best)) == spread(lowest))) best += LANES;
+        while (best < K - 1 && costs(best) != lowest) ++best;
+        // a perfect match needs no parabola, and the ends of the range allow none
+        const double offset = lowest != 0 && 0 < best && best < K - 1 ? vertex(costs.at(best), 0) : 0;
+        const float sampling = (disparities(K - 1) - disparities(0)) / float(K - 1);
+        return {float(disparities(best) + offset * sampling), lowest, sum_of(sum) / float(K)};
+    }
 };
 
 // Sweep the rows begin..end of the mask (H, W) in tiles of at most height rows, width columns.
-template <class Colour>
-void sweep_plane_rows(const ViewStack<Colour> &views, const Candidates &candidates, const Window &window, const ExpectedCosts &expected,
-                      Array<const bool, 2> mask, Index begin, Index end, Index height, Index width, const BestMaps &maps) {
+void sweep_plane_rows(const ViewStack &views, const Candidates &candidates, const Window &window, const ExpectedCosts &expected, Array<const bool, 2> mask,
+                      Index begin, Index end, Index height, Index width, Array<float, 4> maps) {
     const Index W = mask.shape[1];
     const ComparedViews compared(views, candidates);
-    parallel_for(0, (end - begin + height - 1) / height, [&](Index task) {
-        const Index top = begin + task * height;
-        TileSweep<Colour> sweep(views, compared, candidates, window, expected, mask, std::min(W, width), maps);
-        for (Index left = 0; left < W; left += width) sweep.run({top, std::min(end, top + height), left, std::min(W, left + width)});
-    });
-}
-
-template <class Colour>
-void bind_of_colours(nb::module_ &m) {
-    m.def("sweep_plane_rows", &sweep_plane_rows<Colour>, Unlocked(), "views"_a, "candidates"_a, "window"_a, "expected"_a, "mask"_a, "begin"_a, "end"_a,
-          "height"_a, "width"_a, "maps"_a);
+    const auto sweep_rows = [&]<class Colour>(const Array<const Colour, 5> &colours) {
+        parallel_for(0, (end - begin + height - 1) / height, [&](Index task) {
+            const Index top = begin + task * height;
+            TileSweep<Colour> sweep{colours, views, compared, candidates, window, expected, mask, std::min(W, width), maps};
+            for (Index left = 0; left < W; left += width) sweep.run({top, std::min(end, top + height), left, std::min(W, left + width)});
+        });
+    };
+    std::visit(sweep_rows, views.colours);
 }
 
 const Submodule submodule("plane_sweep", [](nb::module_ &m) {
-    bind_of_colours<std::uint8_t>(m);
-    bind_of_colours<std::uint16_t>(m);
-    bind_of_colours<float>(m);
+    m.def("sweep_plane_rows", &sweep_plane_rows, Unlocked(), "views"_a, "candidates"_a, "window"_a, "expected"_a, "mask"_a, "begin"_a, "end"_a, "height"_a,
+          "width"_a, "maps"_a);
     m.attr("BLOCK") = BLOCK;
 });
 

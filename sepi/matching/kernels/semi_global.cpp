@@ -1,7 +1,6 @@
 // Semi-global smoothing of a cost volume, after averaging over pixels of one's own colour. Smoothed are volumes of the
 // shape (H, W, K'): candidates lie side by side, as many as fill vectors, and those too many are out of reach.
 #include "kernels/arguments.hpp"
-#include "kernels/exponential.hpp"
 #include "pixels.hpp"
 
 namespace sepi {
@@ -11,46 +10,6 @@ namespace {
 constexpr Index PATHS_AT_ONCE = 32;
 
 constexpr float UNREACHABLE = 1e9f;
-
-// Weights of the windows of row y, of sum 1, into weights ((2 radius + 1)^2, W or more); zero outside the picture.
-// guide (3, H, W); total (W) is scratch.
-void window_weights(Array<const float, 3> guide, Index y, Index radius, float variance, Array<float, 2> weights, float *__restrict total) {
-    const Index H = guide.shape[1], W = guide.shape[2], size = 2 * radius + 1;
-    const double width = 2 * double(variance);
-    std::fill_n(weights.data, size * size * weights.strides[0], 0.0f);
-    std::fill_n(total, W, 0.0f);
-    for (Index i = std::max<Index>(0, radius - y); i < std::min(size, H - y + radius); ++i) {
-        const Index row = y + i - radius;
-        for (Index j = 0; j < size; ++j) {
-            const Index dx = j - radius, first = std::max<Index>(0, -dx), last = std::max<Index>(0, std::min(W, W - dx));
-            const float *here[3], *there[3];
-            for (Index c = 0; c < 3; ++c) here[c] = guide.at(c, y), there[c] = guide.at(c, row, dx);
-            float *__restrict out = weights.at(i * size + j);
-            for (Index x = first; x < last; ++x) {
-                const float r = here[0][x] - there[0][x], g = here[1][x] - there[1][x], b = here[2][x] - there[2][x];
-                out[x] = exp_of_negative(-double(r * r + g * g + b * b) / width);
-                total[x] += out[x];
-            }
-        }
-    }
-    for (Index n = 0; n < size * size; ++n) {
-        float *__restrict weight = weights.at(n);
-        for (Index x = 0; x < W; ++x) weight[x] /= total[x];
-    }
-}
-
-// Rows of eight candidates (LANES, W) become those of a pixel each, into out (W, K'), of which the first are meant.
-void transpose_candidates(Array<const float, 2> rows, Index W, Array<float, 2> out) {
-    Index x = 0;
-    for (; x <= W - LANES; x += LANES) {
-        Float8 block[LANES];
-        for (Index k = 0; k < LANES; ++k) block[k] = load(rows.at(k, x));
-        transpose(block);
-        for (Index i = 0; i < LANES; ++i) store(out.at(x + i), block[i]);
-    }
-    for (; x < W; ++x)
-        for (Index k = 0; k < LANES; ++k) out(x, k) = rows(k, x);
-}
 
 // What costs are smoothed with, into out (H, W, K').
 struct Smoothing {
@@ -138,8 +97,7 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
     const Index K = cost.shape[0], H = cost.shape[1], W = cost.shape[2], size = 2 * radius + 1;
     parallel_for(0, H, [&](Index y) {
         const Scratch<float, 2> weights(size * size, W + LANES);
-        const Scratch<float, 1> of_weights(W);
-        window_weights(guide, y, radius, variance, weights.array(), of_weights.array().data);
+        window_weights(guide, y, 0, W, radius, weights.array(), [width = 2 * double(variance)](float apart2) { return -double(apart2) / width; });
         // what lies beyond the picture weighs nothing: it may be other rows, but for those with no memory beside them
         const auto at_ends = zeros<float, 2>(size, W + 2 * radius + LANES);
         const Scratch<const float *, 1> places(size * size);
@@ -160,9 +118,13 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
                 float *sums = total.array().at(k - begin);
                 radius == 2 ? sum_products(W, std::integral_constant<Index, 25>(), sums, add) : sum_products(W, size * size, sums, add);
             }
-            Array<float, 2> pixels = out[y];
-            pixels.data += begin;
-            transpose_candidates(total.array(), W, pixels);
+            // rows of eight candidates become those of a pixel each
+            for (Index x = 0; x < W; x += LANES) {
+                Float8 block[LANES];
+                for (Index k = 0; k < LANES; ++k) block[k] = load(total.array().at(k, x));
+                transpose(block);
+                for (Index i = 0; i < std::min<Index>(LANES, W - x); ++i) store(out.at(y, x + i, begin), block[i]);
+            }
         }
     });
 }
@@ -206,12 +168,7 @@ void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Arra
         for (Index x = 0; x < W; ++x) {
             const float *costs = smoothed.at(y, x);
             const Index best = first_least(costs, padded);
-            double offset = 0;
-            if (0 < best && best < K - 1) {
-                const float a = costs[best - 1], b = costs[best], c = costs[best + 1];
-                const double curvature = a - 2 * double(b) + c;
-                if (curvature > 1e-9) offset = 0.5f * (a - c) / curvature;
-            }
+            const double offset = 0 < best && best < K - 1 ? vertex(costs + best, 1e-9) : 0;
             const float found = float(disparities(best) + offset * spacing);
             disparity(y, x) = found;
             margin(y, x) = margin_of(averaged.at(y, x), padded, of_candidates.array().data, found, best, same);

@@ -2,15 +2,15 @@
 #pragma once
 
 #include <tuple>
+#include <variant>
 
 #include "kernels/array.hpp"
 
 namespace sepi {
 
 // The views that are compared.
-template <class Colour>
 struct ViewStack {
-    Array<const Colour, 5> colours;  // (T, S, 3, H, W + LANES)
+    std::variant<Array<const std::uint8_t, 5>, Array<const std::uint16_t, 5>, Array<const float, 5>> colours;  // (T, S, 3, H, W + LANES)
     Index t0, s0;
     Array<const std::int64_t, 2> groups;  // (T, S); -1 leaves a view out
     Array<const bool, 2> subsets;         // (N, G)
@@ -52,13 +52,6 @@ struct ExpectedCosts {
     Array<const float, 2> anywhere;  // (H, W)
 
     auto fields() { return std::tie(moments, weights, anywhere); }
-};
-
-// What is found of each subset of views; (N, H, W).
-struct BestMaps {
-    Array<float, 3> disparity, cost, mean;
-
-    auto fields() { return std::tie(disparity, cost, mean); }
 };
 
 }  // namespace sepi
