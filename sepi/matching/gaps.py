@@ -65,7 +65,7 @@ def with_open_gaps(
     -------
     ndarray, shape (H, W), float32
     """
-    guide, reach = guide_of(light_field), parameters.gap_reach
+    guide, reach = np.ascontiguousarray(guide_of(light_field)), parameters.gap_reach
     lowest = np.asarray(cv2.erode(disparity, np.ones((2 * reach + 1, 1), np.uint8)), np.float32)
     lowest = np.asarray(cv2.erode(lowest, np.ones((1, 2 * reach + 1), np.uint8)), np.float32)
     farther = np.empty_like(disparity)

@@ -194,14 +194,14 @@ def sweep(
     expected = expected_costs(light_field, to_correct, candidates, groups, subsets, squared_scale, LANES)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     window = Window(guide, parameters.window_radius, np.float32(parameters.window_sigma**2 + noise))
-    maps = np.full((3, len(subsets), H, W), np.nan, np.float32)
+    best, cost, mean = maps = np.full((3, len(subsets), H, W), np.nan, np.float32)
     height = _rows_at_a_stretch(H, threads_used())
     strip = height * threads_used()
     for begin in range(0, H, strip):
         end = min(H, begin + strip)
         kernels.sweep_plane_rows(views, candidates, window, expected, mask, begin, end, height, TILE_WIDTH, maps)
         progress(end / H)
-    return SweepResult(*maps, expected.anywhere)
+    return SweepResult(best, cost, mean, expected.anywhere)
 
 
 def _rows_at_a_stretch(height: int, threads: int) -> int:

@@ -60,15 +60,16 @@ def conjugate_gradients(
     if not enough:
         return np.zeros_like(right)
     direction, bent = np.zeros_like(right), np.zeros_like(right)
-    kernels.turn_and_bend(stencil, start, 0.0, direction, bent)
+    kernels.bend(stencil, start, bent)
     solution, residual, before = start.copy(), right - bent, 1.0
     left = float(np.linalg.norm(residual)) ** 2
-    direction[:] = 0
     for _ in range(max_iterations):
         if left < enough**2:
             break
         ahead, along = inverse(residual)
-        curved = kernels.turn_and_bend(stencil, ahead, along / before, direction, bent)
+        direction *= along / before
+        direction += ahead
+        curved = kernels.bend(stencil, direction, bent)
         left = kernels.step(along / curved, direction, bent, solution, residual)
         before = along
     return solution

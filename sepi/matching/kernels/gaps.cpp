@@ -30,42 +30,27 @@ Index steps_within(Index i, Index direction, Index n, Index most) { return std::
 // Disparity (H, W) of the closest farther pixel of a like colour, straight or at 45 degrees from each, its own if none;
 // of two that are as close the farther. lowest (H, W) is the least within reach pixels across and down; farther is more
 // than least_step away, and colours (H, W, 3) are alike below a squared distance2.
-void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest, Strided<const float, 3> colours, Index reach, float least_step,
+void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest, Array<const float, 3> colours, Index reach, float least_step,
                    float distance2, Array<float, 2> farther) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
-    const auto alike = [distance2, step = colours.strides[2]](const float *a, const float *b) {
-        float apart = 0;
-        for (Index c = 0; c < 3; ++c) {
-            const float e = b[c * step] - a[c * step];
-            apart += e * e;
-        }
-        return apart < distance2;
-    };
-    const auto farther_of = [&](Index y, Index x) {
-        float found = disparity(y, x);
-        const float limit = found - least_step;
-        if (lowest(y, x) >= limit) return found;
-        const float *here = colours.at(y, x);
+    parallel_for_pixels(H, W, [&](Index y, Index x) {
+        const float own = disparity(y, x), limit = own - least_step, *here = colours.at(y, x);
+        farther(y, x) = own;
+        if (lowest(y, x) >= limit) return;
         Index closest = reach;
         for (Index dy = -1; dy <= 1; ++dy) {
             for (Index dx = -1; dx <= 1; ++dx) {
                 if (dy == 0 && dx == 0) continue;
                 const Index end = steps_within(y, dy, H, steps_within(x, dx, W, closest));
-                const Index next = dy * disparity.strides[0] + dx, onward = dy * colours.strides[0] + dx * colours.strides[1];
-                const float *there = disparity.at(y, x);
                 for (Index step = 1; step <= end; ++step) {
-                    there += next;
-                    if (*there >= limit || !alike(here, here + step * onward)) continue;
-                    found = step == closest ? std::min(*there, found) : *there;
+                    const float there = disparity(y + step * dy, x + step * dx);
+                    if (there >= limit || squared_distance(here, colours.at(y + step * dy, x + step * dx)) >= distance2) continue;
+                    farther(y, x) = step == closest ? std::min(there, farther(y, x)) : there;
                     closest = step;
                     break;
                 }
             }
         }
-        return found;
-    };
-    parallel_for(0, H, [&](Index y) {
-        for (Index x = 0; x < W; ++x) farther(y, x) = farther_of(y, x);
     });
 }
 

@@ -54,12 +54,6 @@ struct Pixels {
     std::int32_t weights[6][LANES];                     // of these, in pairs: of the four rows each twice, of the columns the first two and the others
 };
 
-// What a view shows of eight pixels: 1 where it sees them, and the four channels there; where it does not, anything.
-struct Samples {
-    Float8 seen;
-    Four channels;
-};
-
 // Whole weights, of sum ONE, of the four coefficients round a position, by how far it is beyond the second.
 std::array<Int8, 4> coefficient_weights(Float8 f) {
     constexpr float ALL = ONE, THIRDS = float(2.0 / 3);
@@ -79,67 +73,61 @@ Four transposed_halves(const Four &rows) {
     return {low(a, b), high(a, b), low(c, d), high(c, d)};
 }
 
+// What is known of one of the views, number n of them; pictures (H, W).
 struct View {
-    float down, across;  // baseline
-
-    View(const SplineViews &views, const Seeing &seeing, Index n, Index H, Index W)
-        : down(views.baselines(n, 0)), across(views.baselines(n, 1)), low_(std::int32_t(views.low)), bottom_(float(H - 1)), right_(float(W - 1)),
-          margin_(seeing.occlusion_margin), unit_(views.unit / float(ONE)), pitch_(std::int32_t(views.splines.strides[2])),
-          width_(std::int32_t(seeing.nearest.strides[2])), nearest_(seeing.nearest.at(views.places(n, 0), views.places(n, 1))),
-          // one before the picture
-          coefficients_(views.splines.at(views.places(n, 0), views.places(n, 1), SPLINE_MARGIN - 1, SPLINE_MARGIN - 1)) {}
+    const SplineViews &views;
+    const Seeing &seeing;
+    const Index n, H, W;
+    const Index t = views.places(n, 0), s = views.places(n, 1);
+    const float down = views.baselines(n, 0), across = views.baselines(n, 1), bottom = float(H - 1), right = float(W - 1), unit = views.unit / float(ONE);
+    const std::int32_t low = std::int32_t(views.low), pitch = std::int32_t(views.splines.strides[2]), width = std::int32_t(seeing.nearest.strides[2]);
+    const float *const nearest = seeing.nearest.at(t, s);
+    // from the one before the picture on
+    const std::int16_t *const coefficients = views.splines.at(t, s, SPLINE_MARGIN - 1, SPLINE_MARGIN - 1);
 
     // Find pixels of a row.
     void find(Index row, Pixels &pixels) const {
         Float8 y = float(row) - pixels.disparity * down, x = pixels.x - pixels.disparity * across;
-        pixels.inside = (y >= 0.0f) & (y <= bottom_) & (x >= 0.0f) & (x <= right_);
+        pixels.inside = (y >= 0.0f) & (y <= bottom) & (x >= 0.0f) & (x <= right);
         // of what is outside, a corner is looked at
-        y = pixels.inside ? y : spread(float(low_));
+        y = pixels.inside ? y : spread(float(low));
         x = pixels.inside ? x : Float8{};
         const Int8 top = truncated(y), left = truncated(x);
-        store(pixels.nearest, (truncated(y + 0.5f) - low_) * width_ + truncated(x + 0.5f));
-        store(pixels.coefficients, (top - low_) * pitch_ + left * 4);
+        store(pixels.nearest, (truncated(y + 0.5f) - low) * width + truncated(x + 0.5f));
+        store(pixels.coefficients, (top - low) * pitch + left * 4);
         const auto rows = coefficient_weights(y - __builtin_convertvector(top, Float8)), columns = coefficient_weights(x - __builtin_convertvector(left, Float8));
         for (Index n = 0; n < 4; ++n) store(pixels.weights[n], rows[n] | rows[n] << 16);
         for (Index n = 0; n < 2; ++n) store(pixels.weights[4 + n], columns[2 * n] | columns[2 * n + 1] << 16);
         // what sampling asks for comes while others are found
-        __builtin_prefetch(nearest_ + pixels.nearest[0]);
-        for (Index n = 0; n < 4; ++n) __builtin_prefetch(coefficients_ + pixels.coefficients[0] + n * pitch_);
+        __builtin_prefetch(nearest + pixels.nearest[0]);
+        for (Index n = 0; n < 4; ++n) __builtin_prefetch(coefficients + pixels.coefficients[0] + n * pitch);
     }
 
-    // Sample pixels that are found; false if the view sees none of them.
-    bool sample(const Pixels &pixels, Samples &samples) const {
+    // Sample the four channels of pixels that are found. 1 where the view sees them; where it does not, they are anything.
+    Float8 sample(const Pixels &pixels, Four &channels) const {
         float found[LANES];
-        for (int i = 0; i < LANES; ++i) found[i] = nearest_[pixels.nearest[i]];
-        const Int8 seen = pixels.inside & (load(found) <= pixels.disparity + margin_);
-        if (!any(seen)) return false;
-        samples.seen = seen ? spread(1) : Float8{};
+        for (int i = 0; i < LANES; ++i) found[i] = nearest[pixels.nearest[i]];
+        const Int8 seen = pixels.inside & (load(found) <= pixels.disparity + seeing.occlusion_margin);
+        if (!any(seen)) return Float8{};
         Four halves;
         for (int i = 0; i < 4; ++i) {
             const Int8 a = products(pixels, i), b = products(pixels, i + 4);
             const Int8 first = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11), others = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
-            halves[i] = __builtin_convertvector(first + others, Float8) * unit_;
+            halves[i] = __builtin_convertvector(first + others, Float8) * unit;
         }
-        samples.channels = transposed_halves(halves);
-        return true;
+        channels = transposed_halves(halves);
+        return seen ? spread(1) : Float8{};
     }
 
-  private:
     // Sums of the first two columns of coefficients, of four channels, and of the others, weighted for pixel i.
     Int8 products(const Pixels &pixels, int i) const {
         const auto line = [&](Index n) { return Int8{} + pixels.weights[n][i]; };
-        const auto row = [&](Index n) { return rounded_products(load(coefficients_ + pixels.coefficients[i] + n * pitch_), Short16(line(n))); };
+        const auto row = [&](Index n) { return rounded_products(load(coefficients + pixels.coefficients[i] + n * pitch), Short16(line(n))); };
         const Short16 sums = row(0) + row(1) + row(2) + row(3);
         // neighbours of one channel side by side
         const Short16 neighbours = __builtin_shufflevector(sums, sums, 0, 4, 1, 5, 2, 6, 3, 7, 8, 12, 9, 13, 10, 14, 11, 15);
         return dot_of_pairs(Int8(neighbours), __builtin_shufflevector(line(4), line(5), 0, 1, 2, 3, 12, 13, 14, 15));
     }
-
-    std::int32_t low_;
-    float bottom_, right_, margin_, unit_;
-    std::int32_t pitch_, width_;
-    const float *nearest_;
-    const std::int16_t *coefficients_;
 };
 
 // Derivative of z / (z + scale2) with respect to z, times scale2: 1 for 0.
@@ -179,10 +167,12 @@ void over_views(const SplineViews &views, const Seeing &seeing, Array<const floa
                 begin(sums, y, x, count);
             });
             for (Index n = 0; n < views.places.shape[0]; ++n) {
-                const View view(views, seeing, n, H, W);
+                const View view{views, seeing, n, H, W};
                 each([&](Sums &sums, Index, Index) { view.find(y, sums); });
                 each([&](Sums &sums, Index, Index) {
-                    if (Samples samples; view.sample(sums, samples)) add(sums, view, samples);
+                    Four channels;
+                    const Float8 seen = view.sample(sums, channels);
+                    if (any(seen > 0.0f)) add(sums, view, seen, channels);
                 });
             }
             each([&](const Sums &sums, Index x, Index count) { write(sums, y, x, count); });
@@ -203,12 +193,12 @@ void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const f
             sums.channels = sums.own = load_channels(views.reference, y, x, count);
             sums.colours = sums.detail = spread(1);
         },
-        [&](Mean &sums, const View &, const Samples &samples) {
+        [&](Mean &sums, const View &, Float8 seen, const Four &channels) {
             Four r;
-            for (Index c = 0; c < 4; ++c) r[c] = samples.channels[c] - sums.own[c];
-            const Float8 weight = samples.seen * robust_weight(dot(r, r), views.scales2(0));
-            const Float8 detail_weight = samples.seen * robust_weight(3.0f * (r[3] * r[3]), views.scales2(1));
-            for (Index c = 0; c < 4; ++c) sums.channels[c] += (c < 3 ? weight : detail_weight) * samples.channels[c];
+            for (Index c = 0; c < 4; ++c) r[c] = channels[c] - sums.own[c];
+            const Float8 weight = seen * robust_weight(dot(r, r), views.scales2(0));
+            const Float8 detail_weight = seen * robust_weight(3.0f * (r[3] * r[3]), views.scales2(1));
+            for (Index c = 0; c < 4; ++c) sums.channels[c] += (c < 3 ? weight : detail_weight) * channels[c];
             sums.colours += weight;
             sums.detail += detail_weight;
         },
@@ -236,20 +226,20 @@ static void add_equations(const SplineViews &views, const Seeing &seeing, Array<
             pixels.down = load_channels(image.down, y, x, count);
             pixels.across = load_channels(image.across, y, x, count);
         },
-        [&](Equations &pixels, const View &view, const Samples &samples) {
+        [&](Equations &pixels, const View &view, Float8 seen, const Four &channels) {
             Four r, g;
             for (Index c = 0; c < 4; ++c) {
-                r[c] = samples.channels[c] - pixels.own[c];
+                r[c] = channels[c] - pixels.own[c];
                 g[c] = pixels.down[c] * view.down + pixels.across[c] * view.across;
             }
-            const Float8 squared = dot(r, r), weight = samples.seen * robust_weight(squared, views.scales2(0));
-            const Float8 detail_weight = samples.seen * (3.0f * robust_weight(3.0f * r[3] * r[3], views.scales2(1)));
+            const Float8 squared = dot(r, r), weight = seen * robust_weight(squared, views.scales2(0));
+            const Float8 detail_weight = seen * (3.0f * robust_weight(3.0f * r[3] * r[3], views.scales2(1)));
             const Four terms{weight * dot(r, g), weight * dot(g, g), detail_weight * r[3] * g[3], detail_weight * g[3] * g[3]};
             for (Index k = 0; k < 4; ++k) pixels.sums[k] += terms[k];
             if constexpr (EVIDENCE) {
                 const auto of_view = both(terms);
                 const bool belongs[] = {view.across < 0, view.across > 0, view.down < 0, view.down > 0};
-                const Four rest{weight * squared, weight, detail_weight / 3.0f, samples.seen};
+                const Four rest{weight * squared, weight, detail_weight / 3.0f, seen};
                 for (Index k = 0; k < 4; ++k) {
                     for (Index i = 0; belongs[k] && i < 2; ++i) pixels.evidence[2 * k + i] += of_view[i];
                     pixels.evidence[8 + k] += rest[k];

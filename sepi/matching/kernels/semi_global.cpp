@@ -160,19 +160,17 @@ void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float 
 // the winner belong to its minimum; smoothed and averaged (H, W, K'), disparities (K).
 void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Array<const float, 1> disparities, float same, Array<float, 2> disparity,
             Array<float, 2> margin) {
-    const Index H = smoothed.shape[0], W = smoothed.shape[1], K = disparities.shape[0], padded = smoothed.shape[2];
+    const Index K = disparities.shape[0], padded = smoothed.shape[2];
     const auto of_candidates = zeros<float, 1>(padded);
     std::copy_n(disparities.data, K, of_candidates.array().data);
     const double spacing = double(disparities(K - 1) - disparities(0)) / double(K - 1);
-    parallel_for(0, H, [&](Index y) {
-        for (Index x = 0; x < W; ++x) {
-            const float *costs = smoothed.at(y, x);
-            const Index best = first_least(costs, padded);
-            const double offset = 0 < best && best < K - 1 ? vertex(costs + best, 1e-9) : 0;
-            const float found = float(disparities(best) + offset * spacing);
-            disparity(y, x) = found;
-            margin(y, x) = margin_of(averaged.at(y, x), padded, of_candidates.array().data, found, best, same);
-        }
+    parallel_for_pixels(disparity.shape[0], disparity.shape[1], [&](Index y, Index x) {
+        const float *costs = smoothed.at(y, x);
+        const Index best = first_least(costs, padded);
+        const double offset = 0 < best && best < K - 1 ? vertex(costs + best, 1e-9) : 0;
+        const float found = float(disparities(best) + offset * spacing);
+        disparity(y, x) = found;
+        margin(y, x) = margin_of(averaged.at(y, x), padded, of_candidates.array().data, found, best, same);
     });
 }
 

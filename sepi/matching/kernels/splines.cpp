@@ -25,45 +25,31 @@ constexpr auto FILTER = [] {
     return filter;
 }();
 
-// Some rows of one channel, stride apart, and REACH more above and below.
+// Coefficients of a row of W, of which lines begins REACH above, into out (W + 2 SPLINE_MARGIN), which has LANES numbers behind it.
 template <Index REACH>
-class Lines {
-  public:
-    Lines(Index channels, Index number, Index width)
-        : width_(width), rows_(channels, number + 2 * REACH, width + LANES), padded_(width + 2 * (SPLINE_MARGIN + REACH) + LANES) {}
-
-    const Array<float, 3> &rows() const { return rows_.array(); }
-
-    // Coefficients of row i of a channel, into out (W + 2 SPLINE_MARGIN), which has LANES numbers behind it.
-    void coefficients(Index channel, Index i, float *out) const {
-        float *inner = padded_.array().at(SPLINE_MARGIN + REACH);
-        convolve(rows().at(channel, i), width_ + LANES, width_, inner);
-        mirror_ends(inner, width_, SPLINE_MARGIN + REACH);
-        convolve(padded_.array().data, 1, width_ + 2 * SPLINE_MARGIN, out);
-    }
-
-  private:
-    static void convolve(const float *lines, Index stride, Index n, float *out) {
-        sum_products(n, std::integral_constant<Index, 2 * REACH + 1>(), out, [=](Float8 total, Index k, Index x) {
-            return total + FILTER[FULL_REACH - REACH + k] * load(lines + k * stride + x);
+void coefficients(const float *lines, Index W, float *out) {
+    const auto convolve = [](const float *from, Index stride, Index n, float *to) {
+        sum_products(n, std::integral_constant<Index, 2 * REACH + 1>(), to, [=](Float8 total, Index k, Index x) {
+            return total + FILTER[FULL_REACH - REACH + k] * load(from + k * stride + x);
         });
-    }
-
-    Index width_;
-    Scratch<float, 3> rows_;
-    Scratch<float, 1> padded_;
-};
+    };
+    const Scratch<float, 1> padded(W + 2 * (SPLINE_MARGIN + REACH) + LANES);
+    float *inner = padded.array().at(SPLINE_MARGIN + REACH);
+    convolve(lines, W + LANES, W, inner);
+    mirror_ends(inner, W, SPLINE_MARGIN + REACH);
+    convolve(padded.array().data, 1, W + 2 * SPLINE_MARGIN, out);
+}
 
 // Coefficients of an image (H, W, C), into out (C, H, W).
 void spline_coefficients(Strided<const float, 3> image, Array<float, 3> out) {
     const Index H = image.shape[0], W = image.shape[1], C = image.shape[2];
     over_stretches({1, 1}, H, ROWS_AT_ONCE, [&](Index, Index, Index first, Index number) {
-        const Lines<FULL_REACH> lines(C, number, W);
-        load_rows<float>(image, first - FULL_REACH, lines.rows());
+        const Scratch<float, 3> lines(C, number + 2 * FULL_REACH, W + LANES);
+        load_rows<float>(image, first - FULL_REACH, lines.array());
         const Scratch<float, 1> row(W + 2 * SPLINE_MARGIN + LANES);
         for (Index c = 0; c < C; ++c) {
             for (Index i = 0; i < number; ++i) {
-                lines.coefficients(c, i, row.array().data);
+                coefficients<FULL_REACH>(lines.array().at(c, i), W, row.array().data);
                 std::copy_n(row.array().at(SPLINE_MARGIN), W, out.at(c, first + i));
             }
         }
@@ -82,16 +68,16 @@ void view_splines(const Views &views, float colour_unit, Array<const std::int16_
     over_stretches(of_colours.shape, out.shape[2], ROWS_AT_ONCE, [&](Index t, Index s, Index first, Index number) {
         const Index begin = of_colours(t, s) ? 0 : 3, end = of_detail(t, s) ? 4 : 3, top = low - SPLINE_MARGIN + first - SPLINE_REACH;
         if (begin == end) return;
-        const Lines<SPLINE_REACH> lines(4, number, W);
-        if (begin == 0) load_rows(views, t, s, top, lines.rows(), [=](auto colour) { return colour * colour_unit; });
+        const Scratch<float, 3> lines(4, number + 2 * SPLINE_REACH, W + LANES);
+        if (begin == 0) load_rows(views, t, s, top, lines.array(), [=](auto colour) { return colour * colour_unit; });
         for (Index i = 0; end == 4 && i < number + 2 * SPLINE_REACH; ++i) {
             const std::int16_t *row = detail.at(t, s, mirrored(top + i, H) - detail_low);
-            std::transform(row, row + W, lines.rows().at(3, i), [=](std::int16_t value) { return float(value) * detail_unit; });
+            std::transform(row, row + W, lines.array().at(3, i), [=](std::int16_t value) { return float(value) * detail_unit; });
         }
         const Index stride = width + LANES;
         const auto row = zeros<float, 2>(4, stride);
         for (Index i = 0; i < number; ++i) {
-            for (Index c = begin; c < end; ++c) lines.coefficients(c, i, row.array().at(c));
+            for (Index c = begin; c < end; ++c) coefficients<SPLINE_REACH>(lines.array().at(c, i), W, row.array().at(c));
             const float *from = row.array().at(begin);
             std::int16_t *to = out.at(t, s, first + i, 0, begin);
             const auto whole = [](float value) { return std::int16_t(rounded(value)); };

@@ -16,16 +16,10 @@ constexpr Index MARGIN = 2;   // how far second differences reach, pixels
 constexpr Index SPACING = 2;  // pixels from node to node of the finest hats
 
 // The finest hats at the pixels beside a node and at the next ones.
-template <class Number>
-constexpr Number NEAR = Number(0.75);
-template <class Number>
-constexpr Number FAR = Number(0.25);
+constexpr float NEAR = 0.75f, FAR = 0.25f;
 
 // Entries of the stencil: rows and columns from a pixel to the other that they belong to.
-struct Entry {
-    Index number, dy, dx;
-};
-constexpr Entry ENTRIES[] = {{0, 0, 0}, {1, 0, 1}, {2, 0, 2}, {3, 1, 0}, {4, 2, 0}, {5, 1, 1}, {6, 1, -1}};
+constexpr Index ENTRIES[7][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 0}, {2, 0}, {1, 1}, {1, -1}};
 
 // Add values, times a factor, to a row.
 template <class Number>
@@ -57,51 +51,38 @@ double in_order(const Scratch<Number, 1> &rows) {
     return total;
 }
 
-// Row y, margin counted, of the matrix times a picture.
-template <class Number>
-void product_row(Array<const Number, 3> stencil, Array<const Number, 2> vector, Index y, Number *__restrict target) {
-    const Index n = vector.shape[1] - 2 * MARGIN;
-    const Number *own = stencil.at(0, y, MARGIN), *here = vector.at(y, MARGIN);
-    for (Index x = 0; x < n; ++x) target[x] = own[x] * here[x];
-    for (const auto [k, dy, dx] : ENTRIES) {
-        if (k == 0) continue;
-        // one entry and its mirror image; few arrays at a time, so that the loop vectorises
-        const Number *forth = stencil.at(k, y, MARGIN), *there = vector.at(y + dy, MARGIN + dx);
-        const Number *back = stencil.at(k, y - dy, MARGIN - dx), *before = vector.at(y - dy, MARGIN - dx);
-        for (Index x = 0; x < n; ++x) target[x] += forth[x] * there[x] + back[x] * before[x];
-    }
-}
-
 // Weights of second differences in one direction; corners (n, 2) and factors (n) say what pixels make a difference.
 void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const double, 2> colour,
                             Array<const std::int64_t, 2> corners, Array<const double, 1> factors, double threshold, double variance, Array<double, 2> out) {
-    parallel_for(0, out.shape[0], [&](Index y) {
-        for (Index x = 0; x < out.shape[1]; ++x) {
-            double difference = 0, trust = reliability(y, x);
-            for (Index i = 0; i < factors.shape[0]; ++i) {
-                const Index row = y + corners(i, 0), column = x + corners(i, 1);
-                difference += factors(i) * double(disparity(row, column));
-                trust = std::min(trust, double(reliability(row, column)));
-            }
-            difference /= threshold;
-            out(y, x) = std::exp(-std::min(difference * difference * trust + 2 * colour(y, x) / variance, 30.0));
+    parallel_for_pixels(out.shape[0], out.shape[1], [&](Index y, Index x) {
+        double difference = 0, trust = reliability(y, x);
+        for (Index i = 0; i < factors.shape[0]; ++i) {
+            const Index row = y + corners(i, 0), column = x + corners(i, 1);
+            difference += factors(i) * double(disparity(row, column));
+            trust = std::min(trust, double(reliability(row, column)));
         }
+        difference /= threshold;
+        out(y, x) = std::exp(-std::min(difference * difference * trust + 2 * colour(y, x) / variance, 30.0));
     });
 }
 
-// direction becomes ratio * direction + ahead, and out the matrix times that; returns the inner product of both.
+// out becomes the matrix times a direction; returns the inner product of both.
 template <class Number>
-double turn_and_bend(Array<const Number, 3> stencil, Array<const Number, 2> ahead, Number ratio, Array<Number, 2> direction, Array<Number, 2> out) {
+double bend(Array<const Number, 3> stencil, Array<const Number, 2> direction, Array<Number, 2> out) {
     const Index H = direction.shape[0] - 2 * MARGIN, W = direction.shape[1] - 2 * MARGIN;
-    for (Index y = MARGIN; y < MARGIN + H; ++y) {
-        Number *__restrict row = direction.at(y);
-        const Number *more = ahead.at(y);
-        for (Index x = 0; x < W + 2 * MARGIN; ++x) row[x] = ratio * row[x] + more[x];
-    }
     const Scratch<Number, 1> along(H);
     parallel_for(MARGIN, MARGIN + H, [&](Index y) {
-        product_row<Number>(stencil, direction, y, out.at(y, MARGIN));
-        along.array()(y - MARGIN) = dot(direction.at(y, MARGIN), out.at(y, MARGIN), W);
+        const Number *own = stencil.at(0, y, MARGIN), *here = direction.at(y, MARGIN);
+        Number *__restrict target = out.at(y, MARGIN);
+        for (Index x = 0; x < W; ++x) target[x] = own[x] * here[x];
+        for (Index k = 1; k < 7; ++k) {
+            // one entry and its mirror image; few arrays at a time, so that the loop vectorises
+            const auto [dy, dx] = ENTRIES[k];
+            const Number *forth = stencil.at(k, y, MARGIN), *there = direction.at(y + dy, MARGIN + dx);
+            const Number *back = stencil.at(k, y - dy, MARGIN - dx), *before = direction.at(y - dy, MARGIN - dx);
+            for (Index x = 0; x < W; ++x) target[x] += forth[x] * there[x] + back[x] * before[x];
+        }
+        along.array()(y - MARGIN) = dot(here, out.at(y, MARGIN), W);
     });
     return in_order(along);
 }
@@ -128,17 +109,16 @@ double step(Number length, Array<const Number, 2> direction, Array<const Number,
 template <class Number>
 void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = out.shape[1];
-    constexpr Number near = NEAR<Number>, far = FAR<Number>;
-    constexpr Number shares[] = {far, near, near, far};
+    constexpr Number SHARES[] = {FAR, NEAR, NEAR, FAR};
     // with zeros round the picture, as wide as the hats reach
     const Scratch<Number, 1> lines(2 * w + 2);
     Number *line = lines.array().data;
     for (Index i = 0; i < out.shape[0]; ++i) {
         std::fill_n(line, 2 * w + 2, Number(0));
         for (Index n = 0; n < 4; ++n)
-            if (const Index y = 2 * i + n - 2; 0 <= y && y < H) add(line + 2, shares[n], vector.at(y + MARGIN, MARGIN), W);
+            if (const Index y = 2 * i + n - 2; 0 <= y && y < H) add(line + 2, SHARES[n], vector.at(y + MARGIN, MARGIN), W);
         Number *__restrict target = out.at(i);
-        for (Index j = 0; j < w; ++j) target[j] = far * (line[2 * j] + line[2 * j + 3]) + near * (line[2 * j + 1] + line[2 * j + 2]);
+        for (Index j = 0; j < w; ++j) target[j] = FAR * (line[2 * j] + line[2 * j + 3]) + NEAR * (line[2 * j + 1] + line[2 * j + 2]);
     }
 }
 
@@ -146,17 +126,16 @@ void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
 template <class Number>
 double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2> vector, Array<const Number, 2> fine, Array<Number, 2> out) {
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = fine.shape[1];
-    constexpr Number near = NEAR<Number>, far = FAR<Number>;
     const Scratch<Number, 1> lines(w), all_hats(2 * w);
     Number *__restrict line = lines.array().data, *__restrict hats = all_hats.array().data;
     double total = 0;
     for (Index y = 0; y < H; ++y) {
-        const Number first = y % 2 ? far : near, second = y % 2 ? near : far;
+        const Number first = y % 2 ? FAR : NEAR, second = y % 2 ? NEAR : FAR;
         const Number *above = fine.at(y / 2), *below = fine.at(y / 2 + 1);
         for (Index j = 0; j < w; ++j) line[j] = first * above[j] + second * below[j];
         for (Index j = 0; j < w - 1; ++j) {
-            hats[2 * j] = near * line[j] + far * line[j + 1];
-            hats[2 * j + 1] = far * line[j] + near * line[j + 1];
+            hats[2 * j] = NEAR * line[j] + FAR * line[j + 1];
+            hats[2 * j + 1] = FAR * line[j] + NEAR * line[j + 1];
         }
         const Number *row = vector.at(y + MARGIN, MARGIN), *own = inverse.at(y + MARGIN, MARGIN);
         Number *__restrict target = out.at(y + MARGIN, MARGIN);
@@ -177,7 +156,8 @@ void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<doubl
         const Scratch<double, 1> lines(spacing * (w + 1));
         double *line = lines.array().data, *__restrict target = out.at(i);
         std::fill_n(target, w, 0.0);
-        for (const auto [k, dy, dx] : ENTRIES) {
+        for (Index k = 0; k < 7; ++k) {
+            const auto [dy, dx] = ENTRIES[k];
             std::fill_n(line, spacing * (w + 1), 0.0);
             for (Index p = 0; p < reach; ++p) {
                 const Index y = spacing * (i - 1) + p;
@@ -197,7 +177,7 @@ void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<doubl
 // The kernels of the second-order smoothing that work in single or double precision.
 template <class Number>
 void bind_of_numbers(nb::module_ &m) {
-    m.def("turn_and_bend", &turn_and_bend<Number>, Unlocked(), "stencil"_a, "ahead"_a, "ratio"_a, "direction"_a, "out"_a);
+    m.def("bend", &bend<Number>, Unlocked(), "stencil"_a, "direction"_a, "out"_a);
     m.def("step", &step<Number>, Unlocked(), "length"_a, "direction"_a, "bent"_a, "solution"_a, "residual"_a);
     m.def("onto_finest", &onto_finest<Number>, Unlocked(), "vector"_a, "out"_a);
     m.def("diagonal_and_finest", &diagonal_and_finest<Number>, Unlocked(), "inverse"_a, "vector"_a, "fine"_a, "out"_a);
