@@ -42,8 +42,8 @@ def support(
 ) -> _Doubles:
     """How many of N pixels agree with each of P planes, less a weight for each that lies behind it; (P,)."""
     residuals = residuals_of(positions, values, planes)
-    agreeing, behind = (abs(residuals) < tolerance).sum(axis=1), (residuals < -tolerance).sum(axis=1)
-    return np.asarray(agreeing - behind_penalty * behind)
+    agreeing, behind = abs(residuals) < tolerance, residuals < -tolerance
+    return np.asarray(np.count_nonzero(agreeing, axis=1) - behind_penalty * np.count_nonzero(behind, axis=1))
 
 
 def fitted(positions: _Doubles, values: _Doubles, plane: Plane, tolerance: float) -> Plane:

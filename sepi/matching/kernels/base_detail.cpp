@@ -23,96 +23,93 @@ struct Neighbours {
 };
 
 // Some rows of a view, and the rows above and below that their windows reach.
-class Stretch {
-  public:
-    Stretch(Array<const float, 2> nearness, float falloff, Index number, Index width)
-        : nearness_(nearness), falloff_(falloff), number_(number), width_(width) {}
+struct Stretch {
+    const Array<const float, 2> nearness;
+    const float falloff;
+    const Index number, width;
+
+    const Index radius = nearness.shape[0] - 1, step = width + 2 * (radius + LANES);
+    // the channels and their mean; weights look at twice the radius beyond the ends
+    const Scratch<float, 3> rows = zeros<float, 3>(4, number + 2 * radius, width + 4 * radius + LANES);
+    // weights of the pixel dx across, at dx + radius; what comes of them: weighted pixels, and weights
+    const Scratch<float, 2> all_pairs = zeros<float, 2>(2 * radius + 1, step);
+    const Scratch<float, 3> sums = zeros<float, 3>(2, number, width + LANES);
 
     // The channels, and their mean, mirrored at both ends.
     void load_channels(const Views &views, Index t, Index s, Index first, float unit) {
-        Array<float, 3> inner = rows_.array();
-        inner.data += 2 * radius_;
-        load_rows(views, t, s, first - radius_, inner, [=](auto colour) { return colour * unit; });
+        Array<float, 3> inner = rows.array();
+        inner.data += 2 * radius;
+        load_rows(views, t, s, first - radius, inner, [=](auto colour) { return colour * unit; });
         for (Index y = 0; y < inner.shape[1]; ++y) {
             float *channels[] = {inner.at(0, y), inner.at(1, y), inner.at(2, y)}, *mean = inner.at(3, y);
-            for (float *channel : channels) mirror_ends(channel, width_, 2 * radius_);
-            for (Index x = -2 * radius_; x < width_ + 2 * radius_; ++x) mean[x] = (channels[0][x] + channels[1][x] + channels[2][x]) * float(1 / 3.0);
+            for (float *channel : channels) mirror_ends(channel, width, 2 * radius);
+            for (Index x = -2 * radius; x < width + 2 * radius; ++x) mean[x] = (channels[0][x] + channels[1][x] + channels[2][x]) * float(1 / 3.0);
         }
     }
 
     void filter() {
         // the pixel itself
-        for (Index y = 0; y < number_; ++y) {
-            std::copy_n(row(y, 3), width_, sums_.array().at(0, y));
-            std::fill_n(sums_.array().at(1, y), width_, 1.0f);
+        for (Index y = 0; y < number; ++y) {
+            std::copy_n(row(y, 3), width, sums.array().at(0, y));
+            std::fill_n(sums.array().at(1, y), width, 1.0f);
         }
-        for (Index y = -radius_; y < number_; ++y) {
-            for (Index dy = std::max<Index>(0, -y); dy <= radius_; ++dy) {
-                Index half = radius_;
-                while (dy * dy + half * half > radius_ * radius_) --half;
+        for (Index y = -radius; y < number; ++y) {
+            for (Index dy = std::max<Index>(0, -y); dy <= radius; ++dy) {
+                Index half = radius;
+                while (dy * dy + half * half > radius * radius) --half;
                 weigh(y, dy, dy == 0 ? 1 : -half, half);
-                const Neighbours there{pairs(), step_, row(y + dy, 3), 1}, here{pairs(), step_ - 1, row(y, 3), -1};
+                const Neighbours there{pairs(), step, row(y + dy, 3), 1}, here{pairs(), step - 1, row(y, 3), -1};
                 if (dy == 0) {
                     add_weighted(y, 1, half, there, here);
                 } else {
                     if (y >= 0) add_weighted(y, -half, half, there);
-                    if (y + dy < number_) add_weighted(y + dy, -half, half, here);
+                    if (y + dy < number) add_weighted(y + dy, -half, half, here);
                 }
             }
         }
     }
 
     void store_detail(Index y, float unit, std::int16_t *out) const {
-        const float *own = row(y, 3), *total = sums_.array().at(0, y), *weight = sums_.array().at(1, y);
-        for (Index x = 0; x < width_; ++x) out[x] = std::int16_t(rounded((own[x] - total[x] / weight[x]) / unit));
+        const float *own = row(y, 3), *total = sums.array().at(0, y), *weight = sums.array().at(1, y);
+        for (Index x = 0; x < width; ++x) out[x] = std::int16_t(rounded((own[x] - total[x] / weight[x]) / unit));
     }
 
-  private:
-    float *row(Index y, Index channel) const { return rows_.array().at(channel, y + radius_, 2 * radius_); }
-    float *pairs() const { return pairs_.array().at(radius_, radius_); }
+    float *row(Index y, Index channel) const { return rows.array().at(channel, y + radius, 2 * radius); }
+    float *pairs() const { return all_pairs.array().at(radius, radius); }
 
     // Weights of the pixels of row y, and of radius pixels beyond its ends, with those dy below and first..last across.
     void weigh(Index y, Index dy, Index first, Index last) {
         const float *const own[] = {row(y, 0), row(y, 1), row(y, 2)}, *const others[] = {row(y + dy, 0), row(y + dy, 1), row(y + dy, 2)};
-        const float *nearness = nearness_.at(dy), falloff = falloff_;
+        const float *near = nearness.at(dy), rate = falloff;
         float *out = pairs();
-        for (Index x = -radius_, end = width_ + radius_, step = step_; x < end; x += LANES) {
+        for (Index x = -radius, end = width + radius, pitch = step; x < end; x += LANES) {
             const Float8 colours[] = {load(own[0] + x), load(own[1] + x), load(own[2] + x)};
             for (Index dx = first; dx <= last; ++dx) {
                 Float8 difference{};
                 for (int c = 0; c < 3; ++c) difference += magnitude(colours[c] - load(others[c] + x + dx));
-                Float8 w = larger(1.0f - falloff * difference * difference, spread(LEAST));
+                Float8 w = larger(1.0f - rate * difference * difference, spread(LEAST));
                 for (int power = 2; power <= 16; power *= 2) w *= w;
-                store(out + dx * step + x, w * (w * nearness[std::abs(dx)]));
+                store(out + dx * pitch + x, w * (w * near[std::abs(dx)]));
             }
         }
     }
 
     // Add weighted pixels of the window to every pixel of row y, in the order of dx.
     template <class... Rows>
-    void add_weighted(Index y, Index first, Index last, Rows... rows) {
-        float *totals = sums_.array().at(0, y), *weights = sums_.array().at(1, y);
-        for (Index x = 0, end = width_; x < end; x += LANES) {
+    void add_weighted(Index y, Index first, Index last, Rows... neighbours) {
+        float *totals = sums.array().at(0, y), *weights = sums.array().at(1, y);
+        for (Index x = 0, end = width; x < end; x += LANES) {
             Float8 total = load(totals + x), weight = load(weights + x);
             const auto add = [&](const Neighbours &of, Index dx) {
                 const Float8 w = load(of.weights + dx * of.next_weights + x);
                 total += w * load(of.means + dx * of.next_means + x);
                 weight += w;
             };
-            for (Index dx = first; dx <= last; ++dx) (add(rows, dx), ...);
+            for (Index dx = first; dx <= last; ++dx) (add(neighbours, dx), ...);
             store(totals + x, total);
             store(weights + x, weight);
         }
     }
-
-    const Array<const float, 2> nearness_;
-    const float falloff_;
-    const Index number_, width_, radius_ = nearness_.shape[0] - 1, step_ = width_ + 2 * (radius_ + LANES);
-    // the channels and their mean; weights look at twice the radius beyond the ends
-    const Scratch<float, 3> rows_ = zeros<float, 3>(4, number_ + 2 * radius_, width_ + 4 * radius_ + LANES);
-    // weights of the pixel dx across, at dx + radius; what comes of them: weighted pixels, and weights
-    const Scratch<float, 2> pairs_ = zeros<float, 2>(2 * radius_ + 1, step_);
-    const Scratch<float, 3> sums_ = zeros<float, 3>(2, number_, width_ + LANES);
 };
 
 // Mean of the channels without its edge-preserving mean, in detail_unit, of rows from low on of the views that are
@@ -123,7 +120,7 @@ void detail_of_views(const Views &views, float unit, Array<const bool, 2> presen
                      Array<std::int16_t, 4> out) {
     over_stretches(present.shape, out.shape[2], ROWS_AT_ONCE, [&](Index t, Index s, Index first, Index number) {
         if (!present(t, s)) return;
-        Stretch stretch(nearness, falloff, number, out.shape[3]);
+        Stretch stretch{nearness, falloff, number, out.shape[3]};
         stretch.load_channels(views, t, s, low + first, unit);
         stretch.filter();
         for (Index y = 0; y < number; ++y) stretch.store_detail(y, detail_unit, out.at(t, s, first + y));

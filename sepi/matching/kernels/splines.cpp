@@ -25,19 +25,19 @@ constexpr auto FILTER = [] {
     return filter;
 }();
 
-// Coefficients of a row of W, of which lines begins REACH above, into out (W + 2 SPLINE_MARGIN), which has LANES numbers behind it.
+// Coefficients of a row of W, of which lines begins REACH above, into out (W + 2 SPLINE_MARGIN), which has LANES numbers
+// behind it; padded (W + 2 (SPLINE_MARGIN + REACH)), which has them, too, is scratch.
 template <Index REACH>
-void coefficients(const float *lines, Index W, float *out) {
+void coefficients(const float *lines, Index W, float *padded, float *out) {
     const auto convolve = [](const float *from, Index stride, Index n, float *to) {
         sum_products(n, std::integral_constant<Index, 2 * REACH + 1>(), to, [=](Float8 total, Index k, Index x) {
             return total + FILTER[FULL_REACH - REACH + k] * load(from + k * stride + x);
         });
     };
-    const Scratch<float, 1> padded(W + 2 * (SPLINE_MARGIN + REACH) + LANES);
-    float *inner = padded.array().at(SPLINE_MARGIN + REACH);
+    float *inner = padded + SPLINE_MARGIN + REACH;
     convolve(lines, W + LANES, W, inner);
     mirror_ends(inner, W, SPLINE_MARGIN + REACH);
-    convolve(padded.array().data, 1, W + 2 * SPLINE_MARGIN, out);
+    convolve(padded, 1, W + 2 * SPLINE_MARGIN, out);
 }
 
 // Coefficients of an image (H, W, C), into out (C, H, W).
@@ -46,10 +46,10 @@ void spline_coefficients(Strided<const float, 3> image, Array<float, 3> out) {
     over_stretches({1, 1}, H, ROWS_AT_ONCE, [&](Index, Index, Index first, Index number) {
         const Scratch<float, 3> lines(C, number + 2 * FULL_REACH, W + LANES);
         load_rows<float>(image, first - FULL_REACH, lines.array());
-        const Scratch<float, 1> row(W + 2 * SPLINE_MARGIN + LANES);
+        const Scratch<float, 1> row(W + 2 * SPLINE_MARGIN + LANES), padded(W + 2 * (SPLINE_MARGIN + FULL_REACH) + LANES);
         for (Index c = 0; c < C; ++c) {
             for (Index i = 0; i < number; ++i) {
-                coefficients<FULL_REACH>(lines.array().at(c, i), W, row.array().data);
+                coefficients<FULL_REACH>(lines.array().at(c, i), W, padded.array().data, row.array().data);
                 std::copy_n(row.array().at(SPLINE_MARGIN), W, out.at(c, first + i));
             }
         }
@@ -76,8 +76,9 @@ void view_splines(const Views &views, float colour_unit, Array<const std::int16_
         }
         const Index stride = width + LANES;
         const auto row = zeros<float, 2>(4, stride);
+        const Scratch<float, 1> padded(W + 2 * (SPLINE_MARGIN + SPLINE_REACH) + LANES);
         for (Index i = 0; i < number; ++i) {
-            for (Index c = begin; c < end; ++c) coefficients<SPLINE_REACH>(lines.array().at(c, i), W, row.array().at(c));
+            for (Index c = begin; c < end; ++c) coefficients<SPLINE_REACH>(lines.array().at(c, i), W, padded.array().data, row.array().at(c));
             const float *from = row.array().at(begin);
             std::int16_t *to = out.at(t, s, first + i, 0, begin);
             const auto whole = [](float value) { return std::int16_t(rounded(value)); };

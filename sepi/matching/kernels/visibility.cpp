@@ -70,76 +70,82 @@ void add_row(const float *row, Index W, Index y, double down, double across, Arr
 }
 
 // What a row of the reference view is compared with, and what comes of it.
-class VisibleRow {
-  public:
-    VisibleRow(const BaseDetail &views, const Visibility &visibility, const RobustCost &robust, const Candidates &candidates, Array<float, 3> cost)
-        : views_(views), visibility_(visibility), candidates_(candidates), cost_(cost), shares_{robust.shares(0), robust.shares(1)} {
-        // in steps of the whole numbers; the detail counts as three equal channels
-        const double colours = double(COLOUR_STEPS) * ONE, detail = ONE / double(views.detail_unit);
-        scales2_[0] = float(robust.scales2(0) * (colours * colours));
-        scales2_[1] = float(robust.scales2(1) * (detail * detail) / 3);
-    }
+struct VisibleRow {
+    const BaseDetail &views;
+    const Visibility &visibility;
+    const RobustCost &robust;
+    const Candidates &candidates;
+    const Array<float, 3> cost;
+
+    const Index K = cost.shape[0], H = cost.shape[1], W = cost.shape[2], width = W + LANES;
+    // in steps of the whole numbers; the detail counts as three equal channels
+    const double colour_steps = double(COLOUR_STEPS) * ONE, detail_steps = ONE / double(views.detail_unit);
+    const float colour_scale2 = float(robust.scales2(0) * (colour_steps * colour_steps));
+    const float detail_scale2 = float(robust.scales2(1) * (detail_steps * detail_steps) / 3);
+    // of the rows of the view; where there is no detail it is 0, and fits
+    const Scratch<std::int32_t, 3> view_pairs = zeros<std::int32_t, 3>(height(), 4, width);
+    const Scratch<float, 2> own = zeros<float, 2>(4, width);
+    const Scratch<float, 3> sums = zeros<float, 3>(K, 2, width);  // of the costs, and of their weights
 
     // Cost of every candidate in row y.
     void sweep(Index y) {
         // the reference view, times what the weights of samples sum to
-        const Array<float, 3> own{reference_.array().data, {4, 1, W_}, {width_, 0, 1}};
-        load_rows<float>(views_.guide, y, own, [](auto colour) { return whole(colour * COLOUR_STEPS) * float(ONE); });
-        for (Index x = 0; x < W_ && views_.reference_detail.shape[0] > 0; ++x) own(3, 0, x) = float(views_.reference_detail(y - views_.low, x) * ONE);
-        for (Index t = 0; t < views_.present.shape[0]; ++t) {
-            for (Index s = 0; s < views_.present.shape[1]; ++s) {
-                if (!views_.present(t, s) || (t == views_.t0 && s == views_.s0)) continue;
-                const Index r = candidates_.row(t, s);
-                const auto [low, high] = std::minmax<Index>({y + candidates_.down(r, 0), y + candidates_.down(r, K_ - 1)});
-                const Index first = std::clamp<Index>(low, 0, H_ - 2), last = std::clamp<Index>(high, 0, H_ - 2) + 2;
+        const Array<float, 3> reference{own.array().data, {4, 1, W}, {width, 0, 1}};
+        load_rows<float>(views.guide, y, reference, [](auto colour) { return whole(colour * COLOUR_STEPS) * float(ONE); });
+        for (Index x = 0; x < W && views.reference_detail.shape[0] > 0; ++x) reference(3, 0, x) = float(views.reference_detail(y - views.low, x) * ONE);
+        for (Index t = 0; t < views.present.shape[0]; ++t) {
+            for (Index s = 0; s < views.present.shape[1]; ++s) {
+                if (!views.present(t, s) || (t == views.t0 && s == views.s0)) continue;
+                const Index r = candidates.row(t, s);
+                const auto [low, high] = std::minmax<Index>({y + candidates.down(r, 0), y + candidates.down(r, K - 1)});
+                const Index first = std::clamp<Index>(low, 0, H - 2), last = std::clamp<Index>(high, 0, H - 2) + 2;
                 load_view(t, s, first, last);
                 add_view(t, s, first, y);
             }
         }
-        for (Index k = 0; k < K_; ++k) {
-            const float *sum = sums_.array().at(k, 0), *weight = sums_.array().at(k, 1);
-            float *out = cost_.at(k, y);
-            for (Index x = 0; x < W_; ++x) out[x] = weight[x] > 0 ? sum[x] / weight[x] : 1.0f;
+        for (Index k = 0; k < K; ++k) {
+            const float *sum = sums.array().at(k, 0), *weight = sums.array().at(k, 1);
+            float *out = cost.at(k, y);
+            for (Index x = 0; x < W; ++x) out[x] = weight[x] > 0 ? sum[x] / weight[x] : 1.0f;
         }
     }
 
-  private:
     // Rows begin..end of a view, colours and detail: each value and its right neighbour in one number.
     void load_view(Index t, Index s, Index begin, Index end) {
         for (Index i = 0; i < end - begin; ++i) {
-            const Array<std::int32_t, 3> row{pairs_.array().at(i), {4, 1, W_}, {width_, 0, 1}};
-            load_rows(views_.colours, t, s, begin + i, row, [scale = views_.colour_unit * COLOUR_STEPS](auto colour) { return rounded(colour * scale); });
-            if (views_.detail.shape[2] > 0) std::copy_n(views_.detail.at(t, s, begin + i - views_.low), W_, row.at(3));
+            const Array<std::int32_t, 3> row{view_pairs.array().at(i), {4, 1, W}, {width, 0, 1}};
+            load_rows(views.colours, t, s, begin + i, row, [scale = views.colour_unit * COLOUR_STEPS](auto colour) { return rounded(colour * scale); });
+            if (views.detail.shape[2] > 0) std::copy_n(views.detail.at(t, s, begin + i - views.low), W, row.at(3));
             for (Index c = 0; c < 4; ++c) {
                 std::int32_t *values = row.at(c);
-                for (Index x = 0; x < W_; ++x) values[x] = (values[x] & 0xFFFF) | values[x + 1] << 16;
+                for (Index x = 0; x < W; ++x) values[x] = (values[x] & 0xFFFF) | values[x + 1] << 16;
             }
         }
     }
 
     // Add one view, whose rows from low on are loaded, at every candidate of row y.
     void add_view(Index t, Index s, Index low, Index y) {
-        const Index r = candidates_.row(t, s), c = candidates_.column(t, s), width = width_;
-        const auto nearest = visibility_.nearest[t][s];
+        const Index r = candidates.row(t, s), c = candidates.column(t, s), pitch = width;
+        const auto nearest = visibility.nearest[t][s];
         const bool some_hide = nearest.shape[1] > 0;
-        const Float8 hidden = spread(visibility_.occluded_view_weight);
-        const std::array scales2 = scales2_, shares = shares_;
-        for (Index k = 0; k < K_; ++k) {
-            const auto [top, fy] = upper_row(y, candidates_.down(r, k), candidates_.fy(r, k), H_);
-            const Index left = candidates_.across(c, k);
-            const float fx = candidates_.fx(c, k);
+        const Float8 hidden = spread(visibility.occluded_view_weight);
+        const std::array scale2{colour_scale2, detail_scale2}, share{robust.shares(0), robust.shares(1)};
+        for (Index k = 0; k < K; ++k) {
+            const auto [top, fy] = upper_row(y, candidates.down(r, k), candidates.fy(r, k), H);
+            const Index left = candidates.across(c, k);
+            const float fx = candidates.fx(c, k);
             // on the last column itself nothing beyond it is read with any weight
-            const Index first = std::max<Index>(0, -left), last = std::min(W_, fx == 0 ? W_ - left : W_ - 1 - left);
-            if (top < 0 || top > H_ - 2 || last <= first) continue;
+            const Index first = std::max<Index>(0, -left), last = std::min(W, fx == 0 ? W - left : W - 1 - left);
+            if (top < 0 || top > H - 2 || last <= first) continue;
             // of neighbours, pairs of whole numbers of 16 bits: pixel and right neighbour, above and below
             const auto below = std::int64_t(double(fy) * ONE + 0.5), right = std::int64_t((ONE - below) * double(fx) + 0.5);
             const auto lower_right = std::int64_t(below * double(fx) + 0.5);
             const Int8 upper = pair_of(ONE - below - right, right), lower = pair_of(below - lower_right, lower_right);
-            const Float8 limit = spread(candidates_.disparities(k) + visibility_.occlusion_margin);
-            const float *before = some_hide ? nearest.at(top - views_.low + (fy > 0.5f), first + left + (fx > 0.5f)) : nullptr;
-            const std::int32_t *pairs = pairs_.array().at(top - low, 0, first + left);
-            const float *reference = reference_.array().data + first;
-            float *sum = sums_.array().at(k, 0, first);
+            const Float8 limit = spread(candidates.disparities(k) + visibility.occlusion_margin);
+            const float *before = some_hide ? nearest.at(top - views.low + (fy > 0.5f), first + left + (fx > 0.5f)) : nullptr;
+            const std::int32_t *pairs = view_pairs.array().at(top - low, 0, first + left);
+            const float *reference = own.array().data + first;
+            float *sum = sums.array().at(k, 0, first);
             for (Index rest = last - first; rest > 0; rest -= LANES, pairs += LANES, reference += LANES, sum += LANES) {
                 Float8 seen = spread(1);
                 if (some_hide) {
@@ -151,18 +157,18 @@ class VisibleRow {
                 if (rest < LANES) seen = first_lanes(seen, rest, 0);
                 const auto residual = [&](Index channel) {
                     Int8 above, under;
-                    std::memcpy(&above, pairs + channel * width, sizeof above);
-                    std::memcpy(&under, pairs + (4 + channel) * width, sizeof under);
+                    std::memcpy(&above, pairs + channel * pitch, sizeof above);
+                    std::memcpy(&under, pairs + (4 + channel) * pitch, sizeof under);
                     const Int8 sample = dot_of_pairs(above, upper) + dot_of_pairs(under, lower);
-                    return __builtin_convertvector(sample, Float8) - load(reference + channel * width);
+                    return __builtin_convertvector(sample, Float8) - load(reference + channel * pitch);
                 };
                 const Float8 red = residual(0), green = residual(1), blue = residual(2), detail = residual(3);
                 const Float8 colours2 = fma(blue, blue, fma(green, green, red * red)), detail2 = detail * detail;
                 // z / (z + scale) of either, by one division
-                const Float8 of_colours = colours2 + scales2[0], of_detail = detail2 + scales2[1];
-                const Float8 both = fma(shares[0] * colours2, of_detail, shares[1] * detail2 * of_colours);
+                const Float8 of_colours = colours2 + scale2[0], of_detail = detail2 + scale2[1];
+                const Float8 both = fma(share[0] * colours2, of_detail, share[1] * detail2 * of_colours);
                 store(sum, fma(seen, both / (of_colours * of_detail), load(sum)));
-                store(sum + width, load(sum + width) + seen);
+                store(sum + pitch, load(sum + pitch) + seen);
             }
         }
     }
@@ -170,20 +176,9 @@ class VisibleRow {
     // How many rows of a view are looked at, at most.
     Index height() const {
         Index moved = 0;
-        for (Index r = 0; r < candidates_.down.shape[0]; ++r) moved = std::max(moved, std::abs(candidates_.down(r, K_ - 1) - candidates_.down(r, 0)));
+        for (Index r = 0; r < candidates.down.shape[0]; ++r) moved = std::max(moved, std::abs(candidates.down(r, K - 1) - candidates.down(r, 0)));
         return moved + 2;
     }
-
-    const BaseDetail &views_;
-    const Visibility &visibility_;
-    const Candidates &candidates_;
-    const Array<float, 3> cost_;
-    const Index K_ = cost_.shape[0], H_ = cost_.shape[1], W_ = cost_.shape[2], width_ = W_ + LANES;
-    std::array<float, 2> scales2_, shares_;
-
-    const Scratch<std::int32_t, 3> pairs_ = zeros<std::int32_t, 3>(height(), 4, width_);  // of the rows of the view; where there is no detail it is 0, and fits
-    const Scratch<float, 2> reference_ = zeros<float, 2>(4, width_);
-    const Scratch<float, 3> sums_ = zeros<float, 3>(K_, 2, width_);  // of the costs, and of their weights
 };
 
 // Disparity map of the reference view as each view sees it, rows low..high: the nearest of the pixels that touch a
@@ -228,7 +223,7 @@ void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &vie
 // pixel: 0..1; 1 where no view is left.
 void sweep_visible_rows(const BaseDetail &views, const Visibility &visibility, const RobustCost &robust, const Candidates &candidates, Index begin, Index end,
                         Array<float, 3> cost) {
-    parallel_for(begin, end, [&](Index y) { VisibleRow(views, visibility, robust, candidates, cost).sweep(y); });
+    parallel_for(begin, end, [&](Index y) { VisibleRow{views, visibility, robust, candidates, cost}.sweep(y); });
 }
 
 const Submodule submodule("visibility", [](nb::module_ &m) {
