@@ -43,7 +43,8 @@ struct Stretch {
         for (Index y = 0; y < inner.shape[1]; ++y) {
             float *channels[] = {inner.at(0, y), inner.at(1, y), inner.at(2, y)}, *mean = inner.at(3, y);
             for (float *channel : channels) mirror_ends(channel, width, 2 * radius);
-            for (Index x = -2 * radius; x < width + 2 * radius; ++x) mean[x] = (channels[0][x] + channels[1][x] + channels[2][x]) * float(1 / 3.0);
+            const float *red = channels[0], *green = channels[1], *blue = channels[2];
+            for (Index x = -2 * radius; x < width + 2 * radius; ++x) mean[x] = (red[x] + green[x] + blue[x]) * float(1 / 3.0);
         }
     }
 
@@ -116,8 +117,8 @@ struct Stretch {
 // present: views (T, S, H, W, 3), which unit makes span 0..1, out (T, S, n, W). Other views are left as they are.
 // The window is a disc of pixels so far down and across, whose weights are nearness (radius + 1, radius + 1); of colours they
 // fall off by 1 / (64 s^2), s being the sum of the RGB differences that is an edge.
-void detail_of_views(const Views &views, float unit, Array<const bool, 2> present, Index low, Array<const float, 2> nearness, float falloff, float detail_unit,
-                     Array<std::int16_t, 4> out) {
+void detail_of_views(const Views &views, float unit, Array<const bool, 2> present, Index low, Array<const float, 2> nearness, float falloff,
+                     float detail_unit, Array<std::int16_t, 4> out) {
     over_stretches(present.shape, out.shape[2], ROWS_AT_ONCE, [&](Index t, Index s, Index first, Index number) {
         if (!present(t, s)) return;
         Stretch stretch{nearness, falloff, number, out.shape[3]};
@@ -128,8 +129,8 @@ void detail_of_views(const Views &views, float unit, Array<const bool, 2> presen
 }
 
 const Submodule submodule("base_detail", [](nb::module_ &m) {
-    m.def("detail_of_views", &detail_of_views, Unlocked(), "views"_a, "unit"_a, "present"_a, "low"_a, "nearness"_a, "falloff"_a, "detail_unit"_a,
-          "out"_a);
+    m.def("detail_of_views", &detail_of_views, Unlocked(), "views"_a, "unit"_a, "present"_a, "low"_a, "nearness"_a, "falloff"_a,
+          "detail_unit"_a, "out"_a);
 });
 
 }  // namespace

@@ -95,7 +95,8 @@ class Stretch {
 // the value of white. noise (N, 4) says from which brightness on, which rises, the noise of one channel has a variance of
 // noise[2] + (brightness - noise[0]) / noise[1] * noise[3]; the first is below all. Detail is kept as far as its energy exceeds
 // least (H, W) times that. Whole numbers are rounded and cut off at black and white.
-void denoise_views(const Views &views, Array<const bool, 2> present, float full, Array<const float, 2> noise, Array<const float, 2> least, const NewViews &out) {
+void denoise_views(const Views &views, Array<const bool, 2> present, float full, Array<const float, 2> noise, Array<const float, 2> least,
+                   const NewViews &out) {
     const Index H = shape_of(views)[2], W = shape_of(views)[3], C = shape_of(views)[4];
     over_stretches(present.shape, H, ROWS_AT_ONCE, [&](Index t, Index s, Index first, Index number) {
         if (!present(t, s)) return;

@@ -30,8 +30,8 @@ Index steps_within(Index i, Index direction, Index n, Index most) { return std::
 // Disparity (H, W) of the closest farther pixel of a like colour, straight or at 45 degrees from each, its own if none;
 // of two that are as close the farther. lowest (H, W) is the least within reach pixels across and down; farther is more
 // than least_step away, and colours (H, W, 3) are alike below a squared distance2.
-void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest, Array<const float, 3> colours, Index reach, float least_step,
-                   float distance2, Array<float, 2> farther) {
+void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest, Array<const float, 3> colours, Index reach,
+                   float least_step, float distance2, Array<float, 2> farther) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for_pixels(H, W, [&](Index y, Index x) {
         const float own = disparity(y, x), limit = own - least_step, *here = colours.at(y, x);
@@ -57,8 +57,8 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
 // Squared residuals at two depths of the pixels of rows begin..end, in views (T, S, H, W, 3), which unit makes span 0..1, from
 // the reference view (H, W, 3) in 0..1: added to sums (3, H, W) are those at the farther depth, at the other one, and of how
 // many views they are. Asked is where nothing hides the farther depth; where both are equal nothing is compared.
-void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float, 3> reference,
-                    const AskedViews &asked, Index begin, Index end, Array<float, 3> sums) {
+void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float,
+                    3> reference, const AskedViews &asked, Index begin, Index end, Array<float, 3> sums) {
     const Index W = disparity.shape[1];
     const double bottom = double(disparity.shape[0] - 1), right = double(W - 1);
     const auto add_view = [&](const auto &view, Array<const float, 2> nearest, double down, double across, Index y, const std::vector<Index> &columns) {
@@ -87,9 +87,10 @@ void compare_depths(const Views &views, float unit, Array<const float, 2> dispar
 }
 
 const Submodule submodule("gaps", [](nb::module_ &m) {
-    m.def("farther_alike", &farther_alike, Unlocked(), "disparity"_a, "lowest"_a, "colours"_a, "reach"_a, "least_step"_a, "distance2"_a, "farther"_a);
- m.def("compare_depths", &compare_depths, Unlocked(), "views"_a, "unit"_a, "disparity"_a, "farther"_a, "reference"_a, "asked"_a, "begin"_a, "end"_a,
-          "sums"_a);
+    m.def("farther_alike", &farther_alike, Unlocked(), "disparity"_a, "lowest"_a, "colours"_a, "reach"_a, "least_step"_a, "distance2"_a,
+          "farther"_a);
+    m.def("compare_depths", &compare_depths, Unlocked(), "views"_a, "unit"_a, "disparity"_a, "farther"_a, "reference"_a, "asked"_a,
+          "begin"_a, "end"_a, "sums"_a);
 });
 
 }  // namespace

@@ -79,8 +79,10 @@ struct View {
     const Seeing &seeing;
     const Index n, H, W;
     const Index t = views.places(n, 0), s = views.places(n, 1);
-    const float down = views.baselines(n, 0), across = views.baselines(n, 1), bottom = float(H - 1), right = float(W - 1), unit = views.unit / float(ONE);
-    const std::int32_t low = std::int32_t(views.low), pitch = std::int32_t(views.splines.strides[2]), width = std::int32_t(seeing.nearest.strides[2]);
+    const float down = views.baselines(n, 0), across = views.baselines(n, 1);
+    const float bottom = float(H - 1), right = float(W - 1), unit = views.unit / float(ONE);
+    const std::int32_t low = std::int32_t(views.low);
+    const std::int32_t pitch = std::int32_t(views.splines.strides[2]), width = std::int32_t(seeing.nearest.strides[2]);
     const float *const nearest = seeing.nearest.at(t, s);
     // from the one before the picture on
     const std::int16_t *const coefficients = views.splines.at(t, s, SPLINE_MARGIN - 1, SPLINE_MARGIN - 1);
@@ -122,7 +124,8 @@ struct View {
     // Sums of the first two columns of coefficients, of four channels, and of the others, weighted for pixel i.
     Int8 products(const Pixels &pixels, int i) const {
         const auto line = [&](Index n) { return Int8{} + pixels.weights[n][i]; };
-        const auto row = [&](Index n) { return rounded_products(load(coefficients + pixels.coefficients[i] + n * pitch), Short16(line(n))); };
+        const std::int16_t *first = coefficients + pixels.coefficients[i];
+        const auto row = [&](Index n) { return rounded_products(load(first + n * pitch), Short16(line(n))); };
         const Short16 sums = row(0) + row(1) + row(2) + row(3);
         // neighbours of one channel side by side
         const Short16 neighbours = __builtin_shufflevector(sums, sums, 0, 4, 1, 5, 2, 6, 3, 7, 8, 12, 9, 13, 10, 14, 11, 15);
@@ -150,7 +153,8 @@ Float8 dot(const Four &a, const Four &b) { return a[0] * b[0] + a[1] * b[1] + a[
 // Of each eight pixels of the rows first..last: begin them, add what each view that sees one of them shows, and write what
 // comes of it, at their row, column and number.
 template <class Sums, class Begin, class Add, class Write>
-void over_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index first, Index last, Begin begin, Add add, Write write) {
+void over_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index first, Index last, Begin begin,
+                Add add, Write write) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for(first, last, [&](Index y) {
         std::array<Sums, AT_ONCE / LANES> all;
@@ -181,7 +185,8 @@ void over_views(const SplineViews &views, const Seeing &seeing, Array<const floa
 }
 
 // Mean of the views that see each pixel, those unlike the reference view counting less, into out (H, W, 4).
-void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index begin, Index end, Array<float, 3> out) {
+void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index begin, Index end, Array<float,
+                   3> out) {
     struct Mean : Pixels {
         Four channels;           // times their weights
         Float8 colours, detail;  // weights
@@ -209,8 +214,8 @@ void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const f
 }
 
 template <bool EVIDENCE>
-static void add_equations(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
-                          Array<float, 3> out) {
+void add_equations(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin,
+                   Index end, Array<float, 3> out) {
     // slope and curvature, of colours and of detail; and what else is asked
     struct Equations : Pixels {
         Four down, across;  // derivatives of what pixels are compared with
@@ -256,15 +261,16 @@ static void add_equations(const SplineViews &views, const Seeing &seeing, Array<
 // Sums of each pixel, into out (2 or 14, H, W): gradient and curvature, whose ratio is the update towards less cost. And what
 // else the views say, if it is asked: the same by the views to the left, to the right, above and below alone, misfit,
 // agreement, detail's agreement and number of views.
-void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
-                        Array<float, 3> out) {
+void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin,
+                        Index end, Array<float, 3> out) {
     (out.shape[0] > 2 ? add_equations<true> : add_equations<false>)(views, seeing, disparity, image, begin, end, out);
 }
 
 const Submodule submodule("gauss_newton", [](nb::module_ &m) {
     m.attr("AT_ONCE") = AT_ONCE;
     m.def("mean_of_views", &mean_of_views, Unlocked(), "views"_a, "seeing"_a, "disparity"_a, "begin"_a, "end"_a, "out"_a);
-    m.def("equations_of_views", &equations_of_views, Unlocked(), "views"_a, "seeing"_a, "disparity"_a, "image"_a, "begin"_a, "end"_a, "out"_a);
+    m.def("equations_of_views", &equations_of_views, Unlocked(), "views"_a, "seeing"_a, "disparity"_a, "image"_a, "begin"_a, "end"_a,
+          "out"_a);
 });
 
 }  // namespace

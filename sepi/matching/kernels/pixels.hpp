@@ -86,7 +86,8 @@ void store_interleaved(const float *lines, Index stride, Index n, Number *__rest
 // Weights of the windows of pixels begin..end of row y, summing to one, into weights ((2 radius + 1)^2, end - begin or more);
 // zero outside. They are exponentials of what exponent makes of squared distances in the guide (3, H, W).
 template <class Exponent>
-void window_weights(Array<const float, 3> guide, Index y, Index begin, Index end, Index radius, Array<float, 2> weights, Exponent exponent) {
+void window_weights(Array<const float, 3> guide, Index y, Index begin, Index end, Index radius, Array<float, 2> weights,
+                    Exponent exponent) {
     const Index H = guide.shape[1], W = guide.shape[2], size = 2 * radius + 1;
     const auto totals = zeros<float, 1>(end - begin);
     float *__restrict total = totals.array().data;

@@ -13,7 +13,7 @@
 
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
-#include "sample_polynomials.hpp"
+#include "sweep_arrays.hpp"
 
 namespace sepi {
 namespace {
@@ -45,6 +45,47 @@ std::array<Index, 2> seen_run(Array<const std::int64_t, 2> shown, Index W, Run r
     return {std::max(run.begin, low - left), std::min(run.end, (fx == 0 ? high : high - 1) - left)};
 }
 
+// Fractional pixels from the pixel above and to the left to the sample at the origin, and by how many pixels the sample
+// moves as the disparity rises by one.
+struct Motion {
+    float fy, fx, sy, sx;
+};
+
+// Squared colour differences of eight pixels: a polynomial of the distance from the origin, constant first.
+struct SquaredDifferences {
+    Float8 of[5]{};
+
+    // Add how sample and reference pixel differ in one channel. Upper left neighbours begin at upper, lower left ones at
+    // lower.
+    template <class Colour>
+    void add(const Colour *upper, const Colour *lower, const Colour *reference, Motion at) {
+        const Float8 left = load(upper), lower_left = load(lower);
+        const Float8 across = load(upper + 1) - left, lower_across = load(lower + 1) - lower_left;
+        const Float8 down = lower_left - left, both = lower_across - across;
+        const Float8 fx = spread(at.fx), fy = spread(at.fy);
+        const Float8 constant = fma(fy, fma(fx, both, down), fma(fx, across, left - load(reference)));
+        const Float8 linear = fma(both, spread(at.fx * at.sy + at.fy * at.sx), fma(down, spread(at.sy), across * spread(at.sx)));
+        const Float8 quadratic = both * spread(at.sy * at.sx), twice = linear + linear;
+        of[0] = fma(constant, constant, of[0]);
+        of[1] = fma(constant, twice, of[1]);
+        of[2] = fma(linear, linear, fma(constant + constant, quadratic, of[2]));
+        of[3] = fma(twice, quadratic, of[3]);
+        of[4] = fma(quadratic, quadratic, of[4]);
+    }
+
+    // Have them be 0 but for the first pixels.
+    void keep_first(Index number) {
+        for (Float8 &each : of) each = first_lanes(each, number, 0);
+    }
+
+    // Rounding makes none negative.
+    Float8 at(Float8 distance) const {
+        Float8 sum = of[4];
+        for (int power = 3; power >= 0; --power) sum = fma(distance, sum, of[power]);
+        return larger(sum, Float8{});
+    }
+};
+
 // Candidates begin..end whose samples are between the same four pixels, or the same of them.
 struct Segment {
     Index begin, end, down, left;
@@ -60,9 +101,14 @@ struct ComparedView {
         const Index r = candidates.row(t, s), c = candidates.column(t, s), K = candidates.number();
         const auto *down = candidates.down.at(r), *across = candidates.across.at(c);
         const float *fy = candidates.fy.at(r), *fx = candidates.fx.at(c), *disparities = candidates.disparities.data;
+        const auto as_before = [=](Index k) {
+            return down[k - 1] == down[k] && across[k - 1] == across[k] && (fy[k - 1] == 0) == (fy[k] == 0) &&
+                   (fx[k - 1] == 0) == (fx[k] == 0);
+        };
         for (Index here = 0, next; here < K; here = next) {
-            next = end_of_same_pixels(here, K, down, fy, across, fx);
-            const Index origin = origin_of(disparities, here, next);
+            for (next = here + 1; next < K && as_before(next);) ++next;
+            // a disparity of 0, which can only be at an end, is one: nothing is rounded there
+            const Index origin = disparities[here] >= 0 ? here : next - 1;
             for (Index n = here; n < next; ++n) distances[n] = disparities[n] - disparities[origin];
             segments.push_back({here, next, down[here], across[here], {fy[origin], fx[origin], candidates.sy(r), candidates.sx(c)}});
         }
@@ -110,7 +156,8 @@ struct TileSweep {
     // with the columns of the windows at both ends
     const Index columns = width + 2 * window.radius + LANES, parts = (Index(compared.groups.size()) * padded + AT_ONCE - 1) / AT_ONCE;
     // rows of a window: row r at r % size, column x - radius of the tile at x; what is outside the picture is a number
-    const Scratch<float, 4> cost_ring = zeros<float, 4>(size, parts, columns, AT_ONCE), count_ring = zeros<float, 4>(size, parts, columns, AT_ONCE);
+    const Scratch<float, 4> cost_ring = zeros<float, 4>(size, parts, columns, AT_ONCE);
+    const Scratch<float, 4> count_ring = zeros<float, 4>(size, parts, columns, AT_ONCE);
     const Scratch<float, 2> block_costs{padded, BLOCK_ROW}, block_counts{padded, BLOCK_ROW};
     const Scratch<float, 2> weights{size * size, BLOCK};
     const Scratch<float, 2> sums{BLOCK, parts * AT_ONCE}, numbers{BLOCK, parts * AT_ONCE};
@@ -183,7 +230,8 @@ struct TileSweep {
             for (const Index x : columns) {
                 Float8 total[AT_ONCE / LANES]{};
                 for (Index row = top; row < bottom; ++row) {
-                    const float *costs = ring.at(row % size, part, run.begin + x - tile.begin), *weight = weights.array().at((row - run.y + radius) * size, x);
+                    const float *costs = ring.at(row % size, part, run.begin + x - tile.begin);
+                    const float *weight = weights.array().at((row - run.y + radius) * size, x);
                     for (Index j = 0; j < size; ++j, costs += AT_ONCE, weight += BLOCK)
                         for (Index i = 0; i < AT_ONCE / LANES; ++i) total[i] = fma(spread(*weight), load(costs + i * LANES), total[i]);
                 }
@@ -201,8 +249,8 @@ struct TileSweep {
             if (!all_seen(run.y, x, 0)) counted.push_back(x - run.begin);
         }
         if (asked.empty()) return;
-        const float falloff = -0.5f / window.variance;
-        window_weights(window.guide, run.y, run.begin, run.end, window.radius, weights.array(), [=](float apart2) { return falloff * apart2; });
+        const auto exponent = [falloff = -0.5f / window.variance](float apart2) { return falloff * apart2; };
+        window_weights(window.guide, run.y, run.begin, run.end, window.radius, weights.array(), exponent);
         aggregate(cost_ring.array(), run, asked, sums.array());
         aggregate(count_ring.array(), run, counted, numbers.array());
         for (const Index column : asked) {
@@ -227,7 +275,8 @@ struct TileSweep {
             const Motion at{below, motion.fx, motion.sy, motion.sx};
             const auto squares_of = [&](Index x) {
                 SquaredDifferences squares;
-                for (Index c = 0; c < 3; ++c) squares.add(colours.at(c, top, x + left), colours.at(c, top + 1, x + left), reference.at(c, run.y, x), at);
+                for (Index c = 0; c < 3; ++c)
+                    squares.add(colours.at(c, top, x + left), colours.at(c, top + 1, x + left), reference.at(c, run.y, x), at);
                 // differences of 0 add nothing to what others have added
                 if (last - x < LANES) squares.keep_first(last - x);
                 return squares;
@@ -295,8 +344,8 @@ struct TileSweep {
 };
 
 // Sweep the rows begin..end of the mask (H, W) in tiles of at most height rows, width columns.
-void sweep_plane_rows(const ViewStack &views, const Candidates &candidates, const Window &window, const ExpectedCosts &expected, Array<const bool, 2> mask,
-                      Index begin, Index end, Index height, Index width, Array<float, 4> maps) {
+void sweep_plane_rows(const ViewStack &views, const Candidates &candidates, const Window &window, const ExpectedCosts &expected,
+                      Array<const bool, 2> mask, Index begin, Index end, Index height, Index width, Array<float, 4> maps) {
     const Index W = mask.shape[1];
     const ComparedViews compared(views, candidates);
     const auto sweep_rows = [&]<class Colour>(const Array<const Colour, 5> &colours) {
@@ -310,8 +359,8 @@ void sweep_plane_rows(const ViewStack &views, const Candidates &candidates, cons
 }
 
 const Submodule submodule("plane_sweep", [](nb::module_ &m) {
-    m.def("sweep_plane_rows", &sweep_plane_rows, Unlocked(), "views"_a, "candidates"_a, "window"_a, "expected"_a, "mask"_a, "begin"_a, "end"_a, "height"_a,
-          "width"_a, "maps"_a);
+    m.def("sweep_plane_rows", &sweep_plane_rows, Unlocked(), "views"_a, "candidates"_a, "window"_a, "expected"_a, "mask"_a, "begin"_a,
+          "end"_a, "height"_a, "width"_a, "maps"_a);
     m.attr("BLOCK") = BLOCK;
 });
 

@@ -97,7 +97,8 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
     const Index K = cost.shape[0], H = cost.shape[1], W = cost.shape[2], size = 2 * radius + 1;
     parallel_for(0, H, [&](Index y) {
         const Scratch<float, 2> weights(size * size, W + LANES);
-        window_weights(guide, y, 0, W, radius, weights.array(), [width = 2 * double(variance)](float apart2) { return -double(apart2) / width; });
+        const auto exponent = [width = 2 * double(variance)](float apart2) { return -double(apart2) / width; };
+        window_weights(guide, y, 0, W, radius, weights.array(), exponent);
         // what lies beyond the picture weighs nothing: it may be other rows, but for those with no memory beside them
         const auto at_ends = zeros<float, 2>(size, W + 2 * radius + LANES);
         const Scratch<const float *, 1> places(size * size);
@@ -123,7 +124,7 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
                 Float8 block[LANES];
                 for (Index k = 0; k < LANES; ++k) block[k] = load(total.array().at(k, x));
                 transpose(block);
-                for (Index i = 0; i < std::min<Index>(LANES, W - x); ++i) store(out.at(y, x + i, begin), block[i]);
+                for (Index i = 0; i < LANES && x + i < W; ++i) store(out.at(y, x + i, begin), block[i]);
             }
         }
     });
@@ -131,7 +132,8 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
 
 // Sum of the smoothed costs along eight paths, into out; cost and out (H, W, K'), guide (3, H, W). All paths of a direction go through
 // band rows before any goes on, so that costs and sums come from memory once for the paths down and once for those up.
-void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float small, float large, float weakening, Index band, Array<float, 3> out) {
+void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float small, float large, float weakening, Index band,
+                 Array<float, 3> out) {
     const Index H = cost.shape[0], W = cost.shape[1], K = cost.shape[2];
     const Smoothing smoothing{cost, guide, small, large, weakening, out};
     const Index pieces = (W + PATHS_AT_ONCE - 1) / PATHS_AT_ONCE;
@@ -158,8 +160,8 @@ void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float 
 // Winner of each pixel, refined by a parabola, and by how much the averaged cost of other minima exceeds its own:
 // negative where another minimum is lower before smoothing, 0 where there is no other. Candidates closer than same to
 // the winner belong to its minimum; smoothed and averaged (H, W, K'), disparities (K).
-void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Array<const float, 1> disparities, float same, Array<float, 2> disparity,
-            Array<float, 2> margin) {
+void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Array<const float, 1> disparities, float same, Array<float,
+            2> disparity, Array<float, 2> margin) {
     const Index K = disparities.shape[0], padded = smoothed.shape[2];
     const auto of_candidates = zeros<float, 1>(padded);
     std::copy_n(disparities.data, K, of_candidates.array().data);

@@ -78,7 +78,8 @@ void view_splines(const Views &views, float colour_unit, Array<const std::int16_
         const auto row = zeros<float, 2>(4, stride);
         const Scratch<float, 1> padded(W + 2 * (SPLINE_MARGIN + SPLINE_REACH) + LANES);
         for (Index i = 0; i < number; ++i) {
-            for (Index c = begin; c < end; ++c) coefficients<SPLINE_REACH>(lines.array().at(c, i), W, padded.array().data, row.array().at(c));
+            for (Index c = begin; c < end; ++c)
+                coefficients<SPLINE_REACH>(lines.array().at(c, i), W, padded.array().data, row.array().at(c));
             const float *from = row.array().at(begin);
             std::int16_t *to = out.at(t, s, first + i, 0, begin);
             const auto whole = [](float value) { return std::int16_t(rounded(value)); };
@@ -91,8 +92,8 @@ const Submodule submodule("splines", [](nb::module_ &m) {
     m.attr("MARGIN") = SPLINE_MARGIN;
     m.attr("REACH") = SPLINE_REACH;
     m.def("spline_coefficients", &spline_coefficients, Unlocked(), "image"_a, "out"_a);
-    m.def("view_splines", &view_splines, Unlocked(), "views"_a, "colour_unit"_a, "detail"_a, "detail_unit"_a, "detail_low"_a, "of_colours"_a,
-          "of_detail"_a, "low"_a, "out"_a);
+    m.def("view_splines", &view_splines, Unlocked(), "views"_a, "colour_unit"_a, "detail"_a, "detail_unit"_a, "detail_low"_a,
+          "of_colours"_a, "of_detail"_a, "low"_a, "out"_a);
 });
 
 }  // namespace

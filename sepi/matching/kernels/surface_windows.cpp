@@ -16,8 +16,8 @@ Float8 alike(Float8 apart, float width) { return smaller(larger(1.5f - apart / w
 //
 // Differences of disparity (H, W) over width, and of colours (3, H, W) over colour_width, make a pixel count less and
 // less, from half of it on; one of the same disparity counts least whatever its colour. Colours (3, 0, 0) are not asked.
-void sums_of_surface(Array<const float, 2> gradient, Array<const float, 2> curvature, Array<const float, 2> disparity, Array<const float, 3> colours,
-                     Index radius, float width, float colour_width, float least, Array<float, 3> sums) {
+void sums_of_surface(Array<const float, 2> gradient, Array<const float, 2> curvature, Array<const float, 2> disparity, Array<const float,
+                     3> colours, Index radius, float width, float colour_width, float least, Array<float, 3> sums) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const Array<const float, 2> pictures[] = {gradient, curvature, disparity, colours[0], colours[1], colours[2]};
     const auto add = [&](auto number, Index begin, Index rows) {

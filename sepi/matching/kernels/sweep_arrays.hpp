@@ -2,6 +2,7 @@
 #pragma once
 
 #include <tuple>
+#include <utility>
 #include <variant>
 
 #include "kernels/array.hpp"
@@ -53,5 +54,12 @@ struct ExpectedCosts {
 
     auto fields() { return std::tie(moments, weights, anywhere); }
 };
+
+// Row above the samples of a row, and how far below it they are.
+inline std::pair<Index, float> upper_row(Index y, Index down, float fy, Index height) {
+    // the last row has none below: seen from the one above
+    if (y + down == height - 1 && fy == 0) return {height - 2, 1.0f};
+    return {y + down, fy};
+}
 
 }  // namespace sepi

@@ -1,7 +1,7 @@
 // The visibility sweep: z-buffers of every view, and costs over the views that see a pixel.
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
-#include "sample_polynomials.hpp"
+#include "sweep_arrays.hpp"
 
 namespace sepi {
 namespace {
@@ -92,7 +92,8 @@ struct VisibleRow {
         // the reference view, times what the weights of samples sum to
         const Array<float, 3> reference{own.array().data, {4, 1, W}, {width, 0, 1}};
         load_rows<float>(views.guide, y, reference, [](auto colour) { return whole(colour * COLOUR_STEPS) * float(ONE); });
-        for (Index x = 0; x < W && views.reference_detail.shape[0] > 0; ++x) reference(3, 0, x) = float(views.reference_detail(y - views.low, x) * ONE);
+        for (Index x = 0; x < W && views.reference_detail.shape[0] > 0; ++x)
+            reference(3, 0, x) = float(views.reference_detail(y - views.low, x) * ONE);
         for (Index t = 0; t < views.present.shape[0]; ++t) {
             for (Index s = 0; s < views.present.shape[1]; ++s) {
                 if (!views.present(t, s) || (t == views.t0 && s == views.s0)) continue;
@@ -114,7 +115,8 @@ struct VisibleRow {
     void load_view(Index t, Index s, Index begin, Index end) {
         for (Index i = 0; i < end - begin; ++i) {
             const Array<std::int32_t, 3> row{view_pairs.array().at(i), {4, 1, W}, {width, 0, 1}};
-            load_rows(views.colours, t, s, begin + i, row, [scale = views.colour_unit * COLOUR_STEPS](auto colour) { return rounded(colour * scale); });
+            const float scale = views.colour_unit * COLOUR_STEPS;
+            load_rows(views.colours, t, s, begin + i, row, [=](auto colour) { return rounded(colour * scale); });
             if (views.detail.shape[2] > 0) std::copy_n(views.detail.at(t, s, begin + i - views.low), W, row.at(3));
             for (Index c = 0; c < 4; ++c) {
                 std::int32_t *values = row.at(c);
@@ -176,14 +178,16 @@ struct VisibleRow {
     // How many rows of a view are looked at, at most.
     Index height() const {
         Index moved = 0;
-        for (Index r = 0; r < candidates.down.shape[0]; ++r) moved = std::max(moved, std::abs(candidates.down(r, K - 1) - candidates.down(r, 0)));
+        for (Index r = 0; r < candidates.down.shape[0]; ++r)
+            moved = std::max(moved, std::abs(candidates.down(r, K - 1) - candidates.down(r, 0)));
         return moved + 2;
     }
 };
 
 // Disparity map of the reference view as each view sees it, rows low..high: the nearest of the pixels that touch a
 // position; out (T, S, high - low, W).
-void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, Strided<const double, 3> baselines, Index low, Index high, Array<float, 4> out) {
+void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, Strided<const double, 3> baselines, Index low, Index high,
+               Array<float, 4> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const auto [least, most] = std::minmax_element(disparity.data, disparity.data + H * W);
     over_stretches(present.shape, 1, 1, [&, least = double(*least), most = double(*most)](Index t, Index s, Index, Index) {
@@ -221,8 +225,8 @@ void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &vie
 
 // Cost of every candidate for rows begin..end, into cost (K, H, W), over the views in which nothing nearer occludes the
 // pixel: 0..1; 1 where no view is left.
-void sweep_visible_rows(const BaseDetail &views, const Visibility &visibility, const RobustCost &robust, const Candidates &candidates, Index begin, Index end,
-                        Array<float, 3> cost) {
+void sweep_visible_rows(const BaseDetail &views, const Visibility &visibility, const RobustCost &robust, const Candidates &candidates,
+                        Index begin, Index end, Array<float, 3> cost) {
     parallel_for(begin, end, [&](Index y) { VisibleRow{views, visibility, robust, candidates, cost}.sweep(y); });
 }
 

@@ -7,8 +7,8 @@ namespace {
 
 // Weighted least squares of each superpixel's data, in the order of the pixels, added to left (N, 3, 3) and
 // right (N, 3) of zeros; weight and disparity (H W).
-void add_normal_equations(Array<const std::int64_t, 1> labels, Array<const double, 2> design, Array<const float, 1> weight, Array<const float, 1> disparity,
-                          Array<double, 3> left, Array<double, 2> right) {
+void add_normal_equations(Array<const std::int64_t, 1> labels, Array<const double, 2> design, Array<const float, 1> weight,
+                          Array<const float, 1> disparity, Array<double, 3> left, Array<double, 2> right) {
     for (Index i = 0; i < labels.shape[0]; ++i) {
         const double w = weight(i), d = disparity(i), *own = design.at(i);
         double *matrix = left.at(labels(i)), *side = right.at(labels(i));
@@ -24,7 +24,8 @@ void add_normal_equations(Array<const std::int64_t, 1> labels, Array<const doubl
 }
 
 // Disparity of every pixel by the plane of its superpixel, out (H W); planes (N, 3).
-void values_of_planes(Array<const std::int64_t, 1> labels, Array<const double, 2> design, Array<const double, 2> planes, Array<float, 1> out) {
+void values_of_planes(Array<const std::int64_t, 1> labels, Array<const double, 2> design, Array<const double, 2> planes, Array<float,
+                      1> out) {
     parallel_for_blocks(0, labels.shape[0], 4096, [&](Index i) {
         const double *own = design.at(i), *plane = planes.at(labels(i));
         out(i) = float(own[0] * plane[0] + own[1] * plane[1] + own[2] * plane[2]);
@@ -32,7 +33,8 @@ void values_of_planes(Array<const std::int64_t, 1> labels, Array<const double, 2
 }
 
 const Submodule submodule("planes", [](nb::module_ &m) {
-    m.def("add_normal_equations", &add_normal_equations, Unlocked(), "labels"_a, "design"_a, "weight"_a, "disparity"_a, "left"_a, "right"_a);
+    m.def("add_normal_equations", &add_normal_equations, Unlocked(), "labels"_a, "design"_a, "weight"_a, "disparity"_a, "left"_a,
+          "right"_a);
     m.def("values_of_planes", &values_of_planes, Unlocked(), "labels"_a, "design"_a, "planes"_a, "out"_a);
 });
 

@@ -53,7 +53,8 @@ double in_order(const Scratch<Number, 1> &rows) {
 
 // Weights of second differences in one direction; corners (n, 2) and factors (n) say what pixels make a difference.
 void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const double, 2> colour,
-                            Array<const std::int64_t, 2> corners, Array<const double, 1> factors, double threshold, double variance, Array<double, 2> out) {
+                            Array<const std::int64_t, 2> corners, Array<const double, 1> factors, double threshold, double variance,
+                            Array<double, 2> out) {
     parallel_for_pixels(out.shape[0], out.shape[1], [&](Index y, Index x) {
         double difference = 0, trust = reliability(y, x);
         for (Index i = 0; i < factors.shape[0]; ++i) {
@@ -90,7 +91,8 @@ double bend(Array<const Number, 3> stencil, Array<const Number, 2> direction, Ar
 // Add a direction, so many times, to a solution, and take what the matrix makes of it, bent, from the residual; returns
 // the squared norm of the residual.
 template <class Number>
-double step(Number length, Array<const Number, 2> direction, Array<const Number, 2> bent, Array<Number, 2> solution, Array<Number, 2> residual) {
+double step(Number length, Array<const Number, 2> direction, Array<const Number, 2> bent, Array<Number, 2> solution, Array<Number,
+            2> residual) {
     const Scratch<Number, 1> squares(solution.shape[0]);
     const Index n = solution.shape[1];
     parallel_for(0, solution.shape[0], [&](Index y) {
@@ -124,7 +126,8 @@ void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
 
 // out becomes inverse * vector, plus the finest hats; returns the inner product of vector and out.
 template <class Number>
-double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2> vector, Array<const Number, 2> fine, Array<Number, 2> out) {
+double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2> vector, Array<const Number, 2> fine, Array<Number,
+                           2> out) {
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = fine.shape[1];
     const Scratch<Number, 1> lines(w), all_hats(2 * w);
     Number *__restrict line = lines.array().data, *__restrict hats = all_hats.array().data;
@@ -186,8 +189,8 @@ void bind_of_numbers(nb::module_ &m) {
 const Submodule submodule("second_order", [](nb::module_ &m) {
     m.attr("MARGIN") = MARGIN;
     m.attr("SPACING") = SPACING;
-    m.def("weights_of_differences", &weights_of_differences, Unlocked(), "disparity"_a, "reliability"_a, "colour"_a, "corners"_a, "factors"_a,
-          "threshold"_a, "variance"_a, "out"_a);
+    m.def("weights_of_differences", &weights_of_differences, Unlocked(), "disparity"_a, "reliability"_a, "colour"_a, "corners"_a,
+          "factors"_a, "threshold"_a, "variance"_a, "out"_a);
     bind_of_numbers<float>(m);
     bind_of_numbers<double>(m);
     m.def("diagonal_of_hats", &diagonal_of_hats, Unlocked(), "stencil"_a, "spacing"_a, "out"_a);
