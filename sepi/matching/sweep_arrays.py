@@ -129,13 +129,6 @@ class Visibility(NamedTuple):
     occluded_view_weight: np.float32
 
 
-class RobustCost(NamedTuple):
-    """Square of the robust scale, and share in the cost, of colours and of detail; shape (2,), float32."""
-
-    scales2: FloatMap
-    shares: FloatMap
-
-
 def sampled_candidates(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> Candidates:
     """Candidates ``(K,)`` and where views of these baselines ``(T, S, 2)`` have the samples of a reference pixel."""
     (down, row), (across, column) = (np.unique(baselines[..., axis], return_inverse=True) for axis in (0, 1))

@@ -31,7 +31,7 @@ from sepi.matching.gaps import GapParameters, with_open_gaps
 from sepi.matching.nearest_surfaces import EMPTY, nearest_surfaces, z_buffers
 from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.semi_global import CostVolumes, SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
-from sepi.matching.sweep_arrays import RobustCost, Visibility, sampled_candidates
+from sepi.matching.sweep_arrays import Visibility, sampled_candidates
 from sepi.matching.view_subsets import spread_views
 from sepi.stage import Needs, Progress
 
@@ -291,12 +291,12 @@ def _add_costs(
     if mean is not None:
         views = compared_with(views, mean, parameters, band.rows)
     visibility = _visibility(light_field, present, disparity, parameters, band)
-    scales2 = [views.squared_scale(s) for s in (parameters.colour_scale, parameters.detail_scale)]
-    robust = RobustCost(np.array(scales2, np.float32), parameters.shares)
+    scales = parameters.colour_scale, parameters.detail_scale
+    scales2 = np.array([views.squared_scale(scale) for scale in scales], np.float32)
     candidates = sampled_candidates(disparities, light_field.baselines)
     for begin in range(band.begin, band.end, ROWS_PER_REPORT):
         end = min(band.end, begin + ROWS_PER_REPORT)
-        kernels.sweep_visible_rows(views, visibility, robust, candidates, begin, end, cost)
+        kernels.sweep_visible_rows(views, visibility, scales2, parameters.shares, candidates, begin, end, cost)
         done(end)
 
 

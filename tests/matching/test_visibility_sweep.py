@@ -9,7 +9,7 @@ from sepi.kernels import LANES, semi_global, visibility
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.nearest_surfaces import EMPTY, z_buffers
-from sepi.matching.sweep_arrays import RobustCost, Visibility, sampled_candidates
+from sepi.matching.sweep_arrays import Visibility, sampled_candidates
 from sepi.matching.view_subsets import spread_views
 from sepi.matching.visibility_sweep import (
     FirstDepthParameters,
@@ -69,7 +69,7 @@ def test_all_maps_but_the_last_compare_few_views(monkeypatch) -> None:
     monkeypatch.setattr(
         visibility,
         "sweep_visible_rows",
-        lambda views, _visibility, _robust, candidates, *others: (
+        lambda views, _visibility, _scales2, _shares, candidates, *others: (
             compared.append((int(views.present.sum()), candidates.disparities.size)) or others[-1].fill(0)
         ),
     )
@@ -154,7 +154,7 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool, geo
     cost = np.empty((7, 11, 13), np.float32)
     seen = Visibility(nearest, np.float32(0.1), np.float32(0.05))
     candidates = sampled_candidates(disparities, light_field.baselines)
-    visibility.sweep_visible_rows(views, seen, RobustCost(scales, shares), candidates, 0, 11, cost)
+    visibility.sweep_visible_rows(views, seen, scales, shares, candidates, 0, 11, cost)
     expected = sweep_twin(
         light_field, views, nearest if visible else None, disparities, np.float32(0.1), 0.05, scales, shares
     )

@@ -213,15 +213,18 @@ void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const f
         });
 }
 
-template <bool EVIDENCE>
-void add_equations(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin,
-                   Index end, Array<float, 3> out) {
+// Sums of each pixel, into out (2 or 14, H, W): gradient and curvature, whose ratio is the update towards less cost. And what
+// else the views say, if it is asked: the same by the views to the left, to the right, above and below alone, misfit,
+// agreement, detail's agreement and number of views.
+void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin,
+                        Index end, Array<float, 3> out) {
     // slope and curvature, of colours and of detail; and what else is asked
     struct Equations : Pixels {
         Four down, across;  // derivatives of what pixels are compared with
         Four sums;
-        std::array<Float8, EVIDENCE ? 12 : 0> evidence;
+        Float8 evidence[12];
     };
+    const Index asked = out.shape[0] - 2;
     const float colours = views.shares(0) / views.scales2(0), detail = views.shares(1) / views.scales2(1);
     const auto both = [=](const Four &of) { return std::array{colours * of[0] + detail * of[2], colours * of[1] + detail * of[3]}; };
     over_views<Equations>(
@@ -241,7 +244,7 @@ void add_equations(const SplineViews &views, const Seeing &seeing, Array<const f
             const Float8 detail_weight = seen * (3.0f * robust_weight(3.0f * r[3] * r[3], views.scales2(1)));
             const Four terms{weight * dot(r, g), weight * dot(g, g), detail_weight * r[3] * g[3], detail_weight * g[3] * g[3]};
             for (Index k = 0; k < 4; ++k) pixels.sums[k] += terms[k];
-            if constexpr (EVIDENCE) {
+            if (asked > 0) {
                 const auto of_view = both(terms);
                 const bool belongs[] = {view.across < 0, view.across > 0, view.down < 0, view.down > 0};
                 const Four rest{weight * squared, weight, detail_weight / 3.0f, seen};
@@ -254,16 +257,8 @@ void add_equations(const SplineViews &views, const Seeing &seeing, Array<const f
         [&](const Equations &pixels, Index y, Index x, Index count) {
             const auto sums = both(pixels.sums);
             for (Index k = 0; k < 2; ++k) store_first(out.at(k, y, x), sums[k], count);
-            for (std::size_t k = 0; k < pixels.evidence.size(); ++k) store_first(out.at(2 + k, y, x), pixels.evidence[k], count);
+            for (Index k = 0; k < asked; ++k) store_first(out.at(2 + k, y, x), pixels.evidence[k], count);
         });
-}
-
-// Sums of each pixel, into out (2 or 14, H, W): gradient and curvature, whose ratio is the update towards less cost. And what
-// else the views say, if it is asked: the same by the views to the left, to the right, above and below alone, misfit,
-// agreement, detail's agreement and number of views.
-void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin,
-                        Index end, Array<float, 3> out) {
-    (out.shape[0] > 2 ? add_equations<true> : add_equations<false>)(views, seeing, disparity, image, begin, end, out);
 }
 
 const Submodule submodule("gauss_newton", [](nb::module_ &m) {

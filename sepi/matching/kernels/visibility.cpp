@@ -36,13 +36,6 @@ struct Visibility {
     auto fields() { return std::tie(nearest, occlusion_margin, occluded_view_weight); }
 };
 
-// Square of the robust scale, and share in the cost, of colours and of detail.
-struct RobustCost {
-    Array<const float, 1> scales2, shares;
-
-    auto fields() { return std::tie(scales2, shares); }
-};
-
 constexpr float ROUNDING = 1.0f / 512;  // how far a position is from the same in single precision, at most, pixels
 constexpr float COLOUR_STEPS = 20000;   // from black to white, of colours as whole numbers of 16 bits
 constexpr std::int64_t ONE = 1 << 14;   // the sum of a sample's weights, which are whole numbers of 16 bits
@@ -73,15 +66,15 @@ void add_row(const float *row, Index W, Index y, double down, double across, Arr
 struct VisibleRow {
     const BaseDetail &views;
     const Visibility &visibility;
-    const RobustCost &robust;
+    const Array<const float, 1> scales2, shares;
     const Candidates &candidates;
     const Array<float, 3> cost;
 
     const Index K = cost.shape[0], H = cost.shape[1], W = cost.shape[2], width = W + LANES;
     // in steps of the whole numbers; the detail counts as three equal channels
     const double colour_steps = double(COLOUR_STEPS) * ONE, detail_steps = ONE / double(views.detail_unit);
-    const float colour_scale2 = float(robust.scales2(0) * (colour_steps * colour_steps));
-    const float detail_scale2 = float(robust.scales2(1) * (detail_steps * detail_steps) / 3);
+    const float colour_scale2 = float(scales2(0) * (colour_steps * colour_steps));
+    const float detail_scale2 = float(scales2(1) * (detail_steps * detail_steps) / 3);
     // of the rows of the view; where there is no detail it is 0, and fits
     const Scratch<std::int32_t, 3> view_pairs = zeros<std::int32_t, 3>(height(), 4, width);
     const Scratch<float, 2> own = zeros<float, 2>(4, width);
@@ -131,7 +124,7 @@ struct VisibleRow {
         const auto nearest = visibility.nearest[t][s];
         const bool some_hide = nearest.shape[1] > 0;
         const Float8 hidden = spread(visibility.occluded_view_weight);
-        const std::array scale2{colour_scale2, detail_scale2}, share{robust.shares(0), robust.shares(1)};
+        const std::array scale2{colour_scale2, detail_scale2}, share{shares(0), shares(1)};
         for (Index k = 0; k < K; ++k) {
             const auto [top, fy] = upper_row(y, candidates.down(r, k), candidates.fy(r, k), H);
             const Index left = candidates.across(c, k);
@@ -224,10 +217,11 @@ void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &vie
 }
 
 // Cost of every candidate for rows begin..end, into cost (K, H, W), over the views in which nothing nearer occludes the
-// pixel: 0..1; 1 where no view is left.
-void sweep_visible_rows(const BaseDetail &views, const Visibility &visibility, const RobustCost &robust, const Candidates &candidates,
-                        Index begin, Index end, Array<float, 3> cost) {
-    parallel_for(begin, end, [&](Index y) { VisibleRow{views, visibility, robust, candidates, cost}.sweep(y); });
+// pixel: 0..1; 1 where no view is left. scales2 (2,) and shares (2,) are the square of the robust scale, and the share in
+// the cost, of colours and of detail.
+void sweep_visible_rows(const BaseDetail &views, const Visibility &visibility, Array<const float, 1> scales2, Array<const float, 1> shares,
+                        const Candidates &candidates, Index begin, Index end, Array<float, 3> cost) {
+    parallel_for(begin, end, [&](Index y) { VisibleRow{views, visibility, scales2, shares, candidates, cost}.sweep(y); });
 }
 
 const Submodule submodule("visibility", [](nb::module_ &m) {
@@ -235,8 +229,8 @@ const Submodule submodule("visibility", [](nb::module_ &m) {
     m.attr("MISSING") = MISSING;
     m.def("z_buffers", &z_buffers, Unlocked(), "disparity"_a, "present"_a, "baselines"_a, "low"_a, "high"_a, "out"_a);
     m.def("occluded_in_any_view", &occluded_in_any_view, Unlocked(), "disparity"_a, "views"_a, "begin"_a, "end"_a, "out"_a);
-    m.def("sweep_visible_rows", &sweep_visible_rows, Unlocked(), "views"_a, "visibility"_a, "robust"_a, "candidates"_a, "begin"_a, "end"_a,
-          "cost"_a);
+    m.def("sweep_visible_rows", &sweep_visible_rows, Unlocked(), "views"_a, "visibility"_a, "scales2"_a, "shares"_a, "candidates"_a,
+          "begin"_a, "end"_a, "cost"_a);
 });
 
 }  // namespace
