@@ -13,14 +13,11 @@ void add_normal_equations(Array<const std::int64_t, 1> labels, Array<const doubl
         const double w = weight(i), d = disparity(i), *own = design.at(i);
         double *matrix = left.at(labels(i)), *side = right.at(labels(i));
         for (Index p = 0; p < 3; ++p) {
-            const double weighted = own[p] * w;
-            side[p] += weighted * d;
-            for (Index q = p; q < 3; ++q) matrix[3 * p + q] += weighted * own[q];
+            side[p] += own[p] * w * d;
+            // rounded alike on both sides of the diagonal
+            for (Index q = 0; q < 3; ++q) matrix[3 * p + q] += own[std::min(p, q)] * w * own[std::max(p, q)];
         }
     }
-    for (Index label = 0; label < right.shape[0]; ++label)
-        for (Index p = 0; p < 3; ++p)
-            for (Index q = 0; q < p; ++q) left(label, p, q) = left(label, q, p);
 }
 
 // Disparity of every pixel by the plane of its superpixel, out (H W); planes (N, 3).
