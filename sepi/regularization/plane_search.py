@@ -14,6 +14,7 @@ from sepi.lightfield import BoolMap, FloatMap
 from sepi.regularization.regions import Plane, basis_of
 
 _PIXELS_OF_A_PLANE = 12  # least to fit one to
+_AT_ONCE = 50  # planes
 
 _Doubles = npt.NDArray[np.float64]
 
@@ -41,9 +42,13 @@ def support(
     positions: _Doubles, values: _Doubles, planes: _Doubles, tolerance: float, behind_penalty: float
 ) -> _Doubles:
     """How many of N pixels agree with each of P planes, less a weight for each that lies behind it; (P,)."""
-    residuals = residuals_of(positions, values, planes)
-    agreeing, behind = abs(residuals) < tolerance, residuals < -tolerance
-    return np.asarray(np.count_nonzero(agreeing, axis=1) - behind_penalty * np.count_nonzero(behind, axis=1))
+    found = np.empty(len(planes))
+    # a few planes at a time, whose residuals stay in the cache
+    for begin in range(0, len(planes), _AT_ONCE):
+        residuals = residuals_of(positions, values, planes[begin : begin + _AT_ONCE])
+        agreeing = np.count_nonzero(abs(residuals) < tolerance, axis=1)
+        found[begin : begin + _AT_ONCE] = agreeing - behind_penalty * np.count_nonzero(residuals < -tolerance, axis=1)
+    return found
 
 
 def fitted(positions: _Doubles, values: _Doubles, plane: Plane, tolerance: float) -> Plane:
