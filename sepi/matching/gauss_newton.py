@@ -100,12 +100,12 @@ class GaussNewton(AlignedViews):
         gradient, curvature, *rest = sums = self._sums(14, disparity, mean, *spline_derivatives(mean))
         return gradient, curvature, Evidence(sums[2:10].reshape(4, 2, *disparity.shape), *rest[8:])
 
-    def _sums(self, number: int, disparity: FloatMap, *image: FloatMap) -> FloatMap:
+    def _sums(self, number: int, disparity: FloatMap, mean: FloatMap, down: FloatMap, across: FloatMap) -> FloatMap:
         """The first sums of ``kernels/gauss_newton.cpp``, with a mean and its derivatives."""
         sums = np.empty((number, *disparity.shape), np.float32)
 
         def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
-            kernels.equations_of_views(views, seeing, disparity, image, band.begin, band.end, sums)
+            kernels.equations_of_views(views, seeing, disparity, mean, down, across, band.begin, band.end, sums)
 
         self.in_bands(disparity, add)
         return sums

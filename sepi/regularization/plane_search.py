@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import planes as kernels
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.regularization.regions import Plane, basis_of
 
 _PIXELS_OF_A_PLANE = 12  # least to fit one to
-_AT_ONCE = 50  # planes
 
 _Doubles = npt.NDArray[np.float64]
 
@@ -42,12 +42,9 @@ def support(
     positions: _Doubles, values: _Doubles, planes: _Doubles, tolerance: float, behind_penalty: float
 ) -> _Doubles:
     """How many of N pixels agree with each of P planes, less a weight for each that lies behind it; (P,)."""
+    places, levels, tried = (np.ascontiguousarray(each) for each in (positions.T, values, planes))
     found = np.empty(len(planes))
-    # a few planes at a time, whose residuals stay in the cache
-    for begin in range(0, len(planes), _AT_ONCE):
-        residuals = residuals_of(positions, values, planes[begin : begin + _AT_ONCE])
-        agreeing = np.count_nonzero(abs(residuals) < tolerance, axis=1)
-        found[begin : begin + _AT_ONCE] = agreeing - behind_penalty * np.count_nonzero(residuals < -tolerance, axis=1)
+    kernels.support_of(places, levels, tried, tolerance, behind_penalty, found)
     return found
 
 

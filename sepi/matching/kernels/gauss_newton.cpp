@@ -34,13 +34,6 @@ struct Seeing {
     auto fields() { return std::tie(nearest, occlusion_margin); }
 };
 
-// Mean of the views and its derivatives along y and x, (H, W, 4).
-struct MeanView {
-    Array<const float, 3> mean, down, across;
-
-    auto fields() { return std::tie(mean, down, across); }
-};
-
 using Four = std::array<Float8, 4>;
 
 constexpr std::int32_t ONE = 1 << 15;  // the sum of the weights of coefficients, along either axis
@@ -215,9 +208,9 @@ void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const f
 
 // Sums of each pixel, into out (2 or 14, H, W): gradient and curvature, whose ratio is the update towards less cost. And what
 // else the views say, if it is asked: the same by the views to the left, to the right, above and below alone, misfit,
-// agreement, detail's agreement and number of views.
-void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin,
-                        Index end, Array<float, 3> out) {
+// agreement, detail's agreement and number of views. mean (H, W, 4) is that of the views, down and across its derivatives.
+void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Array<const float, 3> mean,
+                        Array<const float, 3> down, Array<const float, 3> across, Index begin, Index end, Array<float, 3> out) {
     // slope and curvature, of colours and of detail; and what else is asked
     struct Equations : Pixels {
         Four down, across;  // derivatives of what pixels are compared with
@@ -230,9 +223,9 @@ void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<co
     over_views<Equations>(
         views, seeing, disparity, begin, end,
         [&](Equations &pixels, Index y, Index x, Index count) {
-            pixels.own = load_channels(image.mean, y, x, count);
-            pixels.down = load_channels(image.down, y, x, count);
-            pixels.across = load_channels(image.across, y, x, count);
+            pixels.own = load_channels(mean, y, x, count);
+            pixels.down = load_channels(down, y, x, count);
+            pixels.across = load_channels(across, y, x, count);
         },
         [&](Equations &pixels, const View &view, Float8 seen, const Four &channels) {
             Four r, g;
@@ -264,8 +257,8 @@ void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<co
 const Submodule submodule("gauss_newton", [](nb::module_ &m) {
     m.attr("AT_ONCE") = AT_ONCE;
     m.def("mean_of_views", &mean_of_views, Unlocked(), "views"_a, "seeing"_a, "disparity"_a, "begin"_a, "end"_a, "out"_a);
-    m.def("equations_of_views", &equations_of_views, Unlocked(), "views"_a, "seeing"_a, "disparity"_a, "image"_a, "begin"_a, "end"_a,
-          "out"_a);
+    m.def("equations_of_views", &equations_of_views, Unlocked(), "views"_a, "seeing"_a, "disparity"_a, "mean"_a, "down"_a, "across"_a,
+          "begin"_a, "end"_a, "out"_a);
 });
 
 }  // namespace

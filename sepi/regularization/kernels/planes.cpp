@@ -1,4 +1,7 @@
-// Planes of superpixels. labels (H W) say whose a pixel is, design (H W, 3) is each plane parameter's value there.
+// Planes of superpixels, and of the borders of regions. labels (H W) say whose a pixel is, design (H W, 3) is each plane
+// parameter's value there.
+#include <cmath>
+
 #include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
@@ -29,7 +32,26 @@ void values_of_planes(Array<const std::int64_t, 1> labels, Array<const double, 2
     });
 }
 
+// How many pixels agree with each of planes (P, 3), less behind_penalty for each that lies behind it, out (P);
+// positions (3, N) are 1, x and y of pixels, values (N) their disparities.
+void support_of(Array<const double, 2> positions, Array<const double, 1> values, Array<const double, 2> planes, double tolerance,
+                double behind_penalty, Array<double, 1> out) {
+    const double *x = positions.at(1), *y = positions.at(2), *value = values.data;
+    parallel_for(0, planes.shape[0], [&](Index p) {
+        const double a = planes(p, 0), b = planes(p, 1), c = planes(p, 2);
+        Index agreeing = 0, behind = 0;
+        for (Index i = 0; i < values.shape[0]; ++i) {
+            // as residuals of single planes are rounded
+            const double residual = value[i] - (a + b * x[i] + c * y[i]);
+            agreeing += std::abs(residual) < tolerance;
+            behind += residual < -tolerance;
+        }
+        out(p) = double(agreeing) - behind_penalty * double(behind);
+    });
+}
+
 const Submodule submodule("planes", [](nb::module_ &m) {
+    m.def("support_of", &support_of, Unlocked(), "positions"_a, "values"_a, "planes"_a, "tolerance"_a, "behind_penalty"_a, "out"_a);
     m.def("add_normal_equations", &add_normal_equations, Unlocked(), "labels"_a, "design"_a, "weight"_a, "disparity"_a, "left"_a,
           "right"_a);
     m.def("values_of_planes", &values_of_planes, Unlocked(), "labels"_a, "design"_a, "planes"_a, "out"_a);
