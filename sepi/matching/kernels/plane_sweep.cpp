@@ -34,17 +34,6 @@ struct Tile {
     Index top, bottom, begin, end;
 };
 
-// Columns of a run whose samples, below row top and left columns on, are in shown (H or 0, 2).
-std::array<Index, 2> seen_run(Array<const std::int64_t, 2> shown, Index W, Run run, Index top, Index left, float fx) {
-    Index low = 0, high = W;
-    if (shown.shape[0] > 0) {
-        low = std::max(shown(top, 0), shown(top + 1, 0));
-        high = std::min(shown(top, 1), shown(top + 1, 1));
-    }
-    // on the last column nothing beyond it has a weight
-    return {std::max(run.begin, low - left), std::min(run.end, (fx == 0 ? high : high - 1) - left)};
-}
-
 // Fractional pixels from the pixel above and to the left to the sample at the origin, and by how many pixels the sample
 // moves as the disparity rises by one.
 struct Motion {
@@ -97,8 +86,8 @@ struct ComparedView {
     std::vector<Segment> segments;
     std::vector<float> distances;  // of each candidate from the origin of its segment
 
-    ComparedView(const Candidates &candidates, Index t, Index s) : t(t), s(s), distances(candidates.number()) {
-        const Index r = candidates.row(t, s), c = candidates.column(t, s), K = candidates.number();
+    ComparedView(const Candidates &candidates, Index t, Index s) : t(t), s(s), distances(candidates.disparities.shape[0]) {
+        const Index r = candidates.row(t, s), c = candidates.column(t, s), K = candidates.disparities.shape[0];
         const auto *down = candidates.down.at(r), *across = candidates.across.at(c);
         const float *fy = candidates.fy.at(r), *fx = candidates.fx.at(c), *disparities = candidates.disparities.data;
         const auto as_before = [=](Index k) {
@@ -152,7 +141,7 @@ struct TileSweep {
     const Index H = mask.shape[0], W = mask.shape[1];
     // where a view may show less than the picture, all pixels are as those near its border
     const Index border = views.shown.shape[2] > 0 ? H + W : Index(std::ceil(candidates.reach)) + window.radius + 1;
-    const Index padded = (candidates.number() + LANES - 1) / LANES * LANES, size = 2 * window.radius + 1;
+    const Index padded = (candidates.disparities.shape[0] + LANES - 1) / LANES * LANES, size = 2 * window.radius + 1;
     // with the columns of the windows at both ends
     const Index columns = width + 2 * window.radius + LANES, parts = (Index(compared.groups.size()) * padded + AT_ONCE - 1) / AT_ONCE;
     // rows of a window: row r at r % size, column x - radius of the tile at x; what is outside the picture is a number
@@ -271,7 +260,11 @@ struct TileSweep {
         for (const auto &[begin, end, down, left, motion] : view.segments) {
             const auto [top, below] = upper_row(run.y, down, motion.fy, H);
             if (top < 0 || top > H - 2) continue;
-            const auto [first, last] = seen_run(shown, W, run, top, left, motion.fx);
+            // columns of the run whose samples are shown; on the last column nothing beyond it has a weight
+            const bool all = shown.shape[0] == 0;
+            const Index low = all ? 0 : std::max(shown(top, 0), shown(top + 1, 0));
+            const Index high = all ? W : std::min(shown(top, 1), shown(top + 1, 1));
+            const Index first = std::max(run.begin, low - left), last = std::min(run.end, (motion.fx == 0 ? high : high - 1) - left);
             const Motion at{below, motion.fx, motion.sy, motion.sx};
             const auto squares_of = [&](Index x) {
                 SquaredDifferences squares;

@@ -70,13 +70,6 @@ struct Smoothing {
     }
 };
 
-// Number of the least cost of K', of the first of equal ones.
-Index first_least(const float *costs, Index K) {
-    Float8 least = load(costs);
-    for (Index k = LANES; k < K; k += LANES) least = smaller(load(costs + k), least);
-    return std::find(costs, costs + K - 1, least_of(least)) - costs;
-}
-
 // By how much the least cost of other candidates exceeds that of those that belong to the winner's minimum; 0 where
 // there is no other.
 float margin_of(const float *costs, Index K, const float *disparities, float found, Index best, float same) {
@@ -168,7 +161,10 @@ void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Arra
     const double spacing = double(disparities(K - 1) - disparities(0)) / double(K - 1);
     parallel_for_pixels(disparity.shape[0], disparity.shape[1], [&](Index y, Index x) {
         const float *costs = smoothed.at(y, x);
-        const Index best = first_least(costs, padded);
+        // the first of equal ones
+        Float8 least = load(costs);
+        for (Index k = LANES; k < padded; k += LANES) least = smaller(load(costs + k), least);
+        const Index best = std::find(costs, costs + padded - 1, least_of(least)) - costs;
         const double offset = 0 < best && best < K - 1 ? vertex(costs + best, 1e-9) : 0;
         const float found = float(disparities(best) + offset * spacing);
         disparity(y, x) = found;

@@ -33,8 +33,6 @@ struct Candidates {
     double reach;
 
     auto fields() { return std::tie(disparities, row, column, down, fy, across, fx, sy, sx, reach); }
-
-    Index number() const { return disparities.shape[0]; }
 };
 
 // Aggregation window: 2 radius + 1 pixels wide, its weights narrow in colour.

@@ -7,10 +7,8 @@
 namespace sepi {
 namespace {
 
-// Width of a block, pixels.
-constexpr Index BLOCK = 8;
-
-static_assert(BLOCK == LANES);
+// Width of a block, pixels: a vector of them.
+constexpr Index BLOCK = LANES;
 
 float in_order(Float8 lanes) {
     float sum = 0;
