@@ -54,7 +54,6 @@ from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.compared.guided_filter import GuidedFilter
 from sepi.compared.message_passing import labels_of_least_energy
 from sepi.compared.weighted_median import weighted_median
-from sepi.kernels import acc as kernels
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, require_costs
@@ -166,7 +165,6 @@ def phase_shift_costs(
     ndarray, shape (K, H, W), float32
         0..1.
     """
-    share, colour, gradient = parameters.colour_share, parameters.colour_truncation, parameters.gradient_truncation
     reference = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     others = light_field.present.copy()
     others[light_field.reference_position] = False
@@ -177,11 +175,30 @@ def phase_shift_costs(
         view = PhaseShift(as_unit_float(light_field.rgb_views[t, s].transpose(2, 0, 1)), farthest)
         for begin in range(0, len(disparities), _AT_ONCE):
             part = slice(begin, begin + _AT_ONCE)
-            moved = view.by(-disparities[part, None] * baseline)
-            kernels.add_differences(moved, reference, across_share(baseline), share, colour, gradient, costs[part])
+            for cost, moved in zip(costs[part], view.by(-disparities[part, None] * baseline), strict=True):
+                cost += truncated_difference(moved, reference, across_share(baseline), parameters)
         progress(0.9 * (n + 1) / others.sum())
-    costs /= np.float32(others.sum() * (share * colour + (1 - share) * gradient))
+    share, truncation = parameters.colour_share, parameters.colour_truncation
+    costs /= np.float32(others.sum() * (share * truncation + (1 - share) * parameters.gradient_truncation))
     return costs
+
+
+def truncated_difference(
+    moved: FloatMap, reference: FloatMap, across_share: float, parameters: AccParameters
+) -> FloatMap:
+    """Truncated differences of a view's colours and gradients, (3, H or more, W or more), from (3, H, W); (H, W)."""
+    height, width = reference.shape[1:]
+    colour, across, down = np.zeros((3, height, width), np.float32)
+    for here, own in zip(moved, reference, strict=True):
+        residual = here[:height, :width] - own
+        colour += np.abs(residual)
+        # central differences, twice as large
+        across += np.abs(cv2.Sobel(residual, -1, 1, 0, ksize=1, borderType=cv2.BORDER_REPLICATE))
+        down += np.abs(cv2.Sobel(residual, -1, 0, 1, ksize=1, borderType=cv2.BORDER_REPLICATE))
+    gradients = across_share * np.minimum(across / 6, parameters.gradient_truncation)
+    gradients += (1 - across_share) * np.minimum(down / 6, parameters.gradient_truncation)
+    colours = np.minimum(colour / 3, parameters.colour_truncation)
+    return np.asarray(parameters.colour_share * colours + (1 - parameters.colour_share) * gradients, np.float32)
 
 
 def across_share(baseline: npt.NDArray[np.float64]) -> float:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sepi.kernels import acc as kernels
 from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap
 
@@ -54,8 +53,7 @@ class PhaseShift:
         from scipy import fft
 
         rows, columns = (_phases(length, offsets[:, axis]) for axis, length in enumerate(self._size))
-        turned = np.empty((len(offsets), *self._spectrum.shape), np.complex64)
-        kernels.turn_phases(self._spectrum, rows, columns, turned)
+        turned = self._spectrum * (rows[:, None, :, None] * columns[:, None, None, : self._spectrum.shape[2]])
         moved = fft.irfft2(turned, s=self._size, overwrite_x=True, workers=thread_count())
         return np.asarray(moved, np.float32)
 

@@ -55,10 +55,10 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
+from sepi.compared.colour_differences import colour_differences
 from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.compared.guided_costs import GuidedCostsParameters, guided_costs
 from sepi.compared.weighted_median import weighted_median
-from sepi.kernels import oavc as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
@@ -66,6 +66,10 @@ from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps
 
 CANDIDATES = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=10**9)
 """As many as fit a gigabyte at most, since the cost volume is kept."""
+
+
+_ROWS = 64
+"""Of the views that are looked at together: the differences of all of them are kept."""
 
 
 class OavcParameters(CandidateParameters):
@@ -143,9 +147,33 @@ def vote_thresholds(
     needed = max(1, math.ceil(parameters.agreeing_share * (len(views.positions) - 1)))
     thresholds = np.full(shape, np.inf, np.float32)
     for k, sheared in views.over(disparities):
-        kernels.lower_thresholds(sheared, views.reference, needed, thresholds)
+        lower_thresholds(sheared, views.reference, needed, thresholds)
         progress((k + 1) / len(disparities))
     return np.maximum(thresholds, np.float32(parameters.least_threshold))
+
+
+def lower_thresholds(sheared: FloatMap, reference: int, needed: int, thresholds: FloatMap) -> None:
+    """Lower thresholds (H, W) to those by which so many other views (N, 3, H, W) as needed agree with one of them."""
+    for top in range(0, len(thresholds), _ROWS):
+        rows = slice(top, top + _ROWS)
+        # the view agrees with itself, too
+        found = np.stack(list(colour_differences(sheared[:, :, rows], sheared[reference, :, rows])))
+        # few pixels: the thresholds soon are as low as most candidates leave them
+        lower = np.count_nonzero(found < thresholds[rows], axis=0) > needed
+        thresholds[rows][lower] = np.partition(found[:, lower], needed, axis=0)[needed]
+
+
+def vote_costs(sheared: FloatMap, reference: int, thresholds: FloatMap) -> FloatMap:
+    """What a candidate costs each pixel, ``1 - (V - M) / (N - 1)``, by the views (N, 3, H, W) sheared by it; (H, W)."""
+    number, total = np.zeros((2, *thresholds.shape), np.float32)
+    for difference in colour_differences(sheared, sheared[reference]):
+        agrees = difference <= thresholds
+        number += agrees
+        total += difference * agrees
+    # the view itself has no vote
+    number -= 1
+    mean = total / (np.maximum(number, 1) * thresholds)
+    return np.asarray(1 - (number - mean) / (len(sheared) - 1), np.float32)
 
 
 def votes(views: ShearedViews, disparities: FloatMap, thresholds: FloatMap, progress: Progress) -> CostVolume:
@@ -166,10 +194,8 @@ def votes(views: ShearedViews, disparities: FloatMap, thresholds: FloatMap, prog
     CostVolume
     """
     costs = np.empty((len(disparities), *thresholds.shape), np.float16)
-    of_one = np.empty(thresholds.shape, np.float32)
     for k, sheared in views.over(disparities):
-        kernels.vote_costs(sheared, views.reference, thresholds, of_one)
-        costs[k] = of_one
+        costs[k] = vote_costs(sheared, views.reference, thresholds)
         progress((k + 1) / len(disparities))
     return CostVolume(disparities, costs)
 

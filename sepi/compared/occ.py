@@ -65,7 +65,7 @@ from sepi.compared.message_passing import labels_of_least_energy
 from sepi.compared.occ_patches import Edges, colours_beside, edges_to_split, halves_of_views
 from sepi.image.edges import CannyParameters
 from sepi.kernels import occ as kernels
-from sepi.lightfield import FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, require_previous
@@ -153,7 +153,7 @@ def occ(
     reference = _channels_first(light_field.reference_view)
     costs = np.empty((len(disparities), *light_field.shape), np.float32)
     for k, sheared in ShearedViews(light_field).over(disparities):
-        kernels.whole_patch_costs(sheared, reference, costs[k])
+        costs[k] = whole_patch_costs(sheared, reference)
         progress((k + 1) / len(disparities))
     return StageMaps(*least_cost(disparities, costs))
 
@@ -269,14 +269,41 @@ def split_costs(
     beside = colours_beside(light_field.reference_view, edges, max(1, round(light_field.reach)))
     halves = halves_of_views(views.baselines)
     costs = np.empty((len(disparities), len(edges.places)), np.float32)
-    cues, of_candidate = (np.zeros((len(edges.places), 3), np.float32) for _ in range(2))
+    cues = np.zeros((len(edges.places), 3), np.float32)
     least = np.full(len(edges.places), np.inf, np.float32)
     for k, sheared in views.over(disparities):
-        kernels.split_patch_costs(sheared, reference, edges.places, halves, beside, tolerance, costs[k], of_candidate)
+        costs[k], of_candidate = split_patch_costs(sheared, reference, edges, halves, beside, tolerance)
         better = costs[k] < least
         least[better], cues[better] = costs[k][better], of_candidate[better]
         progress((k + 1) / len(disparities))
     return costs, cues
+
+
+def whole_patch_costs(sheared: FloatMap, reference: FloatMap) -> FloatMap:
+    """Variance of angular patches (N, 3, H, W), and how far their mean lies from a view (3, H, W); (H, W), float32."""
+    total, squares = np.zeros((2, *reference.shape), np.float32)
+    for view in sheared:
+        # counted from the reference's colour, so that the squares keep their digits
+        difference = view - reference
+        total += difference
+        squares += np.square(difference)
+    mean = total / np.float32(len(sheared))
+    variance = np.maximum((squares - total * mean).mean(axis=0), 0) / np.float32(max(1, len(sheared) - 1))
+    return np.asarray(variance + np.square(mean).mean(axis=0))
+
+
+def split_patch_costs(
+    sheared: FloatMap, reference: FloatMap, edges: Edges, halves: BoolMap, beside: FloatMap, tolerance: float
+) -> tuple[FloatMap, FloatMap]:
+    """Costs (P,) and cues (P, 3) of one candidate, as of :func:`split_costs`, by its sheared views (N, 3, H, W)."""
+    count = len(edges.places)
+    means, variances = np.empty((count, 2, 3), np.float32), np.empty((count, 2), np.float32)
+    kernels.moments_of_halves(sheared, reference, edges.places, halves, means, variances)
+    colours = means + reference[:, edges.places[:, 0], edges.places[:, 1]].T[:, None]
+    as_they_are, changed = (np.abs(sides - beside).mean(axis=2).sum(axis=1) for sides in (colours, colours[:, ::-1]))
+    costs = np.where(variances[:, 0] <= variances[:, 1], *(variances + np.square(means).mean(axis=2)).T)
+    apart = np.abs(means[:, 0] - means[:, 1]).mean(axis=1)
+    return np.where(as_they_are <= changed + tolerance, costs, np.inf), np.column_stack([variances, apart])
 
 
 def slope(disparity: FloatMap) -> FloatMap:

@@ -53,11 +53,11 @@ import cv2
 import numpy as np
 from pydantic import Field
 
+from sepi.compared.colour_differences import colour_differences
 from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.compared.guided_filter import GuidedFilter
 from sepi.image.noise import noise_level
 from sepi.image.superpixels import Superpixels, superpixels
-from sepi.kernels import pobr as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
@@ -138,14 +138,20 @@ def pobr_cost(
     views = ShearedViews(light_field)
     smooth = GuidedFilter(light_field.reference_view, parameters.radius, parameters.epsilon)
     costs = np.empty((len(disparities), *light_field.shape), np.float16)
-    difference = np.empty(light_field.shape, np.float32)
     for k, sheared in views.over(disparities):
-        kernels.mean_truncated_differences(sheared, views.reference, parameters.truncation, difference)
-        costs[k] = smooth(difference)
+        costs[k] = smooth(photo_consistency(sheared, views.reference, parameters.truncation))
         progress((k + 1) / len(disparities))
     volume = CostVolume(disparities, costs)
     labels = least_costs(volume)
     return StageMaps(disparity_of(volume, labels), distinctness(volume, labels))
+
+
+def photo_consistency(sheared: FloatMap, reference: int, truncation: float) -> FloatMap:
+    """Mean truncated difference of views (N, 3, H, W) from one of them, in parts of the truncation; (H, W), 0..1."""
+    total = np.zeros(sheared.shape[2:], np.float32)
+    for difference in colour_differences(sheared, sheared[reference]):
+        total += np.minimum(difference, truncation)
+    return total / np.float32(truncation * (len(sheared) - 1))
 
 
 def pobr_regions(

@@ -9,12 +9,17 @@ from geometries import GEOMETRIES, standing
 from several_threads import SEVERAL, threads
 
 from sepi.compared import acc
-from sepi.compared.acc import AccParameters, ConfidentLabelsParameters, confident_labels, phase_shift_costs
+from sepi.compared.acc import (
+    AccParameters,
+    ConfidentLabelsParameters,
+    confident_labels,
+    phase_shift_costs,
+    truncated_difference,
+)
 from sepi.compared.acc_features import agreed, features_of, matched_disparities, mutual_matches
 from sepi.compared.acc_phase_shift import PhaseShift
 from sepi.compared.cost_volumes import disparity_of, least_costs
 from sepi.compared.guided_filter import GuidedFilter
-from sepi.kernels import acc as kernels
 from sepi.lightfield import DisparityRange, LightField
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
@@ -82,21 +87,14 @@ def differences_twin(moved: np.ndarray, reference: np.ndarray, across: float, sh
     return np.asarray(share * colour + (1 - share) * gradients)
 
 
-def test_kernels_equal_plain_twins() -> None:
-    """Every cost comes from these loops."""
+def test_differences_equal_plain_twins() -> None:
+    """Every cost comes from them."""
     random = np.random.default_rng(2)
     moved, reference = random.random((4, 3, 14, 19), np.float32), random.random((3, 12, 17), np.float32)
-    out = np.ones((4, 12, 17), np.float32)
-    kernels.add_differences(moved, reference, 0.7, 0.4, 0.3, 0.2, out)
-    for found, one in zip(out, moved, strict=True):
-        np.testing.assert_allclose(found, 1 + differences_twin(one, reference, 0.7, 0.4), rtol=1e-5)
-    spectrum, rows, columns = (
-        (random.random(shape) + 1j * random.random(shape)).astype(np.complex64) for shape in ((3, 5, 4), (2, 5), (2, 7))
-    )
-    turned = np.empty((2, 3, 5, 4), np.complex64)
-    kernels.turn_phases(spectrum, rows, columns, turned)
-    expected = spectrum * rows[:, None, :, None] * columns[:, None, None, :4]
-    np.testing.assert_allclose(turned, expected, rtol=1e-5)
+    chosen = AccParameters(colour_share=0.4, colour_truncation=0.3, gradient_truncation=0.2)
+    for one in moved:
+        found = truncated_difference(one, reference, 0.7, chosen)
+        np.testing.assert_allclose(found, differences_twin(one, reference, 0.7, 0.4), rtol=1e-5)
 
 
 def textured(disparity: float, noise: float, *, rows: int = 5, stripes: bool = False) -> LightField:

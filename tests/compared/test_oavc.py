@@ -1,4 +1,4 @@
-"""The vote cost: what its publication says of it, its compiled loops, and light fields unlike the publication's."""
+"""The vote cost: what its publication says of it, its loops, and light fields unlike the publication's."""
 
 from dataclasses import replace
 from functools import cache
@@ -9,7 +9,7 @@ import pytest
 
 from sepi.compared import oavc
 from sepi.compared.cost_volumes import least_costs
-from sepi.kernels import oavc as kernels
+from sepi.compared.oavc import lower_thresholds, vote_costs
 from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.matching.sheared_views import ShearedViews
 from sepi.pipeline import estimate_depth
@@ -129,7 +129,7 @@ def test_thresholds_are_those_by_which_the_share_agrees(needed: int) -> None:
     thresholds = np.full(first.shape[2:], np.inf, np.float32)
     expected = thresholds.copy()
     for sheared in (first, second):
-        kernels.lower_thresholds(sheared, 2, needed, thresholds)
+        lower_thresholds(sheared, 2, needed, thresholds)
         expected = np.minimum(expected, np.sort(deviations(sheared, 2), axis=0)[needed - 1])
     np.testing.assert_allclose(thresholds, expected, rtol=1e-4, atol=1e-7)
 
@@ -138,8 +138,7 @@ def test_thresholds_are_those_by_which_the_share_agrees(needed: int) -> None:
 def test_costs_are_votes_less_their_mean_difference(threshold: float) -> None:
     """Pixels without a vote, with some and with all."""
     sheared = sheared_example()
-    out = np.empty(sheared.shape[2:], np.float32)
-    kernels.vote_costs(sheared, 2, np.full(out.shape, threshold, np.float32), out)
+    out = vote_costs(sheared, 2, np.full(sheared.shape[2:], threshold, np.float32))
     difference = deviations(sheared, 2) / threshold
     votes = (difference <= 1).sum(axis=0)
     mean = np.where(difference <= 1, difference, 0).sum(axis=0) / np.maximum(votes, 1)
@@ -153,8 +152,7 @@ def test_a_vote_counts_for_more_than_any_mean_difference() -> None:
     sheared = np.zeros((5, 3, 1, 2), np.float32)
     sheared[:, :, 0, 0] = np.array([0.0099, 0.0099, 0, 0.0099, 0.9])[:, None]
     sheared[:, :, 0, 1] = np.array([0, 0, 0, 0.9, 0.9])[:, None]
-    out = np.empty((1, 2), np.float32)
-    kernels.vote_costs(sheared, 2, np.full((1, 2), 0.01, np.float32), out)
+    out = vote_costs(sheared, 2, np.full((1, 2), 0.01, np.float32))
     assert out[0, 1] == pytest.approx(0.5)
     assert out[0, 0] < out[0, 1]
 

@@ -19,9 +19,10 @@ from sepi.compared.occ import (
     occ_split,
     predicted_occlusion,
     smoothness_weights,
+    split_patch_costs,
+    whole_patch_costs,
 )
 from sepi.compared.occ_patches import LEAST_SHARE, ORIENTATIONS, Edges, colours_beside, edges_to_split, halves_of_views
-from sepi.kernels import occ as kernels
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
@@ -155,40 +156,30 @@ def test_reversed_colours_leave_a_candidate_out() -> None:
     halves = np.array([[[True, True, False], [False, True, True]]])
     straight = np.broadcast_to(np.array([[0.3], [0.6]], np.float32), (2, 3))
     for beside, finite in ((straight, True), (straight[::-1], False)):
-        costs, cues = np.empty(1, np.float32), np.empty((1, 3), np.float32)
-        kernels.split_patch_costs(
-            sheared,
-            sheared[1],
-            np.zeros((1, 3), np.int64, order="F"),
-            halves,
-            np.ascontiguousarray(beside[None]),
-            0.02,
-            costs,
-            cues,
+        costs, _ = split_patch_costs(
+            sheared, sheared[1], Edges(halves, np.zeros((1, 3), np.int64, order="F")), halves, beside[None], 0.02
         )
         assert np.isfinite(costs[0]) == finite
 
 
 def test_whole_patch_costs_equal_numpy() -> None:
-    """If this fails, the compiled loop does not compute the stated costs."""
+    """If this fails, the loop over the views does not compute the stated costs."""
     rng = np.random.default_rng(0)
     sheared, reference = rng.random((7, 3, 6, 5), np.float32), rng.random((3, 6, 5), np.float32)
-    out = np.empty((6, 5), np.float32)
-    kernels.whole_patch_costs(sheared, reference, out)
+    out = whole_patch_costs(sheared, reference)
     expected = (sheared.var(axis=0, ddof=1) + (sheared.mean(axis=0) - reference) ** 2).mean(axis=0)
     np.testing.assert_allclose(out, expected, rtol=1e-4, atol=1e-6)
 
 
 def test_split_patch_costs_equal_numpy() -> None:
-    """If this fails, the compiled loop does not compute the stated costs of halves."""
+    """If this fails, the loops over the views do not compute the stated costs of halves."""
     rng = np.random.default_rng(1)
     sheared, reference = rng.random((9, 3, 6, 5), np.float32), rng.random((3, 6, 5), np.float32)
     places = np.array([rng.integers(0, 6, 8), rng.integers(0, 5, 8), rng.integers(0, 3, 8)]).T
     halves = rng.random((3, 2, 9)) < 0.6
     halves[:, :, :2] = True
     beside = rng.random((8, 2, 3), np.float32)
-    costs, cues = np.empty(8, np.float32), np.empty((8, 3), np.float32)
-    kernels.split_patch_costs(sheared, reference, places, halves, beside, 0.02, costs, cues)
+    costs, cues = split_patch_costs(sheared, reference, Edges(halves, places), halves, beside, 0.02)
     for p, (y, x, orientation) in enumerate(places):
         parts = [sheared[halves[orientation, j], :, y, x] for j in (0, 1)]
         means = [part.mean(axis=0) for part in parts]

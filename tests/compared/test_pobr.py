@@ -13,6 +13,7 @@ from sepi.compared.pobr import (
     PobrRegionParameters,
     PobrSmoothingParameters,
     label_deviation,
+    photo_consistency,
     pobr_cost,
     pobr_regions,
     pobr_smoothing,
@@ -20,7 +21,6 @@ from sepi.compared.pobr import (
     squared_steps,
 )
 from sepi.image.superpixels import Superpixels, superpixels
-from sepi.kernels import pobr as kernels
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.sheared_views import ShearedViews
 from sepi.pipeline import estimate_depth
@@ -147,11 +147,10 @@ def test_step_between_superpixels_counts_in_full():
     assert_allclose(squared_steps(image, segments), expected, rtol=1e-6)
 
 
-def test_kernel_is_the_mean_truncated_difference():
-    """The compiled loop is the formula of the docstring."""
+def test_photo_consistency_is_the_mean_truncated_difference():
+    """The loop over the views is the formula of the docstring."""
     views = np.random.default_rng(0).random((4, 3, 5, 6), np.float32)
-    out = np.empty((5, 6), np.float32)
-    kernels.mean_truncated_differences(views, 2, 0.3, out)
+    out = photo_consistency(views, 2, 0.3)
     difference = np.abs(np.delete(views, 2, axis=0) - views[2]).mean(axis=1)
     assert_allclose(out, (np.minimum(difference, 0.3) / 0.3).mean(axis=0), rtol=1e-5)
 
@@ -222,8 +221,8 @@ def test_light_fields_of_other_kinds(changed):
 
 def test_views_sheared_at_the_true_disparity_cost_least(disc):
     """The data cost of an unoccluded pixel is zero at its disparity."""
-    views, out = ShearedViews(disc), np.empty(disc.shape, np.float32)
-    kernels.mean_truncated_differences(views.at(2.0), views.reference, 0.1, out)
+    views = ShearedViews(disc)
+    out = photo_consistency(views.at(2.0), views.reference, 0.1)
     assert out[28:36, 28:36].max() < 1e-5
 
 

@@ -1,20 +1,12 @@
-#include "acc.hpp"
 #include "cae.hpp"
 #include "kernels/arguments.hpp"
 #include "message_passing.hpp"
 #include "mishiba.hpp"
-#include "oavc.hpp"
 #include "occ.hpp"
-#include "pobr.hpp"
 #include "spo.hpp"
 #include "weighted_median.hpp"
 
 void bind_compared(nb::module_ &kernels) {
-    auto acc = kernels.def_submodule("acc");
-    acc.def("turn_phases", &sepi::turn_phases, Unlocked(), "spectrum"_a, "rows"_a, "columns"_a, "out"_a);
-    acc.def("add_differences", &sepi::add_differences, Unlocked(), "shifted"_a, "reference"_a, "across_share"_a, "colour_share"_a, "colour_truncation"_a,
-            "gradient_truncation"_a, "out"_a);
-
     auto cae = kernels.def_submodule("cae");
     cae.attr("LEVELS") = sepi::LEVELS;
     cae.attr("PATCH") = sepi::PATCH;
@@ -31,17 +23,8 @@ void bind_compared(nb::module_ &kernels) {
     mishiba.def("median_pass", &sepi::median_pass, Unlocked(), "current"_a, "data"_a, "data_weights"_a, "guide"_a, "radius"_a, "gap"_a, "table"_a,
                 "per_entry"_a, "out"_a);
 
-    auto oavc = kernels.def_submodule("oavc");
-    oavc.def("lower_thresholds", &sepi::lower_thresholds, Unlocked(), "sheared"_a, "reference"_a, "needed"_a, "thresholds"_a);
-    oavc.def("vote_costs", &sepi::vote_costs, Unlocked(), "sheared"_a, "reference"_a, "thresholds"_a, "out"_a);
-
     auto occ = kernels.def_submodule("occ");
-    occ.def("whole_patch_costs", &sepi::whole_patch_costs, Unlocked(), "sheared"_a, "reference"_a, "out"_a);
-    occ.def("split_patch_costs", &sepi::split_patch_costs, Unlocked(), "sheared"_a, "reference"_a, "places"_a, "halves"_a, "beside"_a, "tolerance"_a,
-            "costs"_a, "cues"_a);
-
-    auto pobr = kernels.def_submodule("pobr");
-    pobr.def("mean_truncated_differences", &sepi::mean_truncated_differences, Unlocked(), "sheared"_a, "reference"_a, "truncation"_a, "out"_a);
+    occ.def("moments_of_halves", &sepi::moments_of_halves, Unlocked(), "sheared"_a, "reference"_a, "places"_a, "halves"_a, "means"_a, "variances"_a);
 
     auto spo = kernels.def_submodule("spo");
     spo.def("half_distances", &sepi::half_distances, Unlocked(), "lines"_a, "weights"_a, "bins"_a, "out"_a);
