@@ -47,83 +47,81 @@ float median(const float *values, Index n) {
 
 }  // namespace
 
-template <class Colour>
-void brightness_of_views(const RimViews<Colour> &views, const Sides &sides, Array<const bool, 4> missing, Array<double, 1> brightness,
+void brightness_of_views(const RimViews &views, const Sides &sides, Array<const bool, 4> missing, Array<double, 1> brightness,
                          Array<double, 1> residual) {
     const Index H = sides.disparity.shape[0], W = sides.disparity.shape[1];
-    parallel_for(0, views.number(), [&](Index view) {
-        const auto of_view = missing[views.places(view, 0)][views.places(view, 1)];
-        const auto shows = [&](Index y, Index x) {
-            return of_view.shape[0] == 0 || !(of_view(y, x) || of_view(y, x + 1) || of_view(y + 1, x) || of_view(y + 1, x + 1));
-        };
-        // colours of the pixels that the view shows, there and in the reference view
-        std::vector<std::pair<std::array<float, 3>, std::array<float, 3>>> shown;
-        double own = 1e-9, other = 1e-9, rest = 0;
-        for (Index y = 0; y < H; y += STRIDE) {
-            for (Index x = 0; x < W; x += STRIDE) {
-                const auto place = place_in(views, view, sides.disparity(y, x), y, x);
-                if (!sides.clean(y, x) || !place || !shows(place->row, place->column)) continue;
-                const auto there = sample(views, view, *place);
-                const auto here = sides.colour(y, x);
-                for (Index c = 0; c < 3; ++c) other += there[c], own += here[c];
-                shown.emplace_back(there, here);
+    const auto look = [&](auto lines) {
+        const ViewSamples samples_of{views, lines};
+        parallel_for(0, views.number(), [&](Index view) {
+            const auto of_view = missing[views.places(view, 0)][views.places(view, 1)];
+            const auto shows = [&](Index y, Index x) {
+                return of_view.shape[0] == 0 || !(of_view(y, x) || of_view(y, x + 1) || of_view(y + 1, x) || of_view(y + 1, x + 1));
+            };
+            // colours of the pixels that the view shows, there and in the reference view
+            std::vector<std::pair<std::array<float, 3>, std::array<float, 3>>> shown;
+            double own = 1e-9, other = 1e-9, rest = 0;
+            for (Index y = 0; y < H; y += STRIDE) {
+                for (Index x = 0; x < W; x += STRIDE) {
+                    const auto place = samples_of.place_in(view, sides.disparity(y, x), y, x);
+                    if (!sides.clean(y, x) || !place || !shows(place->row, place->column)) continue;
+                    const auto there = samples_of.sample(view, *place);
+                    const auto here = sides.colour(y, x);
+                    for (Index c = 0; c < 3; ++c) other += there[c], own += here[c];
+                    shown.emplace_back(there, here);
+                }
             }
-        }
-        const double ratio = other / own;
-        for (const auto &[there, here] : shown)
-            for (Index c = 0; c < 3; ++c) rest += std::min(std::abs(there[c] / ratio - here[c]), MOST_DIFFERENCE);
-        brightness(view) = ratio;
-        residual(view) = shown.empty() ? std::numeric_limits<double>::quiet_NaN() : rest / double(3 * shown.size() + 1);
-    });
+            const double ratio = other / own;
+            for (const auto &[there, here] : shown)
+                for (Index c = 0; c < 3; ++c) rest += std::min(std::abs(there[c] / ratio - here[c]), MOST_DIFFERENCE);
+            brightness(view) = ratio;
+            residual(view) = shown.empty() ? std::numeric_limits<double>::quiet_NaN() : rest / double(3 * shown.size() + 1);
+        });
+    };
+    std::visit(look, views.lines);
 }
 
-template <class Colour>
-void background_of(const RimViews<Colour> &views, Array<const float, 2> layer, Array<const bool, 2> wanted, Index begin, Index end,
+void background_of(const RimViews &views, Array<const float, 2> layer, Array<const bool, 2> wanted, Index begin, Index end,
                    Array<float, 3> background) {
     const Index W = layer.shape[1];
-    parallel_for(begin, end, [&](Index y) {
-        std::vector<Index> columns;
-        for (Index x = 0; x < W; ++x) {
-            background(y, x, 3) = UNSEEN;
-            if (wanted(y, x)) columns.push_back(x);
-        }
-        const auto few = Index(columns.size());
-        const auto scratch = Scratch<float, 3>(few, 3, views.number() + LANES).filled(NONE);
-        const auto samples = scratch.array();
-        std::vector<Index> count(few);
-        // view by view: neighbours are near each other in its memory
-        for (Index view = 0; view < views.number(); ++view) {
-            for (Index i = 0; i < few; ++i) {
-                const auto place = place_seen(views, view, layer(y, columns[i]), y, columns[i]);
-                if (!place) continue;
-                const auto colour = sample(views, view, *place);
-                for (Index c = 0; c < 3; ++c) samples(i, c, count[i]) = colour[c];
-                ++count[i];
+    const auto look = [&](auto lines) {
+        const ViewSamples samples_of{views, lines};
+        parallel_for(begin, end, [&](Index y) {
+            std::vector<Index> columns;
+            for (Index x = 0; x < W; ++x) {
+                background(y, x, 3) = UNSEEN;
+                if (wanted(y, x)) columns.push_back(x);
             }
-        }
-        for (Index i = 0; i < few; ++i) {
-            const Index n = count[i];
-            if (n < FEWEST_VIEWS) continue;
-            double total = 0;
-            for (Index c = 0; c < 3; ++c) {
-                const float middle = median(samples.at(i, c), n);
-                for (Index v = 0; v < n; ++v) {
-                    const float apart = samples(i, c, v) - middle;
-                    total += std::min(double(apart * apart), MOST_DEVIATION2);
+            const auto few = Index(columns.size());
+            const auto scratch = Scratch<float, 3>(few, 3, views.number() + LANES).filled(NONE);
+            const auto samples = scratch.array();
+            std::vector<Index> count(few);
+            // view by view: neighbours are near each other in its memory
+            for (Index view = 0; view < views.number(); ++view) {
+                for (Index i = 0; i < few; ++i) {
+                    const auto place = samples_of.place_seen(view, layer(y, columns[i]), y, columns[i]);
+                    if (!place) continue;
+                    const auto colour = samples_of.sample(view, *place);
+                    for (Index c = 0; c < 3; ++c) samples(i, c, count[i]) = colour[c];
+                    ++count[i];
                 }
-                background(y, columns[i], c) = middle;
             }
-            background(y, columns[i], 3) = float(total / double(3 * n));
-        }
-    });
+            for (Index i = 0; i < few; ++i) {
+                const Index n = count[i];
+                if (n < FEWEST_VIEWS) continue;
+                double total = 0;
+                for (Index c = 0; c < 3; ++c) {
+                    const float middle = median(samples.at(i, c), n);
+                    for (Index v = 0; v < n; ++v) {
+                        const float apart = samples(i, c, v) - middle;
+                        total += std::min(double(apart * apart), MOST_DEVIATION2);
+                    }
+                    background(y, columns[i], c) = middle;
+                }
+                background(y, columns[i], 3) = float(total / double(3 * n));
+            }
+        });
+    };
+    std::visit(look, views.lines);
 }
-
-#define INSTANTIATE(Colour)                                                                                                               \
-    template void brightness_of_views(const RimViews<Colour> &, const Sides &, Array<const bool, 4>, Array<double, 1>, Array<double, 1>); \
-    template void background_of(const RimViews<Colour> &, Array<const float, 2>, Array<const bool, 2>, Index, Index, Array<float, 3>);
-INSTANTIATE(std::uint8_t)
-INSTANTIATE(std::uint16_t)
-INSTANTIATE(float)
-#undef INSTANTIATE
 
 }  // namespace sepi

@@ -1,26 +1,21 @@
+#include <nanobind/stl/variant.h>
+
 #include "colour_mixture.hpp"
 #include "edge_lines.hpp"
 #include "kernels/arguments.hpp"
 #include "specks.hpp"
 #include "surface_shares.hpp"
 
-// The kernels that look at the colours of views, of one type.
-template <class Colour>
-static void bind_of_colours(nb::module_ &background, nb::module_ &surface_shares) {
-    background.def("brightness_of_views", &sepi::brightness_of_views<Colour>, Unlocked(), "views"_a, "sides"_a, "missing"_a, "brightness"_a, "residual"_a);
-    background.def("background_of", &sepi::background_of<Colour>, Unlocked(), "views"_a, "layer"_a, "wanted"_a, "begin"_a, "end"_a, "background"_a);
-    surface_shares.def("costs_of_shares", &sepi::costs_of_shares<Colour>, Unlocked(), "views"_a, "rim"_a, "background"_a, "sides"_a, "scale2"_a,
-                       "contrast2"_a, "pixels"_a, "costs"_a, "told"_a);
-}
-
 void bind_boundaries(nb::module_ &kernels) {
     auto background = kernels.def_submodule("background");
-    auto surface_shares = kernels.def_submodule("surface_shares");
-    bind_of_colours<std::uint8_t>(background, surface_shares);
-    bind_of_colours<std::uint16_t>(background, surface_shares);
-    bind_of_colours<float>(background, surface_shares);
+    background.def("brightness_of_views", &sepi::brightness_of_views, Unlocked(), "views"_a, "sides"_a, "missing"_a, "brightness"_a, "residual"_a);
+    background.def("background_of", &sepi::background_of, Unlocked(), "views"_a, "layer"_a, "wanted"_a, "begin"_a, "end"_a, "background"_a);
     background.attr("FEWEST_VIEWS") = sepi::FEWEST_VIEWS;
     background.attr("UNSEEN") = sepi::UNSEEN;
+
+    auto surface_shares = kernels.def_submodule("surface_shares");
+    surface_shares.def("costs_of_shares", &sepi::costs_of_shares, Unlocked(), "views"_a, "rim"_a, "background"_a, "sides"_a, "scale2"_a, "contrast2"_a,
+                       "pixels"_a, "costs"_a, "told"_a);
     surface_shares.attr("FEWEST_SAMPLES") = sepi::FEWEST_SAMPLES;
     surface_shares.attr("FEWEST_ALONE") = sepi::FEWEST_ALONE;
     surface_shares.attr("SHARES") = sepi::SHARES;

@@ -104,7 +104,8 @@ float sum_over(Index n, Index channels, Turn turn) {
 // What the views show of one pixel after the other.
 template <class Colour>
 struct ShownPixel {
-    const RimViews<Colour> &views;
+    const RimViews &views;
+    const ViewSamples<Colour> samples_of;
     const Rim &rim;
     const Array<const float, 3> background;
     const Sides &sides;
@@ -158,7 +159,7 @@ struct ShownPixel {
     }
 
     void take(Index view, const Place &place) {
-        const auto colour = sample(views, view, place);
+        const auto colour = samples_of.sample(view, place);
         for (Index c = 0; c < 3; ++c) rows.array()(c, number) = colour[c];
         ++number;
     }
@@ -168,7 +169,7 @@ struct ShownPixel {
         number = 0;
         for (Index view = 0; view < views.number(); ++view) {
             // and where the background that is there in the view is in the reference view
-            const auto place = place_seen(views, view, near, y, x), there = place_in(views, view, near - far, y, x);
+            const auto place = samples_of.place_seen(view, near, y, x), there = samples_of.place_in(view, near - far, y, x);
             if (!place || !there) continue;
             if (const auto known = behind(*there)) {
                 for (Index k = 0; k < 4; ++k) rows.array()(BEHIND + k, number) = (*known)[k];
@@ -207,7 +208,7 @@ struct ShownPixel {
         for (Index view = 0; view < views.number(); ++view) {
             // the reference view itself always fits
             if (views.baselines(view, 0) == 0 && views.baselines(view, 1) == 0) continue;
-            if (const auto place = place_seen(views, view, far, y, x)) take(view, *place);
+            if (const auto place = samples_of.place_seen(view, far, y, x)) take(view, *place);
         }
         if (number < FEWEST_ALONE) return UNKNOWN;
         const float sum = sum_over(number, 3, [&, own = sides.colour(y, x)](Index v, Index c) {
@@ -220,23 +221,17 @@ struct ShownPixel {
 
 }  // namespace
 
-template <class Colour>
-void costs_of_shares(const RimViews<Colour> &views, const Rim &rim, Array<const float, 3> background, const Sides &sides, double scale2, double contrast2,
+void costs_of_shares(const RimViews &views, const Rim &rim, Array<const float, 3> background, const Sides &sides, double scale2, double contrast2,
                      Array<const std::int64_t, 1> pixels, Array<float, 2> costs, Array<bool, 1> told) {
     const Index W = sides.disparity.shape[1], count = pixels.shape[0];
-    parallel_for(0, (count + AT_ONCE - 1) / AT_ONCE, [&](Index task) {
-        ShownPixel<Colour> shown{views, rim, background, sides, scale2, contrast2};
-        for (Index i = task * AT_ONCE; i < std::min(count, (task + 1) * AT_ONCE); ++i)
-            if (shown.find(pixels(i) / W, pixels(i) % W, costs.at(i))) told(i) = true;
-    });
+    const auto look = [&](auto lines) {
+        parallel_for(0, (count + AT_ONCE - 1) / AT_ONCE, [&](Index task) {
+            ShownPixel shown{views, ViewSamples{views, lines}, rim, background, sides, scale2, contrast2};
+            for (Index i = task * AT_ONCE; i < std::min(count, (task + 1) * AT_ONCE); ++i)
+                if (shown.find(pixels(i) / W, pixels(i) % W, costs.at(i))) told(i) = true;
+        });
+    };
+    std::visit(look, views.lines);
 }
-
-#define INSTANTIATE(Colour)                                                                                                    \
-    template void costs_of_shares(const RimViews<Colour> &, const Rim &, Array<const float, 3>, const Sides &, double, double, \
-                                  Array<const std::int64_t, 1>, Array<float, 2>, Array<bool, 1>);
-INSTANTIATE(std::uint8_t)
-INSTANTIATE(std::uint16_t)
-INSTANTIATE(float)
-#undef INSTANTIATE
 
 }  // namespace sepi

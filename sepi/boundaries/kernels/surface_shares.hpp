@@ -4,15 +4,15 @@
 
 #include <array>
 #include <tuple>
+#include <variant>
 
 #include "kernels/array.hpp"
 
 namespace sepi {
 
 // The views that are compared, and what hides what in them.
-template <class Colour>
 struct RimViews {
-    Array<const Colour, 4> lines;  // (T, S, H, W C)
+    std::variant<Array<const std::uint8_t, 4>, Array<const std::uint16_t, 4>, Array<const float, 4>> lines;  // (T, S, H, W C)
     Index channels;
     Array<const float, 1> units;            // (N,)
     Strided<const std::int64_t, 2> places;  // (N, 2)
@@ -52,15 +52,13 @@ constexpr float UNSEEN = -1;       // in place of the variance of a background t
 // How bright each view is beside the reference, and how badly it shows the same, over some clean pixels: the ratio of the
 // sums of the colours, and the mean absolute difference of one channel, 0..1, that is left, NaN of views that show none
 // of the pixels; (N,). Pixels that a view does not show are missing (T, S, H, W), none if that is (T, S, 0, 0).
-template <class Colour>
-void brightness_of_views(const RimViews<Colour> &views, const Sides &sides, Array<const bool, 4> missing, Array<double, 1> brightness,
+void brightness_of_views(const RimViews &views, const Sides &sides, Array<const bool, 4> missing, Array<double, 1> brightness,
                          Array<double, 1> residual);
 
 // Rows begin..end of the more distant surfaces where they are wanted (H, W), medians over the views that see them, and of
 // disparity layer (H, W), also where a nearer one hides them. Into background (H, W, 4): colours, and the variance of the
 // views' colours, mean of the channels, or UNSEEN.
-template <class Colour>
-void background_of(const RimViews<Colour> &views, Array<const float, 2> layer, Array<const bool, 2> wanted, Index begin, Index end,
+void background_of(const RimViews &views, Array<const float, 2> layer, Array<const bool, 2> wanted, Index begin, Index end,
                    Array<float, 3> background);
 
 constexpr Index FEWEST_SAMPLES = 8;  // views from which a share is told
@@ -72,8 +70,7 @@ constexpr Index SHARES = 12;         // that are tried, from 0 to 1; none is one
 // not tell. Along the nearer surface's disparity each view shows the same share of that surface before another piece of
 // background (H, W, 4), which is that of background_of. A view counts half at the squared residual scale2, to which
 // the squared difference of both surfaces' colours adds, times contrast2: errors of samples grow with it.
-template <class Colour>
-void costs_of_shares(const RimViews<Colour> &views, const Rim &rim, Array<const float, 3> background, const Sides &sides, double scale2, double contrast2,
+void costs_of_shares(const RimViews &views, const Rim &rim, Array<const float, 3> background, const Sides &sides, double scale2, double contrast2,
                      Array<const std::int64_t, 1> pixels, Array<float, 2> costs, Array<bool, 1> told);
 
 }  // namespace sepi

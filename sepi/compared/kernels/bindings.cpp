@@ -24,7 +24,8 @@ void bind_compared(nb::module_ &kernels) {
                 "per_entry"_a, "out"_a);
 
     auto occ = kernels.def_submodule("occ");
-    occ.def("moments_of_halves", &sepi::moments_of_halves, Unlocked(), "sheared"_a, "reference"_a, "places"_a, "halves"_a, "means"_a, "variances"_a);
+    occ.def("moments_of_halves", &sepi::moments_of_halves, Unlocked(), "sheared"_a, "reference"_a, "places"_a, "halves"_a, "means"_a,
+            "variances"_a);
 
     auto spo = kernels.def_submodule("spo");
     spo.def("half_distances", &sepi::half_distances, Unlocked(), "lines"_a, "weights"_a, "bins"_a, "out"_a);

@@ -4,8 +4,8 @@
 
 namespace sepi {
 
-void moments_of_halves(Array<const float, 4> sheared, Array<const float, 3> reference, Strided<const std::int64_t, 2> places, Array<const bool, 3> halves,
-                       Array<float, 3> means, Array<float, 2> variances) {
+void moments_of_halves(Array<const float, 4> sheared, Array<const float, 3> reference, Strided<const std::int64_t, 2> places,
+                       Array<const bool, 3> halves, Array<float, 3> means, Array<float, 2> variances) {
     parallel_for(0, places.shape[0], [&](Index p) {
         const Index y = places(p, 0), x = places(p, 1);
         for (Index half = 0; half < 2; ++half) {
