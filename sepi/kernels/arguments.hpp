@@ -3,6 +3,7 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/variant.h>
 
 #include <tuple>
@@ -37,44 +38,25 @@ struct type_caster<sepi::Array<T, N>> : array_caster<sepi::Array<T, N>, T, N> {}
 template <class T, int N>
 struct type_caster<sepi::Strided<T, N>> : array_caster<sepi::Strided<T, N>, T, N> {};
 
+// Of references.
+template <class... Fields>
+std::tuple<Fields...> values_of(std::tuple<Fields &...>);
+
 // A NamedTuple becomes a struct of the same fields in the same order, which its fields() lists.
 template <class Struct>
-struct named_tuple_caster {
-    static constexpr auto Name = const_name("tuple[typing.Any, ...]");
-    Struct value;
-
-    template <class>
-    using Cast = Struct &;
-    template <class>
-    bool can_cast() const noexcept {
-        return true;
-    }
-    operator Struct &() { return value; }
+    requires requires(Struct one) { one.fields(); }
+struct type_caster<Struct> {
+    NB_TYPE_CASTER(Struct, const_name("tuple[typing.Any, ...]"))
 
     bool from_python(handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
-        auto fields = value.fields();
-        return PyTuple_Check(source.ptr()) && PyTuple_Size(source.ptr()) == Py_ssize_t(std::tuple_size_v<decltype(fields)>) &&
-               std::apply(
-                   [&](auto &...field) {
-                       Py_ssize_t i = 0;
-                       return (assign(field, PyTuple_GetItem(source.ptr(), i++), flags, cleanup) && ...);
-                   },
-                   fields);
-    }
-
-    template <class Field>
-    static bool assign(Field &field, handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
-        make_caster<Field> caster;
+        using Fields = decltype(values_of(value.fields()));
+        make_caster<Fields> caster;
         // numbers may be NumPy's
         if (!caster.from_python(source, flags | cast_flags::convert, cleanup)) return false;
-        field = caster.operator cast_t<Field>();
+        value.fields() = caster.operator Fields();
         return true;
     }
 };
-
-template <class Struct>
-    requires requires(Struct one) { one.fields(); }
-struct type_caster<Struct> : named_tuple_caster<Struct> {};
 
 }  // namespace nanobind::detail
 
