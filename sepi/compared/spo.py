@@ -149,15 +149,16 @@ def side_distances(
     ndarray, shape (K, H, W), float32
         0..1.
     """
-    weights = column_weights(parameters.scale)
+    sheared_views = ShearedViews(light_field, views)
+    shares = column_weights(parameters.scale) / np.float32(len(sheared_views.positions))
     found = np.empty((len(disparities), *light_field.shape), np.float32)
     turned = np.empty(light_field.shape[::-1], np.float32)
-    for k, sheared in ShearedViews(light_field, views).over(disparities):
+    for k, sheared in sheared_views.over(disparities):
         if down:
-            kernels.half_distances(np.ascontiguousarray(sheared.swapaxes(2, 3)), weights, parameters.bins, turned)
+            kernels.half_distances(np.ascontiguousarray(sheared.swapaxes(2, 3)), shares, parameters.bins, turned)
             found[k] = turned.T
         else:
-            kernels.half_distances(sheared, weights, parameters.bins, found[k])
+            kernels.half_distances(sheared, shares, parameters.bins, found[k])
         progress((k + 1) / len(disparities))
     return found
 

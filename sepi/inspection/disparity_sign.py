@@ -53,6 +53,12 @@ _WINDOW_RADIUS = 2
 _LEAST_NOISE = 3e-3
 _SEEN = 0.3
 _HIDDEN = 4.0
+# Two surfaces count as two where they are this far apart in a view, pixels; they meet in it within this distance
+_LEAST_SHIFT = 1.5
+_MEETING = 0.75
+# Logarithm of the ratio of residuals: that one pair counts at most; the least that tells anything
+_MOST_EVIDENCE = 2.0
+_LEAST_EVIDENCE = 1.0
 # So many of the farthest views on each side are asked what is hidden in them
 _HIDING_VIEWS = 2
 # Side of a region, pixels, at most and as part of the picture's (pairs in one region are one observation); its pairs
@@ -174,9 +180,42 @@ def _add_pairs(
     usable = surface & (opposite <= _SEEN) & np.isfinite(residual)
     rise = np.zeros(disparity.shape, np.float32)
     rise[usable] = np.log((residual[usable] + noise) / (opposite[usable] + noise))
-    down, across = (int(n) for n in np.sign(baseline))
+    down, across = np.sign(baseline).astype(int).tolist()
     length, hidden, side = np.abs(baseline).max(), _HIDDEN * noise, _side(disparity.shape)
-    kernels.add_pairs(rise, residual, disparity, usable, down, across, length, hidden, farthest, side, total, count)
+    for distance in range(2, farthest + 1):
+        add_pairs(rise, residual, disparity, usable, (down, across), distance, length, hidden, side, total, count)
+
+
+def add_pairs(
+    rise: FloatMap,
+    residual: FloatMap,
+    disparity: FloatMap,
+    usable: BoolMap,
+    direction: Baseline,
+    distance: int,
+    length: np.float32,
+    hidden: float,
+    side: int,
+    total: npt.NDArray[np.float64],
+    count: npt.NDArray[np.float64],
+) -> None:
+    """Add what pairs of usable pixels that meet in a view say, and their number, to regions of ``side`` pixels.
+
+    The nearer pixel lies ``distance`` steps of ``direction``, each -1, 0 or 1 down and across, from the other. The view
+    is ``length`` view steps away, and a pixel that is hidden in it has a greater residual than ``hidden``.
+    """
+    (height, width), (down, across) = disparity.shape, (distance * step for step in direction)
+    if abs(down) >= height or abs(across) >= width:
+        return
+    here = slice(max(0, -down), height - max(0, down)), slice(max(0, -across), width - max(0, across))
+    there = slice(max(0, down), height - max(0, -down)), slice(max(0, across), width - max(0, -across))
+    shift = (disparity[there] - disparity[here]) * length
+    meet = usable[here] & usable[there] & (np.abs(shift - distance) <= _MEETING) & (shift >= _LEAST_SHIFT)
+    meet &= np.maximum(residual[here], residual[there]) > hidden
+    meet &= np.maximum(rise[here], rise[there]) > _LEAST_EVIDENCE
+    regions = tuple((n + part.start) // side for n, part in zip(np.nonzero(meet), here, strict=True))
+    np.add.at(total, regions, np.clip(rise[here] - rise[there], -_MOST_EVIDENCE, _MOST_EVIDENCE)[meet])
+    np.add.at(count, regions, 1)
 
 
 def _summary(total: npt.NDArray[np.float64], count: npt.NDArray[np.float64]) -> Evidence:

@@ -184,7 +184,7 @@ def test_distances_equal_a_plain_twin(scale: float, bins: int, width: int) -> No
     lines[1:3] = lines[:1]
     weights = column_weights(scale)
     found = np.full((4, width), np.nan, np.float32)
-    kernels.half_distances(lines, weights, bins, found)
+    kernels.half_distances(lines, weights / np.float32(5), bins, found)
     assert np.allclose(found, twin_of_half_distances(lines, weights, bins), atol=1e-6)
 
 
@@ -194,7 +194,7 @@ def test_distances_are_the_same_for_any_number_of_threads() -> None:
     found = np.empty((2, 16, 20), np.float32)
     for count, distances in zip((1, SEVERAL), found, strict=True):
         with threads(count):
-            kernels.half_distances(lines, column_weights(0.8), 64, distances)
+            kernels.half_distances(lines, column_weights(0.8) / np.float32(5), 64, distances)
     assert np.array_equal(*found)
 
 

@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from real_scenes import views_of
 
-from sepi.inspection.disparity_sign import Evidence, Look, occlusion_evidence
+from sepi.inspection.disparity_sign import Evidence, Look, add_pairs, occlusion_evidence
 from sepi.inspection.view_layouts import Trial, Views
 from sepi.inspection.view_order import check_order
 from sepi.io.readers.options import ORDERS
-from sepi.kernels import view_order as kernels
 from sepi.lightfield import LightField
 from sepi.scenes import SCENES, render
 
@@ -351,7 +350,8 @@ def test_pairs_that_meet_in_a_view_are_counted_in_the_region_of_the_farther(down
     usable = rng.random(disparity.shape) < 0.7
     length, hidden, side, farthest = np.float32(3.5), np.float32(0.4), 8, 12
     total, count = np.zeros((2, 4, 5))
-    kernels.add_pairs(rise, residual, disparity, usable, down, across, length, hidden, farthest, side, total, count)
+    for distance in range(2, farthest + 1):
+        add_pairs(rise, residual, disparity, usable, (down, across), distance, length, hidden, side, total, count)
     expected = np.zeros((2, 4, 5))
     for (y, x), distance in itertools.product(np.argwhere(usable).tolist(), range(2, farthest + 1)):
         i, j = y + down * distance, x + across * distance

@@ -28,7 +28,7 @@ void bind_compared(nb::module_ &kernels) {
             "variances"_a);
 
     auto spo = kernels.def_submodule("spo");
-    spo.def("half_distances", &sepi::half_distances, Unlocked(), "lines"_a, "weights"_a, "bins"_a, "out"_a);
+    spo.def("half_distances", &sepi::half_distances, Unlocked(), "lines"_a, "shares"_a, "bins"_a, "out"_a);
 
     auto weighted_median = kernels.def_submodule("weighted_median");
     weighted_median.def("weighted_medians", &sepi::weighted_medians, Unlocked(), "values"_a, "guide"_a, "radius"_a, "sigma"_a, "weight"_a, "out"_a);

@@ -44,13 +44,11 @@ void count(Array<Entry, 2> epi, Index x, Index earlier, float *__restrict histog
 // Histograms of both sides of a column.
 void halves(Array<const float, 2> ring, Index centre, Array<const float, 1> shares, float *__restrict left, float *__restrict right) {
     const Index size = ring.shape[0], bins = ring.shape[1];
+    std::fill_n(left, bins, 0.0f);
+    std::fill_n(right, bins, 0.0f);
     for (Index k = 0; k < shares.shape[0]; ++k) {
         const float *before = ring.at((centre + size - 1 - k) % size), *after = ring.at((centre + 1 + k) % size), share = shares(k);
-        if (k == 0) {
-            for (Index b = 0; b < bins; ++b) left[b] = share * before[b], right[b] = share * after[b];
-        } else {
-            for (Index b = 0; b < bins; ++b) left[b] += share * before[b], right[b] += share * after[b];
-        }
+        for (Index b = 0; b < bins; ++b) left[b] += share * before[b], right[b] += share * after[b];
     }
 }
 
@@ -68,12 +66,8 @@ float common(float *__restrict left, const float *right, Index C, Index bins) {
 
 }  // namespace
 
-void half_distances(Array<const float, 4> lines, Array<const float, 1> weights, Index bins, Array<float, 2> out) {
-    const Index N = lines.shape[0], C = lines.shape[1], W = lines.shape[3], R = weights.shape[0], size = 2 * R + 1;
-    float sum = 0;
-    for (Index k = 0; k < R; ++k) sum += weights(k);
-    const Scratch<float, 1> shares(R);
-    for (Index k = 0; k < R; ++k) shares.array()(k) = float(double(weights(k)) / (double(sum) * double(N)));
+void half_distances(Array<const float, 4> lines, Array<const float, 1> shares, Index bins, Array<float, 2> out) {
+    const Index C = lines.shape[1], W = lines.shape[3], R = shares.shape[0], size = 2 * R + 1;
     parallel_for(0, lines.shape[2], [&](Index y) {
         const auto epi = quantised(lines, y, bins);
         const auto ring = zeros<float, 2>(size, C * bins);
@@ -83,7 +77,7 @@ void half_distances(Array<const float, 4> lines, Array<const float, 1> weights, 
             count(epi.array(), clamped(x, W), clamped(x - size, W), ring.array().at((x + size) % size));
             const Index centre = x - R;
             if (centre < 0) continue;
-            halves(ring.array(), centre, shares.array(), left, right);
+            halves(ring.array(), centre, shares, left, right);
             // with sums of 1, half the sum of (g - h)^2 / (g + h) is 1 less twice that of g h / (g + h)
             out(y, centre) = std::max(1 - 2 * common(left, right, C, bins) / float(C), 0.0f);
         }

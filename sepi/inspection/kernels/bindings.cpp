@@ -11,6 +11,4 @@ void bind_inspection(nb::module_ &kernels) {
     view_order.def("layout_costs", &sepi::layout_costs, Unlocked(), "reference"_a, "views"_a, "offsets"_a, "candidates"_a, "points"_a, "radius"_a, "cost"_a,
                    "disparity"_a);
     view_order.def("residuals", &sepi::residuals, Unlocked(), "reference"_a, "view"_a, "baseline"_a, "disparity"_a, "asked"_a, "radius"_a, "out"_a);
-    view_order.def("add_pairs", &sepi::add_pairs, Unlocked(), "rise"_a, "residual"_a, "disparity"_a, "usable"_a, "down"_a, "across"_a, "length"_a,
-                   "hidden"_a, "farthest"_a, "side"_a, "total"_a, "count"_a);
 }

@@ -10,10 +10,6 @@ namespace sepi {
 namespace {
 
 constexpr float HALF = 0.25f;  // difference of two patches that counts one half, as part of the patch's own variation
-// Two surfaces count as two where they are this far apart in a view, pixels; they meet in it within this distance.
-constexpr float LEAST_SHIFT = 1.5f, MEETING = 0.75f;
-// Logarithm of the ratio of residuals that one pair counts at most; least that tells anything.
-constexpr float MOST_EVIDENCE = 2, LEAST_EVIDENCE = 1;
 
 // Square part of a picture, which begins at (y, x).
 Array<const float, 2> patch_at(Array<const float, 2> picture, Index y, Index x, Index side) {
@@ -38,9 +34,6 @@ float squares_of(Array<const float, 2> patch, Array<const float, 2> view, const 
     }
     return total;
 }
-
-// How many steps of -1, 0 or 1 lead from a place to the ends of n.
-Index steps_within(Index place, Index step, Index n) { return step > 0 ? n - 1 - place : step < 0 ? place : std::numeric_limits<Index>::max(); }
 
 }  // namespace
 
@@ -93,29 +86,6 @@ void residuals(Array<const float, 2> reference, Array<const float, 2> view, Arra
             if (!asked(row, x + radius)) continue;
             const auto place = patch_within(view, y, x, disparity(row, x + radius), baseline(0), baseline(1), side);
             if (place) out(row, x + radius) = squares_of(patch_at(reference, y, x, side), view, *place) / float(side * side);
-        }
-    });
-}
-
-void add_pairs(Array<const float, 2> rise, Array<const float, 2> residual, Array<const float, 2> disparity, Array<const bool, 2> usable, Index down,
-               Index across, float length, float hidden, Index farthest, Index side, Array<double, 2> total, Array<double, 2> count) {
-    const Index H = disparity.shape[0], W = disparity.shape[1], ahead = down * disparity.strides[0] + across;
-    parallel_for(0, total.shape[0], [&](Index region) {
-        for (Index y = region * side; y < std::min(H, (region + 1) * side); ++y) {
-            for (Index x = 0; x < W; ++x) {
-                if (!usable(y, x)) continue;
-                const float *here = disparity.at(y, x);
-                const Index last = std::min({farthest, steps_within(y, down, H), steps_within(x, across, W)});
-                for (Index distance = 2; distance <= last; ++distance) {
-                    const Index i = y + down * distance, j = x + across * distance;
-                    const float shift = (here[ahead * distance] - *here) * length;
-                    if (std::abs(shift - float(distance)) > MEETING || shift < LEAST_SHIFT || !usable(i, j)) continue;
-                    if (std::max(residual(y, x), residual(i, j)) > hidden && std::max(rise(y, x), rise(i, j)) > LEAST_EVIDENCE) {
-                        total(region, x / side) += std::clamp(rise(y, x) - rise(i, j), -MOST_EVIDENCE, MOST_EVIDENCE);
-                        count(region, x / side) += 1;
-                    }
-                }
-            }
         }
     });
 }

@@ -17,12 +17,4 @@ void layout_costs(Array<const float, 2> reference, Array<const float, 3> views, 
 void residuals(Array<const float, 2> reference, Array<const float, 2> view, Array<const float, 1> baseline, Array<const float, 2> disparity,
                Array<const bool, 2> asked, Index radius, Array<float, 2> out);
 
-// Add what pairs of pixels that meet in a view say of which is in front, and their number, to those of regions of side
-// pixels, total and count (R, C). Of pixels (H, W): rise, the logarithm of the residual in the view over the one on the
-// other side; residual, that in the view; disparity; and which are usable.
-// The nearer pixel of a pair lies down and across, each -1, 0 or 1, from the other, at most farthest pixels away. The
-// view is length view steps away, and a pixel that is hidden in it has a greater residual than hidden.
-void add_pairs(Array<const float, 2> rise, Array<const float, 2> residual, Array<const float, 2> disparity, Array<const bool, 2> usable, Index down,
-               Index across, float length, float hidden, Index farthest, Index side, Array<double, 2> total, Array<double, 2> count);
-
 }  // namespace sepi
