@@ -32,6 +32,8 @@ inline std::array<float, 4> cubic_weights(double f) {
     };
 }
 
+inline double squared(double number) { return number * number; }
+
 // Squared distance of two colours.
 inline float squared_distance(const float *one, const float *other) {
     const float r = one[0] - other[0], g = one[1] - other[1], b = one[2] - other[2];

@@ -9,6 +9,7 @@ mix keep what paths brought, and so do gloss, mirrors and glass, which send each
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -65,8 +66,24 @@ def with_shared_light(
         kernels.gathered_light(light, disparities, surface, baselines, view, _BEND, mean, variance)
         alike = alike_light(mean, variance, own)
         shown[view] = np.where(whole[view][..., None], alike * albedo[view], pictures[view])
-        kernels.limit_bent(things[view], whole[view], _BESIDE, shown[view])
+        limit_bent(things[view], whole[view], shown[view])
     return shown
+
+
+def limit_bent(things: npt.NDArray[np.int16], whole: BoolMap, shown: FloatArray) -> None:
+    """Keep pixels (H, W, 3) that are not whole, amid one thing, within the light of its whole ones beside them."""
+    height, width = whole.shape
+    bent = ~whole & (cv2.erode(things, np.ones((3, 3))) == cv2.dilate(things, np.ones((3, 3))))
+    around = ((_BESIDE, _BESIDE), (_BESIDE, _BESIDE))
+    surface, light = np.pad(np.where(whole, things, -1), around, constant_values=-1), np.pad(shown, (*around, (0, 0)))
+    low, high = np.full_like(shown, np.inf), np.full_like(shown, -np.inf)
+    for y, x in np.ndindex(2 * _BESIDE + 1, 2 * _BESIDE + 1):
+        beside = slice(y, y + height), slice(x, x + width)
+        same = (surface[beside] == things)[..., None]
+        np.minimum(low, light[beside], out=low, where=same)
+        np.maximum(high, light[beside], out=high, where=same)
+    known = bent[..., None] & (low <= high)
+    shown[known] = np.clip(shown, low, high)[known]
 
 
 def alike_light(light: FloatArray, variance: FloatArray, surface: npt.NDArray[np.int16]) -> FloatArray:

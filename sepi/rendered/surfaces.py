@@ -16,12 +16,14 @@ from sepi.rendered.world import FloatArray, Material, Mesh, Pattern, Vector, Wor
 
 # rays of a pixel, across and down, that find what is painted there
 _FINE = 8
+# pixels that are looked at together: what is known of them stays in the cache
+_AT_ONCE = 4096
 
 Faces = npt.NDArray[np.int32]
 
 
 class Planes(NamedTuple):
-    """Planes of triangles, and where on its pattern each is, for the compiled kernels."""
+    """Planes of triangles, and where on its pattern each is."""
 
     corner: npt.NDArray[np.float64]
     """The first one, shape (M, 3)."""
@@ -31,17 +33,6 @@ class Planes(NamedTuple):
     """Of the corner, in periods, shape (M, 2)."""
     gradient: npt.NDArray[np.float64]
     """Of uv, shape (M, 2, 3)."""
-
-
-class Paint(NamedTuple):
-    """What triangles are painted with, for the compiled kernels."""
-
-    thing: npt.NDArray[np.int64]
-    """Whose each triangle is, shape (M,)."""
-    starts: npt.NDArray[np.int64]
-    """Of each thing's pattern: where it begins in the list of texels, its height and width."""
-    texels: FloatArray
-    """Of all patterns, linear, shape (N, 3)."""
 
 
 @dataclass(frozen=True)
@@ -181,8 +172,31 @@ class Surfaces:
             Where the camera is (right, down), the row and column that its axis meets, its focal length in pixels.
         """
         found = np.empty((len(faces), 3), np.float32)
-        kernels.painted(faces, pixels, frame, self._planes, self._paint, _FINE, found)
+        for begin in range(0, len(faces), _AT_ONCE):
+            part = slice(begin, begin + _AT_ONCE)
+            found[part] = self._albedo(faces[part], pixels[part], frame)
         return found
+
+    def _albedo(self, faces: Faces, pixels: npt.NDArray[np.int64], frame: npt.NDArray[np.float64]) -> FloatArray:
+        corner, normal, uv, gradient = (part[faces] for part in self._planes)
+        corner = corner - [*frame[:2], 0]
+        volume = np.sum(normal * corner, axis=1)
+        begins, texels = self._texels
+        starts = np.array([(begins[id(pattern)], *_raster(pattern).shape[:2]) for pattern in self._patterns])
+        start, sizes = starts[self.thing[faces], 0], starts[self.thing[faces], 1:]
+        total = np.zeros((len(faces), 3))
+        for fine in np.ndindex(_FINE, _FINE):
+            down, across = ((pixels + (np.array(fine) + 0.5) / _FINE - frame[2:4]) / frame[4]).T
+            ray = np.stack([across, down, np.ones(len(faces))], axis=1)
+            # a plane seen from its edge ends nowhere
+            with np.errstate(divide="ignore", invalid="ignore"):
+                point = (volume / np.sum(normal * ray, axis=1))[:, None] * ray - corner
+                periods = uv + np.einsum("nij,nj->ni", gradient, point)
+                texel = ((periods - np.floor(periods))[:, ::-1] * sizes).astype(int)
+            # what is left of a whole period may round to one
+            row, column = np.clip(texel, 0, sizes - 1).T
+            total += texels[start + row * sizes[:, 1] + column]
+        return np.asarray(total / _FINE**2, np.float32)
 
     def linear(self, pattern: Pattern) -> FloatArray:
         """The raster of a pattern of the world's things, linear."""
@@ -200,12 +214,6 @@ class Surfaces:
         for raster, first, after in zip(rasters.values(), begins, begins[1:], strict=False):
             texels[first:after] = srgb_decoded(raster).reshape(-1, 3)
         return dict(zip(rasters, begins, strict=False)), texels
-
-    @cached_property
-    def _paint(self) -> Paint:
-        begins, texels = self._texels
-        starts = np.array([(begins[id(pattern)], *_raster(pattern).shape[:2]) for pattern in self._patterns])
-        return Paint(self.thing, starts, texels)
 
 
 def _raster(pattern: Pattern | Vector) -> FloatArray:

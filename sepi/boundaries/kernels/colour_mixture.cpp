@@ -19,8 +19,6 @@ struct Side {
     double weight = 0, colour[3] = {}, colour2 = 0;
 };
 
-double squared(double number) { return number * number; }
-
 }  // namespace
 
 void mixture_evidence(Array<const float, 2> disparity, const Surroundings &around, Strided<const float, 3> guide, double discontinuity, Index radius,

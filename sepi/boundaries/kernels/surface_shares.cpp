@@ -19,8 +19,6 @@ constexpr double LEAST_EXTENT = 0.1, DOUBT = 0.1, LEAST_DEVIATION = 0.004;
 constexpr float UNKNOWN = 1e3f;  // cost where nothing tells
 constexpr Index AT_ONCE = 64;    // pixels that a thread does at a stretch
 
-double squared(double number) { return number * number; }
-
 // Three channels, and a number that is not looked at.
 using Channels = double __attribute__((vector_size(32)));
 

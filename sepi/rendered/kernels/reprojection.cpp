@@ -1,15 +1,12 @@
 #include "reprojection.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
 namespace sepi {
 namespace {
-
-double squared(double number) { return number * number; }
 
 // Calls body(other, x, place) where another view shows the point of a pixel of row y. View by view: pixels beside each
 // other lie beside each other in all of them.
@@ -71,23 +68,6 @@ void gathered_light(Array<const float, 4> light, Array<const float, 3> dispariti
             const double between = std::max(total[3] / number - squared((total[0] + total[1] + total[2]) / number), 0.0);
             variance(y, x) = number > 1 ? float(between / (number - 1)) : 0.0f;
             for (Index c = 0; c < 3; ++c) mean(y, x, c) = float(total[c] / number);
-        }
-    });
-}
-
-void limit_bent(Array<const std::int16_t, 2> things, Array<const bool, 2> whole, Index reach, Array<float, 3> shown) {
-    const Index H = whole.shape[0], W = whole.shape[1];
-    parallel_for_pixels(H, W, [&](Index y, Index x) {
-        const auto same = [&](Index i, Index j) { return things(i, j) == things(y, x); };
-        bool one = !whole(y, x);
-        for_window(y, x, 1, H, W, [&](Index i, Index j) { one &= same(i, j); });
-        if (!one) return;
-        for (Index c = 0; c < 3; ++c) {
-            float low = std::numeric_limits<float>::infinity(), high = 0;
-            for_window(y, x, reach, H, W, [&](Index i, Index j) {
-                if (whole(i, j) && same(i, j)) low = std::min(low, shown(i, j, c)), high = std::max(high, shown(i, j, c));
-            });
-            if (low <= high) shown(y, x, c) = std::clamp(shown(y, x, c), low, high);
         }
     });
 }

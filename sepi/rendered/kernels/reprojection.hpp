@@ -15,7 +15,4 @@ void seen_elsewhere(Array<const float, 3> disparities, Array<const double, 2> ba
 void gathered_light(Array<const float, 4> light, Array<const float, 3> disparities, Array<const std::int16_t, 3> surface, Array<const double, 2> baselines,
                     Index view, double bend, Array<float, 3> mean, Array<float, 2> variance);
 
-// Keep pixels that are not whole, amid one thing, within the light of its whole ones beside them; shown (H, W, 3).
-void limit_bent(Array<const std::int16_t, 2> things, Array<const bool, 2> whole, Index reach, Array<float, 3> shown);
-
 }  // namespace sepi

@@ -17,7 +17,7 @@ constexpr Index BAND = 32;
 // Pixels: more than rounding moves a corner.
 constexpr double SLACK = 1e-4;
 
-// Triangles, or pixels, that a thread looks at together.
+// Triangles that a thread looks at together.
 constexpr Index AT_ONCE = 64;
 
 using Vector = std::array<double, 3>;  // right, down, away
@@ -91,33 +91,6 @@ void first_met(Array<const double, 3> corners, Array<const double, 1> origin, Ar
     parallel_for(0, (size + BAND - 1) / BAND, [&](Index band) {
         const auto depth = Scratch<double, 2>(std::min(BAND, size - band * BAND), size).filled(std::numeric_limits<double>::infinity());
         for (Index n = 1; n < count; ++n) triangles[n].meet(n, near, frame.data, across.array().data, band * BAND, depth.array(), out);
-    });
-}
-
-void painted(Array<const std::int32_t, 1> faces, Strided<const std::int64_t, 2> pixels, Array<const double, 1> frame, const Planes &planes, const Paint &paint,
-             Index fine, Array<float, 2> out) {
-    // what is left of a whole one may round to one
-    const auto texel = [](double periods, Index size) { return clamped(Index((periods - std::floor(periods)) * double(size)), size); };
-    parallel_for_blocks(0, faces.shape[0], AT_ONCE, [&](Index n) {
-        const Index face = faces(n);
-        const std::int64_t *start = paint.starts.at(paint.thing(face)), height = start[1], width = start[2];
-        const double *normal = planes.normal.at(face), *corner = planes.corner.at(face), *uv = planes.uv.at(face);
-        const double *u = planes.gradient.at(face, 0), *v = planes.gradient.at(face, 1);
-        const double left = corner[0] - frame(0), top = corner[1] - frame(1), near = corner[2];
-        const double volume = normal[0] * left + normal[1] * top + normal[2] * near;
-        double total[3] = {};
-        for (Index i = 0; i < fine; ++i) {
-            const double down = (double(pixels(n, 0)) + (double(i) + 0.5) / double(fine) - frame(2)) / frame(4);
-            for (Index j = 0; j < fine; ++j) {
-                const double right = (double(pixels(n, 1)) + (double(j) + 0.5) / double(fine) - frame(3)) / frame(4);
-                const double away = volume / (normal[0] * right + normal[1] * down + normal[2]);
-                const double x = away * right - left, y = away * down - top, z = away - near;
-                const double across = uv[0] + u[0] * x + u[1] * y + u[2] * z, below = uv[1] + v[0] * x + v[1] * y + v[2] * z;
-                const float *colour = paint.texels.at(start[0] + texel(below, height) * width + texel(across, width));
-                for (Index c = 0; c < 3; ++c) total[c] += double(colour[c]);
-            }
-        }
-        for (Index c = 0; c < 3; ++c) out(n, c) = float(total[c] / double(fine * fine));
     });
 }
 
