@@ -58,14 +58,11 @@ void add_view(Array<const float, 3> view, double v, double u, Array<const float,
 void fill_between(Array<const float, 3> sheared, Array<const float, 2> surfaces, float focus, Array<const float, 1> cell, float margin, Array<float, 3> out) {
     const Index C = sheared.shape[0], H = sheared.shape[1], W = sheared.shape[2];
     const auto box = [&](float disparity) { return Box(std::abs(disparity - focus), cell); };
-    float tallest = 1, widest = 1;
-    for (Index y = 0; y < H; ++y) {
-        for (Index x = 0; x < W; ++x) {
-            const Box each = box(surfaces(y, x));
-            tallest = std::max(tallest, each.height), widest = std::max(widest, each.width);
-        }
-    }
-    const Index rows = Index(std::ceil(0.5f * tallest - 0.5f)), columns = Index(std::ceil(0.5f * widest - 0.5f));
+    float farthest = 0;
+    for (Index y = 0; y < H; ++y)
+        for (Index x = 0; x < W; ++x) farthest = std::max(farthest, std::abs(surfaces(y, x) - focus));
+    const Box largest(farthest, cell);
+    const Index rows = Index(std::ceil(0.5f * largest.height - 0.5f)), columns = Index(std::ceil(0.5f * largest.width - 0.5f));
     parallel_for(0, H, [&](Index y) {
         // colours and shares of what is nearer, and of all else
         const Scratch<float, 2> sums(2, C + 1);
