@@ -17,11 +17,6 @@ constexpr double MOST_DIFFERENCE = 0.1;   // of one channel, that counts in a vi
 
 // Median of n numbers, NONE after them, by halving the interval that it lies in: counting vectorises, and sorting does not.
 float median(const float *values, Index n) {
-    const auto number_below = [&](float limit) {
-        int number = 0;
-        for (Index v = 0; v < n; ++v) number += values[v] < limit;
-        return number;
-    };
     const auto least_from = [&](float limit) {
         Float8 least = spread(NONE);
         for (Index v = 0; v < n; v += LANES) least = load(values + v) >= spread(limit) ? smaller(load(values + v), least) : least;
@@ -37,7 +32,8 @@ float median(const float *values, Index n) {
     float low = least_from(-NONE), high = most_below(NONE);
     int below = 0;
     for (float half; below != middle && (half = low + (high - low) * 0.5f) > low && half < high;) {
-        const int found = number_below(half);
+        int found = 0;
+        for (Index v = 0; v < n; ++v) found += values[v] < half;
         if (found <= middle) below = found;
         (found <= middle ? low : high) = half;
     }
