@@ -106,11 +106,11 @@ def gains(
     factors, errors : ndarray, shape (C,), float64
         And the standard errors of their logarithms; 1 and 0 where too little of both pictures tells.
     """
-    shift, _ = cv2.phaseCorrelate(
-        _grey(reference), _grey(view), cv2.createHanningWindow(_grey(view).shape[::-1], cv2.CV_32F)
-    )
-    across, down = np.rint(shift).astype(int)
     height, width = view.shape[:2]
+    size = width, height
+    shift, _ = cv2.phaseCorrelate(_grey(reference), _grey(view), cv2.createHanningWindow(size, cv2.CV_32F))
+    # it takes half a pixel for the middle of an odd number of them
+    across, down = np.rint(shift - np.array([cv2.getOptimalDFTSize(side) % 2 / 2 for side in size])).astype(int)
     if abs(across) > width // 2 or abs(down) > height // 2:
         across = down = 0
     there = view[max(0, down) : height + min(0, down), max(0, across) : width + min(0, across)]
@@ -140,21 +140,21 @@ def _means_are_alike(light_field: LightField) -> bool:
 
 
 def _mean(light_field: LightField, place: tuple[int, ...]) -> npt.NDArray[np.float64]:
-    """Mean colour of a view, of some of its rows."""
-    view = light_field.views[place][::_STRIDE]
+    """Mean colour of a view, of some of its rows, which are counted from the nearer end."""
+    rows = np.arange(light_field.shape[0])
+    view = light_field.views[place][np.minimum(rows, rows[::-1]) % _STRIDE == 0]
     return np.array(cv2.mean(view)[: view.shape[2]])
 
 
 def _small(light_field: LightField, place: tuple[int, int], step: int) -> tuple[FloatMap, BoolMap]:
     """A view in 0..1, made so many times smaller, and which of its pixels it shows."""
-    height, width = (size // step * step for size in light_field.shape)
-    view = light_field.views[place][:height, :width]
-    small = cv2.resize(view, (width // step, height // step), interpolation=cv2.INTER_AREA)
-    small = small.reshape(height // step, width // step, -1) / np.float32(full_scale(view.dtype))
+    view, (height, width) = light_field.views[place], (size // step for size in light_field.shape)
+    small = cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA)
+    small = small.reshape(height, width, -1) / np.float32(full_scale(view.dtype))
     if light_field.missing is None:
-        return small, np.ones(small.shape[:2], bool)
-    missing = light_field.missing[place][:height, :width].reshape(height // step, step, width // step, step)
-    return small, ~missing.any(axis=(1, 3))
+        return small, np.ones((height, width), bool)
+    missing = light_field.missing[place].astype(np.float32)
+    return small, cv2.resize(missing, (width, height), interpolation=cv2.INTER_AREA) == 0
 
 
 def _grey(view: FloatMap) -> FloatMap:

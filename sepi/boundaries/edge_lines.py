@@ -84,7 +84,8 @@ def _edges(steps: int) -> Edges:
     count = _DIRECTIONS * len(_OFFSETS)
     shares = np.clip(0.5 + distance.reshape(-1, len(down)) / _BLUR, 0, 1)
     return Edges(
-        np.rint(shares * steps).astype(np.uint8),
+        # halves of a step are such in all directions, however they are rounded
+        np.floor(np.round(shares * steps, 6) + 0.5).astype(np.uint8),
         np.tile(_OFFSETS > 0, 2 * _DIRECTIONS),
         np.repeat(np.array([0, _CURVED], np.float32), count),
         np.exp(-(down**2 + across**2) / (2 * _WIDTH**2)).astype(np.float32),

@@ -116,7 +116,8 @@ def join_specks(
             there = (y + dy).clip(0, height - 1), (x + dx).clip(0, width - 1)
             beside = joined[there]
             apart = np.where(np.isnan(beside), np.inf, ((colours[there] - colours[y, x]) ** 2).sum(axis=1))
-            values = np.where(apart < unlike, beside, values)
+            # of neighbours that are equally like, the farthest
+            values = np.where((apart < unlike) | ((apart == unlike) & (beside < values)), beside, values)
             unlike = np.minimum(unlike, apart)
         joined[y, x] = values
         y, x = y[np.isnan(values)], x[np.isnan(values)]

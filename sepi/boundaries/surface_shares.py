@@ -86,7 +86,6 @@ def share_costs(
     if not len(views.places):
         # they say nothing for either surface
         return found
-    layer, distance = _more_distant_layer(disparity, rim, views.margin)
     scales2 = _LEAST_SCALE**2 + 2 * noise_of_reference_view(light_field) ** 2, parameters.share_scale**2
     present = np.zeros(light_field.grid, bool)
     present[tuple(views.places.T)] = True
@@ -96,12 +95,13 @@ def share_costs(
     rows_moved = math.ceil(step * float(np.abs(views.baselines[:, 0]).max())) + 1
     farthest = float(np.abs(disparity).max())
     height, width = light_field.shape
-    background = np.empty((height, width, 4), np.float32)
+    layer, wanted = _more_distant_layer(disparity, rim, views.margin, moved)
+    background = np.zeros((height, width, 4), np.float32)
     for begin, end, rows in row_bands(light_field, present, farthest, BYTES_PER_PIXEL, rows_moved):
         nearest = nearest_surfaces(light_field, around.nearest, present, rows)
         views = views._replace(nearest=nearest, low=rows.low)
         first, last = max(0, begin - rows_moved), min(height, end + rows_moved)
-        background_kernels.background_of(views, layer, distance <= moved, first, last, background)
+        background_kernels.background_of(views, layer, wanted, first, last, background)
         of_band = slice(*np.searchsorted(pixels, (begin * width, end * width)))
         kernels.costs_of_shares(
             views, rim, background, sides, *scales2, pixels[of_band], found.costs[of_band], found.told[of_band]
@@ -134,11 +134,17 @@ def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryPara
     return views._replace(units=units, places=places[alike], baselines=baselines[alike])
 
 
-def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32) -> tuple[FloatMap, FloatMap]:
-    """The map with the more distant surface of the next step in place of all that is nearer, and the distance to it."""
+def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32, reach: int) -> tuple[FloatMap, BoolMap]:
+    """The map with the more distant surface of the next step in place of all that is nearer, and how far it is known.
+
+    That is so many pixels from a step. Of steps that are equally near the most distant surface is taken.
+    """
+    behind = np.where(rim.inside, rim.far, np.float32(np.inf))
+    for step in range(reach):
+        unknown = np.isinf(behind)
+        # by turns, so that what is reached is nearly round
+        around = cv2.getStructuringElement(cv2.MORPH_RECT if step % 2 else cv2.MORPH_CROSS, (3, 3))
+        behind[unknown] = cv2.erode(behind, around)[unknown]
     outside = (~rim.inside).astype(np.uint8)
-    distance, labels = cv2.distanceTransformWithLabels(outside, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-    of_label = np.zeros(labels.max() + 1, np.float32)
-    of_label[labels[rim.inside]] = rim.far[rim.inside]
-    behind = of_label[labels]
-    return np.where(disparity > behind + margin, behind, disparity), np.asarray(distance, np.float32)
+    distance = cv2.distanceTransform(outside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.where(disparity > behind + margin, behind, disparity), np.isfinite(behind) & (distance <= reach)

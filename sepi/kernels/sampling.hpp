@@ -43,6 +43,9 @@ inline float squared_distance(const float *one, const float *other) {
 // Weights of a pixel, its right neighbour, and both below them, for a sample so far below and to the right of it, 0..1.
 inline std::array<float, 4> bilinear_weights(float fy, float fx) { return {(1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx}; }
 
+// Whether what is moved by some whole pixels and a fraction is nearer to the next: halves go to even moves, alike to both sides.
+inline Index is_nearer_next(Index moved, double fraction) { return fraction > 0.5 || (fraction == 0.5 && moved % 2 != 0); }
+
 // Where a sample lies: a pixel, and how far below and to the right of it, 0..1.
 struct Place {
     Index row, column;
@@ -53,8 +56,8 @@ struct Place {
     Index below() const { return row + (fy > 0); }
     Index right() const { return column + (fx > 0); }
 
-    // Row and column of the pixel that is nearest.
-    std::array<Index, 2> nearest() const { return {row + (fy >= 0.5), column + (fx >= 0.5)}; }
+    // Row and column of the pixel that is nearest, of a sample that was moved from (y, x).
+    std::array<Index, 2> nearest(Index y, Index x) const { return {row + is_nearer_next(row - y, fy), column + is_nearer_next(column - x, fx)}; }
 };
 
 // A place in a picture (H, W), unless it lies outside, or is not known.

@@ -28,7 +28,7 @@ from pydantic import Field
 from sepi.image.noise import noise_level
 from sepi.kernels import denoising as kernels
 from sepi.lightfield import FloatMap, LightField, full_scale
-from sepi.matching.view_noise import PARTS, ViewNoise, view_noise
+from sepi.matching.view_noise import PARTS, ViewNoise, part_of_picture, view_noise
 from sepi.stage import Parameters
 from sepi.workspace import OfViews, kept_of
 
@@ -138,7 +138,7 @@ def _is_little(noise: ViewNoise) -> bool:
 
 def _noise_of_parts(image: FloatMap) -> float:
     """Noise of the parts of an image that have most: a scale that bears with it must bear with theirs."""
-    parts = [part for band in np.array_split(image, PARTS) for part in np.array_split(band, PARTS, axis=1)]
+    parts = [image[part_of_picture(number, image.shape[:2])] for number in np.ndindex(PARTS, PARTS)]
     return float(np.quantile([noise_level(part) for part in parts], _NOISIEST))
 
 

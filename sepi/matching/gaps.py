@@ -79,11 +79,16 @@ def with_open_gaps(
     better = there < np.float32(parameters.gap_gain) * here
     # amid like colours: at edges residuals are of interpolation
     voters = asked & _plain(guide, parameters.gap_colour)
-    return np.where(asked & _outvoted(voters, better, seeing / others.sum()), farther, disparity)
+    return np.where(asked & _outvoted(voters, better, seeing, int(others.sum())), farther, disparity)
 
 
 def compared_depths(
-    light_field: LightField, disparity: FloatMap, other: FloatMap, others: BoolMap, occlusion_margin: float
+    light_field: LightField,
+    disparity: FloatMap,
+    other: FloatMap,
+    others: BoolMap,
+    occlusion_margin: float,
+    most: float = np.inf,
 ) -> FloatMap:
     """Squared residuals at two depths, in the views in which nothing hides the second.
 
@@ -96,12 +101,14 @@ def compared_depths(
         The views that are asked; not the reference view.
     occlusion_margin : float
         By how much an occluder in the map ``other`` must be nearer, pixels per view step.
+    most : float
+        That the squared residual of one view counts.
 
     Returns
     -------
     ndarray, shape (3, H, W), float32
-        Sums of the squared residuals at ``other`` and at ``disparity``, colours in 0..1, and of how many views they
-        are.
+        Sums of the squared residuals at ``other`` and at ``disparity``, colours in 0..1, each by the variance of its
+        noise in units of a pixel's, and of how many views they are.
     """
     views = light_field.rgb_views
     depths, unit = (disparity, other, guide_of(light_field)), 1 / full_scale(views.dtype)
@@ -109,7 +116,7 @@ def compared_depths(
     for begin, end, rows in row_bands(light_field, others, float(np.abs(disparity).max()), _BYTES_PER_PIXEL):
         nearest = nearest_surfaces(light_field, other, others, rows)
         asked = (others, light_field.baselines, nearest, rows.low, occlusion_margin)
-        kernels.compare_depths(views, unit, *depths, asked, begin, end, sums)
+        kernels.compare_depths(views, unit, *depths, asked, most, begin, end, sums)
     return sums
 
 
@@ -119,10 +126,12 @@ def _plain(guide: FloatMap, distance: float) -> BoolMap:
     return np.asarray(largest_channel(cv2.dilate(guide, square) - cv2.erode(guide, square)) < np.float32(distance))
 
 
-def _outvoted(voters: BoolMap, better: BoolMap, seeing: FloatMap) -> BoolMap:
+def _outvoted(voters: BoolMap, better: BoolMap, seeing: FloatMap, others: int) -> BoolMap:
     """Where enough voters are about, enough views see what they vote on, and most find the farther depth better."""
+    # sums of whole numbers: exact, in whatever order
     voting, about, seen = (
-        cv2.blur(values.astype(np.float32), (_WINDOW, _WINDOW)) for values in (voters & better, voters, voters * seeing)
+        cv2.boxFilter(values.astype(np.float32), -1, (_WINDOW, _WINDOW), normalize=False)
+        for values in (voters & better, voters, voters * seeing)
     )
-    enough = (about > (_ASKED - 0.5) / _WINDOW**2) & (seen >= _SEEING * about)
+    enough = (about >= _ASKED) & (seen >= _SEEING * others * about)
     return np.asarray(enough & (voting > _MOST * about))

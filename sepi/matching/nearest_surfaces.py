@@ -70,8 +70,9 @@ def z_buffers(
     Returns
     -------
     ndarray, shape (T, S, high - low, W), float32
-        ``EMPTY`` where no pixel falls. A pixel occludes the up to four positions that its square touches, since a
-        bilinear sample beside it reads its colour too.
+        ``EMPTY`` where no pixel falls. A pixel occludes the positions beside which it falls, two along either axis,
+        since a bilinear sample between them reads its colour too, or the one that it falls on. What is at the border of
+        the map goes on beyond it.
     """
     nearest = _with_margin(*present.shape, high - low, disparity.shape[1])
     kernels.z_buffers(np.ascontiguousarray(disparity), present, baselines, low, high, nearest)

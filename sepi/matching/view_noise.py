@@ -24,8 +24,8 @@ from sepi.image.noise import BLACK, SATURATED, mask_energy
 from sepi.kernels import view_noise as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 
-VIEWS = 16
-"""Nearest other views that are compared."""
+VIEWS = 12
+"""Nearest other views that are compared, at least: of those equally far away all."""
 
 MOST_MOVES = 400
 """Beyond so many whole pixels of all of them no other view is compared: where disparities are large, few will do."""
@@ -129,7 +129,9 @@ def view_noise(light_field: LightField) -> ViewNoise:
     place, moves = light_field.reference_position, whole_pixel_moves(light_field)
     # beyond the picture nothing is known
     height, width = light_field.shape
-    differences = np.empty((height // kernels.BLOCK, width // kernels.BLOCK), np.float32)
+    # as many from the one end as from the other: a picture that is turned has the same blocks
+    rows, columns = (2 * (size // (2 * kernels.BLOCK)) or size // kernels.BLOCK for size in (height, width))
+    differences = np.empty((rows, columns), np.float32)
     kernels.least_differences(views, *place, moves, differences)
     between = np.minimum(differences * unit**2 / 2, 1)
     within, level = (
@@ -217,17 +219,22 @@ def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> F
 
 def _by_place(within: FloatMap, between: FloatMap, tells: BoolMap) -> FloatMap:
     """Noise of each part of the picture, from energies of blocks in units of what their brightness has."""
-    down, across = (np.arange(n) * PARTS // max(n, 1) for n in tells.shape)
-    part = down[:, None] * PARTS + across
     factors = np.ones((PARTS, PARTS), np.float32)
-    for number in range(PARTS * PARTS):
-        chosen = tells & (part == number)
+    for number in np.ndindex(PARTS, PARTS):
+        part = part_of_picture(number, tells.shape)
+        chosen = np.zeros_like(tells)
+        chosen[part] = tells[part]
         if chosen.sum() >= LEVELS:
             bounds = _bounds(within[chosen], between[chosen])
             may = chosen.sum() < _ENOUGH or _agreement(*bounds) >= _TRUSTED
             most = _MOST_UNEVEN if may else 1
-            factors.flat[number] = np.clip(min(bounds), 1 / _MOST_UNEVEN, most)
+            factors[number] = np.clip(min(bounds), 1 / _MOST_UNEVEN, most)
     return factors
+
+
+def part_of_picture(number: tuple[int, ...], shape: tuple[int, ...]) -> tuple[slice, ...]:
+    """One of ``PARTS`` x ``PARTS`` parts of a picture; what lies across a border of two belongs to both."""
+    return tuple(slice(i * n // PARTS, -(-(i + 1) * n // PARTS)) for i, n in zip(number, shape, strict=True))
 
 
 def _bounds(within: FloatMap, between: FloatMap) -> tuple[float, float]:
@@ -259,17 +266,24 @@ def whole_pixel_moves(light_field: LightField) -> npt.NDArray[np.int64]:
     others[light_field.reference_position] = False
     places, baselines = np.argwhere(others), light_field.baselines[others]
     moves: list[tuple[int, ...]] = []
-    for n in np.argsort((baselines**2).sum(axis=1), kind="stable")[:VIEWS]:
-        longest = float(np.abs(baselines[n]).max())
-        if longest == 0 or len(moves) > MOST_MOVES:
-            continue
-        for k in np.arange(np.floor(known.minimum * longest), np.ceil(known.maximum * longest) + 1):
-            moves.append((*places[n], *np.rint(-k / longest * baselines[n]).astype(int)))
+    distances, looked_at = (baselines**2).sum(axis=1), 0
+    for distance in np.unique(distances[distances > 0]):
+        if looked_at >= VIEWS or len(moves) > MOST_MOVES:
+            break
+        for n in np.flatnonzero(distances == distance):
+            looked_at += 1
+            longest = float(np.abs(baselines[n]).max())
+            for k in np.arange(np.floor(known.minimum * longest), np.ceil(known.maximum * longest) + 1):
+                moves.append((*places[n], *np.rint(-k / longest * baselines[n]).astype(int)))
     return np.array(moves, np.int64).reshape(-1, 4)
 
 
 def _of_blocks(values: FloatMap, shape: tuple[int, ...], size: int) -> FloatMap:
-    """Means over blocks of ``size`` pixels."""
+    """Means over blocks of ``size`` pixels that lie side by side from all borders."""
     rows, columns = shape
-    blocks = values[: rows * size, : columns * size].reshape(rows, size, columns, size)
+    for axis, number in enumerate(shape):
+        beyond = values.shape[axis] - number * size
+        middle = (number + 1) // 2 * size
+        values = np.delete(values, np.s_[middle : middle + beyond], axis)
+    blocks = values.reshape(rows, size, columns, size)
     return np.asarray(blocks.mean(axis=(1, 3)), np.float32)

@@ -7,6 +7,7 @@ Border that is nearer belongs to what stands before the region.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Self
 
@@ -19,8 +20,8 @@ from sepi.regularization.regions import Plane, basis_of
 from sepi.stage import Parameters
 
 KNOWN_BORDER = 2.0
-"""Pixels of border for each pixel of the side of a square of the region's area, from which it tells whether it is one
-plane: a quarter of the shortest way round, two pixels wide."""
+"""Pixels of border for each pixel of the side of a square of the region's area, from which it tells a plane: a quarter
+of the shortest way round, two pixels wide."""
 
 
 class BorderPlaneParameters(Parameters):
@@ -51,9 +52,13 @@ class BorderPlane:
     pixels: int
     share: float
 
+    def is_known(self, area: int) -> bool:
+        """Whether it is on enough of the way round a region of so many pixels: from one side it leads anywhere."""
+        return self.pixels >= KNOWN_BORDER * math.sqrt(area)
+
     def is_one_plane(self, area: int) -> bool:
-        """Whether most of a border agrees that is known on enough of the way round a region of so many pixels."""
-        return self.pixels >= KNOWN_BORDER * area**0.5 and self.share >= 0.5
+        """Whether most of a border agrees that is known on enough of the way round."""
+        return self.is_known(area) and self.share >= 0.5
 
     @classmethod
     def of(cls, border: BoolMap, disparity: FloatMap, parameters: BorderPlaneParameters) -> Self | None:

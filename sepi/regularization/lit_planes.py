@@ -218,8 +218,12 @@ class _Sums:
         return inverse @ sums @ inverse, self._misfit(varied)
 
     def _misfit(self, varied: npt.NDArray[np.float64]) -> float:
-        y, x = np.nonzero(self.region)
-        part = (y // _PART) * (self.region.shape[1] // _PART + 1) + x // _PART
+        # squares side by side from the middle of the region: it lies in the same ones when it is turned
+        down, across = (
+            (2 * at + 1 - size) // (2 * _PART) + size
+            for at, size in zip(np.nonzero(self.region), self.region.shape, strict=True)
+        )
+        part = down * 2 * self.region.shape[1] + across
         asked, expected = (np.bincount(part, values) for values in (self.gradient, varied))
         many = np.bincount(part) >= _PART**2 // 2
         if not many.any():

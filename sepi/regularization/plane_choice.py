@@ -30,7 +30,7 @@ FAR = 8.0
 STEP = 0.3
 """Disparity by which a part of a region lies off its plane, pixels per view step."""
 
-MOST_MISFIT = 4.0
+MOST_MISFIT = 6.0
 """Times the variance that noise explains, beyond which a region is no plane."""
 
 CLEAR_SHARE = 0.9
@@ -68,11 +68,11 @@ def chosen_plane(
 ) -> Chosen | None:
     """Which plane a region is given; None where it keeps its disparity.
 
-    That of its border, where its light does not contradict it. In noise only of a large region whose border is one
-    plane, since faint texture, which noise hides, knows more than a few pixels beside it; and where what the region
-    has lies about a plane, that one if it is nearer to the light's. Otherwise that of its light, where it contradicts
-    what the region has. Where the light is that of no plane, in noise that of a border that is clearly one, if what the
-    region has is no surface.
+    That of its border, where enough of that is known and its light does not contradict it. In noise only of a large
+    region whose border is one plane, since faint texture, which noise hides, knows more than a few pixels beside it;
+    and where what the region has lies about a plane, that one if it is nearer to the light's. Otherwise that of its
+    light, where it contradicts what the region has. Where the light is that of no plane, in noise that of a border that
+    is clearly one, if what the region has is no surface.
 
     Parameters
     ----------
@@ -87,8 +87,9 @@ def chosen_plane(
     -------
     Chosen or None
     """
-    if border is not None and noisy and not (border.is_one_plane(region.area) and region.area >= LIT_AREA):
-        border = None
+    if border is not None:
+        tells = border.is_one_plane(region.area) and region.area >= LIT_AREA if noisy else border.is_known(region.area)
+        border = border if tells else None
     beside = None if border is None else Chosen(border.plane, "border", False)
     if lit is None:
         return beside

@@ -28,6 +28,7 @@ from sepi.matching.denoising import DenoisedLightField, DenoisingParameters, den
 from sepi.matching.view_noise import variance_map
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
+from sepi.regularization.contradiction import contradicted
 from sepi.regularization.lit_planes import LitPlane, lit_planes
 from sepi.regularization.plane_choice import LIT_AREA, Chosen, chosen_plane, kept_pixels
 from sepi.regularization.pockets import with_pockets
@@ -42,6 +43,9 @@ LEAST_NOISE = 1e-5
 
 LEFT_OF_SLOPES = 15 / 128
 """Of the variance of a difference of neighbours, what the binomial mean leaves of white noise."""
+
+MOST_CONTRADICTED = 0.1
+"""Of a region, that views may know otherwise where its plane is right elsewhere."""
 
 LIT_SHARE = 0.01
 """Of the picture, below which nothing is asked: it takes as long as a round of the optimisation."""
@@ -112,15 +116,24 @@ def fill_uniform_regions(
     planes = _planes_of(found, lit, before.disparity, mean, noisy, parameters)
     disparity, held = before.disparity.copy(), np.zeros_like(core)
     for (region, _), chosen in zip(found, planes, strict=True):
+        if chosen is not None:
+            # a plane that its border holds at one side only may lead anywhere
+            values = np.clip(region.basis @ chosen.plane, known.minimum, known.maximum)
+            disparity[region.place][region.pixels] = values
+    regions = disparity != before.disparity
+    asked = compared, parameters.occlusion_margin, float(np.median(variance))
+    against = contradicted(light_field, before.disparity, disparity, regions, *asked)
+    for (region, _), chosen in zip(found, planes, strict=True):
         place, pixels = region
         if chosen is None:
             continue
-        # a plane that its border holds at one side only may lead anywhere
-        disparity[place][pixels] = np.clip(region.basis @ chosen.plane, known.minimum, known.maximum)
-        if noisy:
-            kept = kept_pixels(pixels, disparity[place], before.disparity[place], chosen)
-            disparity[place][kept] = before.disparity[place][kept]
-            pixels = pixels & ~kept
+        kept = pixels & against[place]
+        if kept.sum() > MOST_CONTRADICTED * pixels.sum():
+            kept = pixels
+        elif noisy:
+            kept |= kept_pixels(pixels, disparity[place], before.disparity[place], chosen)
+        disparity[place][kept] = before.disparity[place][kept]
+        pixels = pixels & ~kept
         # where noise hides faint texture, that may know the surface better than the plane of a border
         faint = noisy and chosen.source == "border" and 2 * core[place][pixels].sum() < pixels.sum()
         held[place] |= pixels & np.bool_(not faint)

@@ -130,7 +130,8 @@ def add_view_twin(
         down, across = (y, x) - disparity[y, x].astype(float) * baseline
         if not (0 <= down <= height - 1 and 0 <= across <= width - 1):
             continue
-        if nearest[int(down + 0.5), int(across + 0.5)] > disparity[y, x] + margin:
+        beside = np.s_[math.floor(down) : math.ceil(down) + 1, math.floor(across) : math.ceil(across) + 1]
+        if nearest[beside].max() > disparity[y, x] + margin:
             continue
         difference = sample_twin(view, down, across) - centre[y, x]
         weights[y, x] = (scale2 / (scale2 + (difference**2).sum())) ** 2

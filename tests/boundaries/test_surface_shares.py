@@ -196,9 +196,9 @@ class Twin:
         found = []
         for n, ((t, s), (v, u)) in enumerate(zip(self.views.places, self.views.baselines, strict=True)):
             down, across = y - d * v, x - d * u
-            if min(down, across) < 0 or down >= self.H - 1 or across >= self.W - 1:
+            if min(down, across) < 0 or down > self.H - 1 or across > self.W - 1:
                 continue
-            if self.views.nearest[t, s, int(down + 0.5), int(across + 0.5)] <= d + self.views.margin:
+            if self.views.nearest[t, s, y - round(d * v), x - round(d * u)] <= d + self.views.margin:
                 found.append((n, cubic(self.pixels[t, s], down, across) * self.views.units[n]))
         return found
 
@@ -241,13 +241,13 @@ class Twin:
         for n, colour in self.seen(near, y, x):
             v, u = self.views.baselines[n]
             down, across = y - (near - far) * v, x - (near - far) * u
-            if min(down, across) < 0 or down >= self.H - 1 or across >= self.W - 1:
+            if min(down, across) < 0 or down > self.H - 1 or across > self.W - 1:
                 continue
-            i, j = int(down), int(across)
+            i, j = min(int(down), self.H - 2), min(int(across), self.W - 2)
             patch = np.s_[i : i + 2, j : j + 2]
-            if (background[patch][..., 3] == background_kernels.UNSEEN).any():
-                continue
             weights = np.outer([1 - (down - i), down - i], [1 - (across - j), across - j])
+            if (background[patch][..., 3][weights > 0] == background_kernels.UNSEEN).any():
+                continue
             colours.append(colour)
             behind.append(np.einsum("ij,ijc->c", weights, background[patch][..., :3]))
             noise.append((weights * background[patch][..., 3]).sum())

@@ -1,5 +1,7 @@
 """The visibility sweep, its z-buffers and the semi-global smoothing equal plain NumPy twins."""
 
+import itertools
+
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
@@ -84,12 +86,12 @@ def test_all_maps_but_the_last_compare_few_views(monkeypatch) -> None:
 def z_buffer_twin(disparity, dt, ds):
     H, W = disparity.shape
     nearest = np.full((H, W), EMPTY)
-    for y, x in np.ndindex(H, W):
-        top, left = int(np.floor(y - disparity[y, x] * dt)), int(np.floor(x - disparity[y, x] * ds))
-        for row in (top, top + 1):
-            for column in (left, left + 1):
-                if 0 <= row < H and 0 <= column < W:
-                    nearest[row, column] = max(nearest[row, column], disparity[y, x])
+    # what is at the border goes on beyond it
+    for y, x in itertools.product(range(-H, 2 * H), range(-W, 2 * W)):
+        d = disparity[min(max(y, 0), H - 1), min(max(x, 0), W - 1)]
+        for row, column in np.ndindex(H, W):
+            if abs(row - (y - d * dt)) < 1 and abs(column - (x - d * ds)) < 1:
+                nearest[row, column] = max(nearest[row, column], d)
     return nearest
 
 
@@ -123,9 +125,11 @@ def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales,
             inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (x <= W - 1)
             seen = np.ones((H, W))
             if nearest is not None:
-                # halves go down, as the kernel's comparison of fractions does
-                near = np.ceil(np.stack([y, x]) - 0.5).astype(int).clip(0, [[[H - 1]], [[W - 1]]])
-                seen = np.where(nearest[t, s][near[0], near[1]] <= np.float32(d + margin), 1, hidden)
+                # halves alike from either side
+                near = np.stack([rows - np.rint(np.float32(d * down)), columns - np.rint(np.float32(d * across))])
+                near = near.astype(int).clip(0, [[[H - 1]], [[W - 1]]])
+                beyond = d + 1.5 * margin - nearest[t, s][near[0], near[1]]
+                seen = np.clip(beyond / max(margin, 1e-6), hidden, 1)
             for values, scale, share in zip(planes, scales, shares, strict=False):
                 sample = np.stack([sampled(c, y, x) for c in values[t, s]])
                 squared = ((sample - values[t0, s0]) ** 2).sum(axis=0)

@@ -86,7 +86,9 @@ def sums_twin(light_field, decomposed, parameters, disparity, margin):
             v, u = light_field.baselines[t, s]
             y, x = rows - disparity * v, columns - disparity * u
             inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (x <= W - 1)
-            position = [np.floor(a + 0.5).astype(int).clip(0, n - 1) for a, n in ((y, H), (x, W))]
+            position = [
+                (a - np.rint(disparity * b)).astype(int).clip(0, n - 1) for a, b, n in ((rows, v, H), (columns, u, W))
+            ]
             seen = inside & (nearest[t, s][tuple(position)] <= disparity + np.float32(margin))
             sample = np.stack([map_coordinates(c.astype(float), [y, x], order=3, mode="mirror") for c in planes[t, s]])
             samples.append((v, u, seen, sample))

@@ -32,7 +32,7 @@ void add_view(Array<const float, 3> view, double v, double u, Array<const float,
         const float d = disparity(y, x);
         const auto place = place_within(y - d * v, x - d * u, H, W);
         if (!place) return;
-        if (const auto [row, column] = place->nearest(); nearest(row, column) > d + margin) return;
+        if (!all_about(*place, [&](Index i, Index j) { return nearest(i, j) <= d + margin; })) return;
         const auto down = cubic_weights(place->fy), across = cubic_weights(place->fx);
         const float *expected = centre.at(y, x);
         float found[C] = {}, z = 0;

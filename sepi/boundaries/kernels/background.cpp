@@ -12,7 +12,7 @@ namespace {
 
 constexpr float NONE = std::numeric_limits<float>::infinity();
 constexpr double MOST_DEVIATION2 = 0.01;  // squared residual that one view counts at most in the background's variance
-constexpr Index STRIDE = 4;               // pixels from one to the next that tell the brightness of a view
+constexpr Index STRIDE = 4;               // pixels from one to the next, from all borders on, that tell the brightness of a view
 constexpr double MOST_DIFFERENCE = 0.1;   // of one channel, that counts in a view's residual
 
 // Median of n numbers, NONE after them, by halving the interval that it lies in: counting vectorises, and sorting does not.
@@ -56,8 +56,10 @@ void brightness_of_views(const RimViews &views, const Sides &sides, Array<const 
             // colours of the pixels that the view shows, there and in the reference view
             std::vector<std::pair<std::array<float, 3>, std::array<float, 3>>> shown;
             double own = 1e-9, other = 1e-9, rest = 0;
-            for (Index y = 0; y < H; y += STRIDE) {
-                for (Index x = 0; x < W; x += STRIDE) {
+            for (Index y = 0; y < H; ++y) {
+                if (std::min(y, H - 1 - y) % STRIDE) continue;
+                for (Index x = 0; x < W; ++x) {
+                    if (std::min(x, W - 1 - x) % STRIDE) continue;
                     const auto place = samples_of.place_in(view, sides.disparity(y, x), y, x);
                     if (!sides.clean(y, x) || !place || !shows(place->row, place->column)) continue;
                     const auto there = samples_of.sample(view, *place);

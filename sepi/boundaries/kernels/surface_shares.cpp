@@ -145,8 +145,9 @@ struct ShownPixel {
     // Colour between pixels of the background, and its variance, if they are known.
     std::optional<std::array<float, 4>> behind(const Place &place) const {
         const auto [row, column, fy, fx] = place;
-        for (Index i = row; i < row + 2; ++i)
-            for (Index j = column; j < column + 2; ++j)
+        // what has no weight need not be known
+        for (Index i = row + (fy == 1); i <= row + (fy > 0); ++i)
+            for (Index j = column + (fx == 1); j <= column + (fx > 0); ++j)
                 if (background(i, j, 3) < 0) return std::nullopt;
         // two pixels side by side
         const Float8 upper = load(background.at(row, column)), lower = load(background.at(row + 1, column));

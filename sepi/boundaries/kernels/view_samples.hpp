@@ -12,17 +12,20 @@ struct ViewSamples {
     const RimViews &views;
     const Array<const Colour, 4> lines;  // those of the views
 
-    // Where a pixel of disparity d lies in a view, if that is amid its pixels.
+    // Where a pixel of disparity d lies in a view, if that is within it: beside the last row and column, not on them.
     [[gnu::always_inline]] std::optional<Place> place_in(Index view, float d, Index y, Index x) const {
         const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
-        return place_amid(down, across, lines.shape[2], views.nearest.shape[3]);
+        const Index H = lines.shape[2], W = views.nearest.shape[3];
+        if (!place_within(down, across, H, W)) return std::nullopt;
+        const Index row = std::min(Index(down), H - 2), column = std::min(Index(across), W - 2);
+        return Place{row, column, down - double(row), across - double(column)};
     }
 
     // The same, if nothing hides it.
     [[gnu::always_inline]] std::optional<Place> place_seen(Index view, float d, Index y, Index x) const {
         const auto place = place_in(view, d, y, x);
         if (!place) return place;
-        const auto [row, column] = place->nearest();
+        const auto [row, column] = place->nearest(y, x);
         return views.nearest(views.places(view, 0), views.places(view, 1), row - views.low, column) <= d + views.margin ? place : std::nullopt;
     }
 

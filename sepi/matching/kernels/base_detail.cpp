@@ -31,7 +31,7 @@ struct Stretch {
     const Index radius = nearness.shape[0] - 1, step = width + 2 * (radius + LANES);
     // the channels and their mean; weights look at twice the radius beyond the ends
     const Scratch<float, 3> rows = zeros<float, 3>(4, number + 2 * radius, width + 4 * radius + LANES);
-    // weights of the pixel dx across, at dx + radius; what comes of them: weighted pixels, and weights
+    // weights of the pixel dx across, at dx + radius; what comes of them: weighted differences, and weights
     const Scratch<float, 2> all_pairs = zeros<float, 2>(2 * radius + 1, step);
     const Scratch<float, 3> sums = zeros<float, 3>(2, number, width + LANES);
 
@@ -50,10 +50,7 @@ struct Stretch {
 
     void filter() {
         // the pixel itself
-        for (Index y = 0; y < number; ++y) {
-            std::copy_n(row(y, 3), width, sums.array().at(0, y));
-            std::fill_n(sums.array().at(1, y), width, 1.0f);
-        }
+        for (Index y = 0; y < number; ++y) std::fill_n(sums.array().at(1, y), width, 1.0f);
         for (Index y = -radius; y < number; ++y) {
             for (Index dy = std::max<Index>(0, -y); dy <= radius; ++dy) {
                 Index half = radius;
@@ -71,8 +68,8 @@ struct Stretch {
     }
 
     void store_detail(Index y, float unit, std::int16_t *out) const {
-        const float *own = row(y, 3), *total = sums.array().at(0, y), *weight = sums.array().at(1, y);
-        for (Index x = 0; x < width; ++x) out[x] = std::int16_t(rounded((own[x] - total[x] / weight[x]) / unit));
+        const float *total = sums.array().at(0, y), *weight = sums.array().at(1, y);
+        for (Index x = 0; x < width; ++x) out[x] = std::int16_t(rounded(-total[x] / weight[x] / unit));
     }
 
     float *row(Index y, Index channel) const { return rows.array().at(channel, y + radius, 2 * radius); }
@@ -95,15 +92,17 @@ struct Stretch {
         }
     }
 
-    // Add weighted pixels of the window to every pixel of row y, in the order of dx.
+    // Add weighted pixels of the window to every pixel of row y, in the order of dx: what they differ by from it, since that
+    // is rounded less than what they are.
     template <class... Rows>
     void add_weighted(Index y, Index first, Index last, Rows... neighbours) {
         float *totals = sums.array().at(0, y), *weights = sums.array().at(1, y);
         for (Index x = 0, end = width; x < end; x += LANES) {
             Float8 total = load(totals + x), weight = load(weights + x);
+            const Float8 middle = load(row(y, 3) + x);
             const auto add = [&](const Neighbours &of, Index dx) {
                 const Float8 w = load(of.weights + dx * of.next_weights + x);
-                total += w * load(of.means + dx * of.next_means + x);
+                total += w * (load(of.means + dx * of.next_means + x) - middle);
                 weight += w;
             };
             for (Index dx = first; dx <= last; ++dx) (add(neighbours, dx), ...);

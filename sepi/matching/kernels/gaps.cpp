@@ -1,4 +1,5 @@
 // What is seen through gaps: farther surfaces of a like colour, and how well both depths fit.
+#include <cmath>
 #include <vector>
 
 #include "kernels/arguments.hpp"
@@ -7,12 +8,14 @@
 namespace sepi {
 namespace {
 
-// Of a bilinear sample of a view (H, W, 3), from reference (3,). Products of 16 bits and a weight are exact as double.
+// Of a bilinear sample of a view (H, W, 3), from reference (3,), in units of what noise makes of it: samples between pixels
+// average noise. Products of 16 bits and a weight are exact as double.
 template <class Colour>
 auto squared_residual(Array<const Colour, 3> view, float unit, double row, double column, Array<const float, 1> reference) {
     using Number = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, float>;
-    const Index top = Index(row), left = Index(column), down = view.strides[0], right = view.strides[1];
+    const Index top = Index(row), left = Index(column);
     const float fy = float(row - double(top)), fx = float(column - double(left));
+    const Index down = fy > 0 ? view.strides[0] : 0, right = fx > 0 ? view.strides[1] : 0;
     const Colour *place = view.at(top, left);
     Number total = 0;
     for (Index c = 0; c < 3; ++c, place += view.strides[2]) {
@@ -21,7 +24,7 @@ auto squared_residual(Array<const Colour, 3> view, float unit, double row, doubl
         const Number residual = ((1 - fy) * above + fy * below) * unit - reference(c);
         total += residual * residual;
     }
-    return total;
+    return total / (1 + (fx * fx + (1 - fx) * (1 - fx)) * (fy * fy + (1 - fy) * (1 - fy)));
 }
 
 // How many of most steps from i stay in a line of n.
@@ -56,9 +59,10 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
 
 // Squared residuals at two depths of the pixels of rows begin..end, in views (T, S, H, W, 3), which unit makes span 0..1, from
 // the reference view (H, W, 3) in 0..1: added to sums (3, H, W) are those at the farther depth, at the other one, and of how
-// many views they are. Asked is where nothing hides the farther depth; where both are equal nothing is compared.
+// many views they are. Asked is where nothing hides the farther depth; where both are equal nothing is compared. The residual of
+// one view counts at most so much.
 void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float,
-                    3> reference, const AskedViews &asked, Index begin, Index end, Array<float, 3> sums) {
+                    3> reference, const AskedViews &asked, float most, Index begin, Index end, Array<float, 3> sums) {
     const Index W = disparity.shape[1];
     const double bottom = double(disparity.shape[0] - 1), right = double(W - 1);
     const auto add_view = [&](const auto &view, Array<const float, 2> nearest, double down, double across, Index y, const std::vector<Index> &columns) {
@@ -67,12 +71,14 @@ void compare_depths(const Views &views, float unit, Array<const float, 2> dispar
             const double row = double(y) - f * down, column = double(x) - f * across;
             const double own_row = double(y) - d * down, own_column = double(x) - d * across;
             if (std::min(row, own_row) < 0 || std::min(column, own_column) < 0) continue;
-            if (std::max(row, own_row) >= bottom || std::max(column, own_column) >= right) continue;
-            const float *above = nearest.at(Index(row) - asked.low, Index(column)), *below = above + nearest.strides[0];
-            if (std::max(std::max(above[0], above[1]), std::max(below[0], below[1])) > f + asked.margin) continue;
+            if (std::max(row, own_row) > bottom || std::max(column, own_column) > right) continue;
+            const float *above = nearest.at(Index(row) - asked.low, Index(column));
+            const float *below = row > std::floor(row) ? above + nearest.strides[0] : above;
+            const Index beside = column > std::floor(column);
+            if (std::max(std::max(above[0], above[beside]), std::max(below[0], below[beside])) > f + asked.margin) continue;
             const auto colour = reference[y][x];
-            sums(0, y, x) = float(sums(0, y, x) + squared_residual(view, unit, row, column, colour));
-            sums(1, y, x) = float(sums(1, y, x) + squared_residual(view, unit, own_row, own_column, colour));
+            sums(0, y, x) += std::min(float(squared_residual(view, unit, row, column, colour)), most);
+            sums(1, y, x) += std::min(float(squared_residual(view, unit, own_row, own_column, colour)), most);
             ++sums(2, y, x);
         }
     };
@@ -89,7 +95,7 @@ void compare_depths(const Views &views, float unit, Array<const float, 2> dispar
 const Submodule submodule("gaps", [](nb::module_ &m) {
     m.def("farther_alike", &farther_alike, Unlocked(), "disparity"_a, "lowest"_a, "colours"_a, "reach"_a, "least_step"_a, "distance2"_a,
           "farther"_a);
-    m.def("compare_depths", &compare_depths, Unlocked(), "views"_a, "unit"_a, "disparity"_a, "farther"_a, "reference"_a, "asked"_a,
+    m.def("compare_depths", &compare_depths, Unlocked(), "views"_a, "unit"_a, "disparity"_a, "farther"_a, "reference"_a, "asked"_a, "most"_a,
           "begin"_a, "end"_a, "sums"_a);
 });
 

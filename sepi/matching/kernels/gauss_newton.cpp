@@ -82,13 +82,16 @@ struct View {
 
     // Find pixels of a row.
     void find(Index row, Pixels &pixels) const {
-        Float8 y = float(row) - pixels.disparity * down, x = pixels.x - pixels.disparity * across;
+        const Float8 up = pixels.disparity * down, back = pixels.disparity * across;
+        Float8 y = float(row) - up, x = pixels.x - back;
         pixels.inside = (y >= 0.0f) & (y <= bottom) & (x >= 0.0f) & (x <= right);
+        // the nearest position, halves alike from either side
+        const Int8 position = (std::int32_t(row - low) - rounded(up)) * std::int32_t(width) + truncated(pixels.x) - rounded(back);
+        store(pixels.nearest, pixels.inside ? position : Int8{});
         // of what is outside, a corner is looked at
         y = pixels.inside ? y : spread(float(low));
         x = pixels.inside ? x : Float8{};
         const Int8 top = truncated(y), left = truncated(x);
-        store(pixels.nearest, (truncated(y + 0.5f) - low) * width + truncated(x + 0.5f));
         store(pixels.coefficients, (top - low) * pitch + left * 4);
         const auto rows = coefficient_weights(y - __builtin_convertvector(top, Float8)), columns = coefficient_weights(x - __builtin_convertvector(left, Float8));
         for (Index n = 0; n < 4; ++n) store(pixels.weights[n], rows[n] | rows[n] << 16);

@@ -16,6 +16,9 @@ float in_order(Float8 lanes) {
     return sum;
 }
 
+// Where block i of n begins along an axis of so many pixels: they lie side by side from both ends.
+Index begin_of(Index i, Index n, Index size) { return 2 * i < n ? i * BLOCK : size - (n - i) * BLOCK; }
+
 // Energy of the differences between a block of one channel and another, without their mean.
 float energy_of(const float *own, const float *other, Index next_row) {
     Float8 squares{}, sums{};
@@ -34,7 +37,7 @@ float energy_of(const float *own, const float *other, Index next_row) {
 void least_differences(const Views &views, Index t0, Index s0, Array<const std::int64_t, 2> moves, Array<float, 2> least) {
     const Index H = shape_of(views)[2], W = shape_of(views)[3], C = shape_of(views)[4];
     parallel_for(0, least.shape[0], [&](Index i) {
-        const Index y = i * BLOCK;
+        const Index y = begin_of(i, least.shape[0], H);
         const Scratch<float, 3> own(C, BLOCK, W), other(C, BLOCK, W);
         load_rows(views, t0, s0, y, own.array());
         float *found = least.at(i);
@@ -44,7 +47,7 @@ void least_differences(const Views &views, Index t0, Index s0, Array<const std::
             if (row < 0 || row + BLOCK > H) continue;
             load_rows(views, moves(n, 0), moves(n, 1), row, other.array());
             for (Index j = 0; j < least.shape[1]; ++j) {
-                const Index x = j * BLOCK;
+                const Index x = begin_of(j, least.shape[1], W);
                 if (x + across < 0 || x + across + BLOCK > W) continue;
                 float energy = 0;
                 for (Index c = 0; c < C; ++c) energy += energy_of(own.array().at(c, 0, x), other.array().at(c, 0, x + across), W);

@@ -1,4 +1,6 @@
 // The visibility sweep: z-buffers of every view, and costs over the views that see a pixel.
+#include <vector>
+
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 #include "sweep_arrays.hpp"
@@ -37,30 +39,71 @@ struct Visibility {
 };
 
 constexpr float ROUNDING = 1.0f / 512;  // how far a position is from the same in single precision, at most, pixels
+constexpr float LEAST_MARGIN = 1e-6f;   // by which an occluder must be nearer
 constexpr float COLOUR_STEPS = 20000;   // from black to white, of colours as whole numbers of 16 bits
 constexpr std::int64_t ONE = 1 << 14;   // the sum of a sample's weights, which are whole numbers of 16 bits
 
-// Add a row of the reference view, W pixels at y, to what is nearest of the pixels whose square begins at a position of a
-// view. Pixels of a smooth surface lie side by side in the view, too: eight at once.
-void add_row(const float *row, Index W, Index y, double down, double across, Array<float, 2> begun) {
-    const auto top_of = [=](Index x) { return Index(std::floor(double(y) - row[x] * down)); };
-    const auto left_of = [=](Index x) { return Index(std::floor(double(x + 1) - row[x] * across)); };
-    for (Index begin = 0; begin < W; begin += LANES) {
-        const Index end = std::min(W, begin + LANES), top = top_of(begin), left = left_of(begin);
-        if (begin + LANES <= W && 0 <= top && top < begun.shape[0] && 0 <= left && left + LANES <= begun.shape[1]) {
-            // how far beyond where the first begins, of 0..1 if they lie side by side
-            const Float8 d = load(row + begin), dy = float(y - top) - d * float(down), dx = float(begin + 1 - left) - d * float(across);
-            if (least_of(smaller(smaller(dy, 1.0f - dy), smaller(dx, 1.0f - dx))) > ROUNDING) {
-                float *place = begun.at(top, left);
-                store(place, larger(load(place), d));
-                continue;
+// What is nearest in a view: a pixel hides the positions beside which it falls, two along either axis, or the one that it falls
+// on. It is kept by where these squares of positions begin, outside, too; what falls on a position, by itself.
+struct NearestInView {
+    const double down, across;
+    const Array<float, 2> nearest;  // its rows are those that are drawn
+    const Index H = nearest.shape[0], W = nearest.shape[1];
+    const Scratch<float, 2> squares = Scratch<float, 2>(H + 1, W + 1).filled(EMPTY);
+    std::vector<bool> drawn = std::vector<bool>(H);
+
+    // Add pixel x of a row y of the reference view, and where it is the first or last what goes on beyond it.
+    void add(const float *row, Index y, Index x, bool all_before, bool all_beyond) {
+        const double i = double(y) - row[x] * down, j = double(x) - row[x] * across;
+        const Index top = Index(std::floor(i)), left = Index(std::floor(j));
+        const bool on_row = i == double(top), on_column = j == double(left);
+        if ((on_row && down != 0) || (on_column && across != 0)) {
+            for (Index k = std::max<Index>(0, top); k <= std::min(H - 1, top + !on_row); ++k) {
+                if (!drawn[k]) std::fill_n(nearest.at(k), W, EMPTY);
+                drawn[k] = true;
+                raise(nearest.at(k), all_before ? 0 : left, all_beyond ? W - 1 : std::min(W - 1, left + !on_column), row[x]);
+            }
+        } else if (0 <= top + 1 && top + 1 <= H) {
+            raise(squares.array().at(top + 1), all_before ? 0 : left + 1, all_beyond ? W : std::min(W, left + 1), row[x]);
+        }
+    }
+
+    // Add a row of the reference view. Pixels of a smooth surface lie side by side in the view, too: eight at once.
+    void add_row(const float *row, Index y) {
+        // how far beyond where the first begins, of 0..1 if they lie side by side
+        const auto between = [](Float8 beyond) { return least_of(smaller(beyond, 1.0f - beyond)) > ROUNDING; };
+        for (Index begin = 0; begin < W; begin += LANES) {
+            const Index top = Index(std::floor(double(y) - row[begin] * down)) + 1, left = Index(std::floor(double(begin) - row[begin] * across)) + 1;
+            if (begin + LANES <= W && 0 <= top && top <= H && 0 <= left && left + LANES <= W + 1) {
+                const Float8 d = load(row + begin), dy = float(y + 1 - top) - d * float(down), dx = float(begin + 1 - left) - d * float(across);
+                if ((down == 0 || between(dy)) && (across == 0 || between(dx))) {
+                    float *place = squares.array().at(top, left);
+                    store(place, larger(load(place), d));
+                    continue;
+                }
+            }
+            for (Index x = begin; x < std::min(W, begin + LANES); ++x) add(row, y, x, false, false);
+        }
+        add(row, y, 0, true, false);
+        add(row, y, W - 1, false, true);
+    }
+
+    void finish() {
+        for (Index y = 0; y < H; ++y) {
+            const float *above = squares.array().at(y + (down == 0)), *here = squares.array().at(y + 1);
+            float *found = nearest.at(y);
+            for (Index x = 0, left = across == 0; x < W; ++x) {
+                const float value = std::max(std::max(above[x + left], above[x + 1]), std::max(here[x + left], here[x + 1]));
+                found[x] = drawn[y] ? std::max(found[x], value) : value;
             }
         }
-        for (Index x = begin; x < end; ++x)
-            if (const Index i = top_of(x), j = left_of(x); 0 <= i && i < begun.shape[0] && 0 <= j && j < begun.shape[1])
-                begun(i, j) = std::max(begun(i, j), row[x]);
     }
-}
+
+  private:
+    static void raise(float *line, Index first, Index last, float value) {
+        for (Index j = std::max<Index>(0, first); j <= last; ++j) line[j] = std::max(line[j], value);
+    }
+};
 
 // What a row of the reference view is compared with, and what comes of it.
 struct VisibleRow {
@@ -124,6 +167,7 @@ struct VisibleRow {
         const auto nearest = visibility.nearest[t][s];
         const bool some_hide = nearest.shape[1] > 0;
         const Float8 hidden = spread(visibility.occluded_view_weight);
+        const float margin = visibility.occlusion_margin, steepness = 1 / std::max(margin, LEAST_MARGIN);
         const std::array scale2{colour_scale2, detail_scale2}, share{shares(0), shares(1)};
         for (Index k = 0; k < K; ++k) {
             const auto [top, fy] = upper_row(y, candidates.down(r, k), candidates.fy(r, k), H);
@@ -136,8 +180,10 @@ struct VisibleRow {
             const auto below = std::int64_t(double(fy) * ONE + 0.5), right = std::int64_t((ONE - below) * double(fx) + 0.5);
             const auto lower_right = std::int64_t(below * double(fx) + 0.5);
             const Int8 upper = pair_of(ONE - below - right, right), lower = pair_of(below - lower_right, lower_right);
-            const Float8 limit = spread(candidates.disparities(k) + visibility.occlusion_margin);
-            const float *before = some_hide ? nearest.at(top - views.low + (fy > 0.5f), first + left + (fx > 0.5f)) : nullptr;
+            // a surface hides more and more, from half a margin nearer to one and a half: it is not known better
+            const Float8 limit = spread(candidates.disparities(k) + 1.5f * margin);
+            const Index lower_row = top - views.low + is_nearer_next(candidates.down(r, k), fy);
+            const float *before = some_hide ? nearest.at(lower_row, first + left + is_nearer_next(left, fx)) : nullptr;
             const std::int32_t *pairs = view_pairs.array().at(top - low, 0, first + left);
             const float *reference = own.array().data + first;
             float *sum = sums.array().at(k, 0, first);
@@ -145,7 +191,7 @@ struct VisibleRow {
                 Float8 seen = spread(1);
                 if (some_hide) {
                     const Float8 found = load(before);
-                    seen = found <= limit ? seen : found < MISSING ? hidden : Float8{};
+                    seen = found < MISSING ? larger(hidden, smaller(seen, (limit - found) * steepness)) : Float8{};
                     before += LANES;
                 }
                 // pixels beyond the last add nothing to what others have added
@@ -186,31 +232,24 @@ void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, St
     over_stretches(present.shape, 1, 1, [&, least = double(*least), most = double(*most)](Index t, Index s, Index, Index) {
         if (!present(t, s)) return;
         const double v = baselines(t, s, 0), u = baselines(t, s, 1);
-        // rows farther away do not get here
-        const Index first = std::max<Index>(0, Index(std::floor(low - 1 + std::min(least * v, most * v))));
-        const Index last = std::min(H, Index(std::ceil(high + std::max(least * v, most * v))) + 1);
-        // of pixels that begin outside, too
-        const auto begun = Scratch<float, 2>(high - low + 1, W + 1).filled(EMPTY);
-        for (Index y = first; y < last; ++y) add_row(disparity.at(y), W, y + 1 - low, v, u, begun.array());
-        for (Index row = 0; row < high - low; ++row) {
-            const float *above = begun.array().at(row), *here = begun.array().at(row + 1);
-            float *target = out.at(t, s, row);
-            for (Index x = 0; x < W; ++x) target[x] = std::max(std::max(above[x], above[x + 1]), std::max(here[x], here[x + 1]));
-        }
+        // rows farther away do not get here; beyond the picture goes on what is at its border
+        const Index first = Index(std::floor(low - 1 + std::min(least * v, most * v))), last = Index(std::ceil(high + std::max(least * v, most * v))) + 1;
+        NearestInView view{v, u, out[t][s]};
+        for (Index y = first; y < last; ++y) view.add_row(disparity.at(clamped(y, H)), y - low);
+        view.finish();
     });
 }
 
 // Pixels that something nearer occludes in one of the views that could see them, of rows begin..end of the map: those of
 // out (H, W) that it sets.
 void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &views, Index begin, Index end, Array<bool, 2> out) {
-    const double H = double(disparity.shape[0]), W = double(disparity.shape[1]);
+    const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for(begin, end, [&](Index y) {
         views.for_each([&](Index t, Index s, double down, double across) {
-            for (Index x = 0; x < disparity.shape[1]; ++x) {
+            for (Index x = 0; x < W; ++x) {
                 const float d = disparity(y, x);
-                const double row = double(y) - d * down + 0.5, column = double(x) - d * across + 0.5;
-                if (row >= 0 && column >= 0 && row < H && column < W)
-                    out(y, x) |= views.nearest(t, s, Index(row) - views.low, Index(column)) > d + views.margin;
+                const Index row = y - Index(std::nearbyint(d * down)), column = x - Index(std::nearbyint(d * across));
+                if (row >= 0 && column >= 0 && row < H && column < W) out(y, x) |= views.nearest(t, s, row - views.low, column) > d + views.margin;
             }
         });
     });
