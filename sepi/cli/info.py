@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -103,10 +104,11 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
 
     Software does not agree on whether rows of views go up or down, columns left or right, or which of the two comes
     first; in a wrong order depth is inside out or nonsense. The views tell: all eight orders are tried, and the flag
-    is named that sets INPUT right. Views that fit none of the others are named, too. Exits with 1 where another order
-    clearly fits better, the views fit in none, or some of them fit none of the others; with 2 where INPUT cannot be
-    read.
+    is named that sets INPUT right. Views that fit none of the others are named, too. Where all is well with them, warns
+    of a part of the scene that is not in the disparity range. Exits with 1 where another order clearly fits better, the
+    views fit in none, or some of them fit none of the others; with 2 where INPUT cannot be read.
     """
+    from sepi.inspection.disparity_range import settle_range
     from sepi.inspection.odd_views import odd_views
     from sepi.inspection.row_spacing import settle_row_spacing
     from sepi.inspection.view_order import check_order
@@ -144,6 +146,9 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
             click.echo(line)
     if odd or found.warning() is not None:
         context.exit(1)
+    # views without texture have no range, and are no failure here
+    with suppress(SepiError):
+        settle_range(light_field)
 
 
 def size_text(light_field: LightField) -> str:

@@ -1,32 +1,33 @@
 """Find the disparity range of a scene from its views alone.
 
-A coarse plane sweep over far more disparities than a scene has tells where the scene lies; a second one, about there
-only, with views as far away as possible, tells its range. Only disparities that can be trusted count: those of
-surfaces, patches of pixels whose best match is unambiguous and whose neighbours agree. The range is that of nearly all
-of them, with a margin: one that is too narrow spoils the nearest or most distant surface, one that is too wide costs
-time and accuracy.
+A coarse plane sweep over all disparities that a scene may have, by the nearest views, tells where the scene lies; a
+second one, about there only, by views as far away as possible, tells its range. Only disparities that can be trusted
+count: those of surfaces, patches of pixels whose best match is unambiguous and whose neighbours agree; where there are
+few views, also one that matches back. The range is that of nearly all of them, with a margin: one that is too narrow
+spoils the nearest or most distant surface, one that is too wide costs time and accuracy.
+
+A third sweep tells of any range whether the scene is in it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import NamedTuple
+import warnings
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
 
 from sepi.channels import largest_channel, mean_of_channels
-from sepi.errors import SepiError
+from sepi.errors import SepiError, SepiWarning
+from sepi.image.noise import noise_of_reference_view
 from sepi.inspection.coarse_sweep import agreeing, coarse_sweep
 from sepi.inspection.dark_corners import dark_corners
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float, require_light_field
 
-# Search: pixels per view step to each side at first, and if surfaces lie beyond; views up to this many steps away at
-# first, and if surfaces move by more than so many pixels
-_EXTENTS = (16.0, 32.0, 64.0, 128.0)
-_REACHES = (4, 2, 1)
-_FAR = 40.0
+# Search: pixels per view step to each side, and at most this part of a view
+_WIDEST = 128.0
+_WIDEST_PART = 0.75
 # movement in the farthest view when the range is measured: pixels at most, also as part of the shorter side; sampling
 _MOST_MOVEMENT = 24.0
 _MOST_MOVEMENT_PART = 0.25
@@ -35,13 +36,13 @@ _SAMPLING = 0.5
 _MOST_VIEWS = 16
 # views that are much darker than the reference are not looked at
 _LEAST_BRIGHTNESS = 0.3
-# larger pictures are reduced by a whole factor
+# larger pictures are reduced by a whole factor; those that are searched by a larger one
 _MOST_PIXELS = 600_000
+_MOST_SEARCHED = 100_000
 
-# Filters, pixels: against noise, against differences of brightness between views; matching windows of the two sweeps
+# Filters, pixels: against noise, against differences of brightness between views; matching window
 _BLUR_SIGMA = 0.8
 _HIGH_PASS = 9
-_SEARCH_RADIUS = 2
 _RADIUS = 3
 # window of the median of disparities
 _MEDIAN = 5
@@ -63,25 +64,28 @@ _FAINT = 4 / 255
 # pixels of a window of so many, itself included, that agree within a candidate step
 _SUPPORT_WINDOW = 5
 _LEAST_SUPPORT = 13
-# pixels of a patch, as part of the picture, and at least
+# pixels of a patch, each counted by how clear its match is: as part of the picture, and at least
 _PATCH = 3e-4
-_FEWEST_PIXELS = 20
-# trusted pixels for the search to end, as part of the picture
-_ENOUGH = 0.02
+_FEWEST_PIXELS = 25
+# so few views must match back
+_FEW_VIEWS = 2
 
-# Range: part of the pixels that is left out on either side, and the margin, as part of the span; in the search, fewer
+# Range: part of the pixels that is left out on either side, and the margin, as part of the span
 _OUTLIERS = 0.001
 _MARGIN = 0.06
-_SEARCH_OUTLIERS = 0.0002
-# outliers when it is decided whether surfaces lie beyond what was searched
-_BEYOND = 0.001
+# part of the pixels that move less than what is told to keep views near enough
+_USUAL = 0.95
 
+# A range without the scene: mean above which there is texture, full range = 1; lowest cost of what matches nowhere, as
+# part of that mean; side of its patches, pixels; their part of the textured pixels
+_TEXTURE = 0.003
+_MISFIT = 0.9
+_HOLE = 5
+_MOST_UNMATCHED = 0.08
 
-class _Found(NamedTuple):
-    """Disparities of the pixels that are trusted, and those of the patches that they make; pixels per view step."""
-
-    pixels: FloatMap
-    patches: FloatMap
+# row and column of a view in the grid
+_Position = tuple[int, int]
+_Positions = list[_Position]
 
 
 def estimate_range(light_field: LightField) -> DisparityRange:
@@ -121,29 +125,32 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     'estimated'
     """
     require_light_field(light_field)
-    factor = math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS))
-    views = _Views(light_field, factor)
-    low, high, sampling = _searched(views)
-    # the search is sure to about two candidates
-    measured, reach = _measured(views, low - 2 * sampling, high + 2 * sampling)
-    if measured.pixels.size < _FEWEST_PIXELS:
-        raise _undecided(light_field)
-    low, high = (float(value) for value in np.quantile(measured.pixels, [_OUTLIERS, 1 - _OUTLIERS]))
-    # small surfaces far before or behind the others are not outliers
-    low, high = min(low, float(measured.patches.min())), max(high, float(measured.patches.max()))
-    margin = max(_MARGIN * (high - low), _SAMPLING / 10 / reach)
+    coarse, fine = _Views(light_field, _MOST_SEARCHED), _Views(light_field, _MOST_PIXELS)
+    nearest = coarse.nearest
+    widest = min(_WIDEST, _WIDEST_PART * max(light_field.shape) / nearest)
+    low, high, usual = coarse.ends(nearest, -widest, widest, 1.0)
+    # the search is sure to about a candidate
+    slack = coarse.factor / nearest
+    if coarse.reach(usual) > nearest:
+        # more views, which few things match by chance
+        low, high, usual = coarse.ends(coarse.reach(usual), low - slack, high + slack, _SAMPLING)
+    reach = fine.reach(usual)
+    low, high, _ = fine.ends(reach, low - slack, high + slack, _SAMPLING)
+    margin = max(_MARGIN * (high - low), fine.factor * _SAMPLING / 10 / reach)
     # two decimals more than the margin's first: numbers that can be read and typed
-    digits = max(2, 1 - math.floor(math.log10(factor * margin)))
+    digits = max(2, 1 - math.floor(math.log10(margin)))
     scale = 10**digits
     return DisparityRange(
-        math.floor(scale * factor * (low - margin)) / scale,
-        math.ceil(scale * factor * (high + margin)) / scale,
+        math.floor(scale * (low - margin)) / scale,
+        math.ceil(scale * (high + margin)) / scale,
         "estimated",
     )
 
 
 def settle_range(light_field: LightField, given: tuple[float, float] | None = None) -> LightField:
     """The light field with a disparity range: the given one, else its own, else one estimated from the views.
+
+    Warns (:class:`sepi.errors.SepiWarning`) where a part of the scene is not in it.
 
     Raises
     ------
@@ -154,52 +161,80 @@ def settle_range(light_field: LightField, given: tuple[float, float] | None = No
     if given is not None:
         light_field = light_field.with_range(DisparityRange(*given, "given"))
     if light_field.disparity_range is None:
-        return light_field.with_range(estimate_range(light_field))
-    known, side = light_field.disparity_range, max(light_field.shape)
+        light_field = light_field.with_range(estimate_range(light_field))
+    known, side = light_field.require_disparity_range(), max(light_field.shape)
     if max(-known.minimum, known.maximum) >= side:
         raise SepiError(
             f"{light_field.source or light_field.name}: disparity range ({known.source}) of {known.minimum:g} to "
             f"{known.maximum:g} pixels per view step; expected less than the {side} pixels of a view"
         )
+    share = unmatched(light_field)
+    if share > _MOST_UNMATCHED:
+        warnings.warn(
+            f"{light_field.source or light_field.name}: {100 * share:.0f} % of the textured pixels match nowhere in "
+            f"the disparity range ({known.source}) of {known.minimum:g} to {known.maximum:g} pixels per view step; "
+            "give another one by --disparity-range",
+            SepiWarning,
+            stacklevel=2,
+        )
     return light_field
+
+
+def unmatched(light_field: LightField) -> float:
+    """Part of the textured pixels that match nowhere in the light field's disparity range, 0..1.
+
+    Only those count that the other views show over the whole range. Where nearer things hide some from all of these, it
+    is up to 0.06 of a range that holds the scene.
+
+    Raises
+    ------
+    SepiError
+        If there is no range.
+    """
+    known = light_field.require_disparity_range()
+    views = _Views(light_field, _MOST_SEARCHED)
+    reach = views.reach(max(-known.minimum, known.maximum))
+    positions = views.positions(reach, [reach])
+    # the lowest cost is none at an end of the candidates
+    step = _SAMPLING * views.factor / reach
+    candidates = views.candidates(reach, known.minimum - step, known.maximum + step, _SAMPLING)
+    cost = views.sweep(positions, candidates, truncation=math.inf)[0]
+    texture = cv2.blur(abs(views.reference), (2 * _RADIUS + 1, 2 * _RADIUS + 1))
+    # the mean of filtered noise is a quarter of its deviation
+    textured = views.seen & (texture > max(_TEXTURE, noise_of_reference_view(light_field) / views.factor))
+    y, x = np.ceil(abs(views.offsets(positions)).max(axis=0) * abs(candidates).max()).astype(int) + _RADIUS
+    counted = textured[y:-y, x:-x]
+    if not counted.any():
+        return 0.0
+    alone = (counted & ~(cost < _MISFIT * texture)[y:-y, x:-x]).astype(np.uint8)
+    # not the narrow bands beside edges that hide them from some views
+    patches = cv2.morphologyEx(alone, cv2.MORPH_OPEN, np.ones((_HOLE, _HOLE), np.uint8))
+    return float(patches.sum() / counted.sum())
 
 
 class _Views:
     """The reference view and others, filtered, reduced by a whole factor; disparities are in reduced pixels."""
 
-    def __init__(self, light_field: LightField, factor: int) -> None:
-        self.light_field, self._factor = light_field, factor
-        self._prepared: dict[tuple[int, int], FloatMap] = {}
+    def __init__(self, light_field: LightField, most_pixels: int) -> None:
+        self.light_field = light_field
+        self.factor = math.ceil(math.sqrt(math.prod(light_field.shape) / most_pixels))
+        self._prepared: dict[_Position, FloatMap] = {}
         self._own = light_field.reference_position
         self._brightness = float(light_field.reference_view.mean())
         self.reference = self._view(self._own)
-        self.seen = ~dark_corners(light_field.reference_view, self.reference.shape, _HIGH_PASS + _SEARCH_RADIUS)
+        self.seen = ~dark_corners(light_field.reference_view, self.reference.shape, _HIGH_PASS + _RADIUS)
         view = light_field.reference_view
         brightest = float(np.quantile(largest_channel(view), 0.99))
         self._flat = max(_FLAT * brightest, _FLAT_BLOCKS if _has_blocks(view) else 0.0)
+        away = abs(np.argwhere(light_field.present) - self._own).max(axis=1)
+        self.nearest, self._farthest = int(away[away > 0].min()), int(away.max())
 
-    def distances(self) -> tuple[int, int]:
-        """Rows or columns from the reference view to the nearest and the farthest other view."""
-        away = abs(np.argwhere(self.light_field.present) - self._own).max(axis=1)
-        away = away[away > 0]
-        return int(away.min()), int(away.max())
+    def reach(self, disparity: float) -> int:
+        """Rows or columns to the farthest views in which a disparity does not move a pixel too far."""
+        movement = min(_MOST_MOVEMENT * self.factor, _MOST_MOVEMENT_PART * min(self.light_field.shape))
+        return int(max(self.nearest, min(self._farthest, movement / max(disparity, 1e-3))))
 
-    def sweep(self, reach: int, distances: Iterable[int], candidates: FloatMap, radius: int) -> _Found:
-        """Match the reference with views at some distances, ``reach`` at most; disparities that can be trusted."""
-        positions = self._positions(reach, set(distances))
-        if not positions:
-            return _Found(np.empty(0, np.float32), np.empty(0, np.float32))
-        views = np.stack([self._view(position) for position in positions])
-        baselines = self.light_field.baselines[tuple(np.transpose(positions))].astype(np.float32)
-        sweep = coarse_sweep(self.reference, views, baselines, candidates, _TRUNCATION, radius)
-        sampling = float(candidates[1] - candidates[0])
-        # neighbours agree within a pixel of the most distant view, however finely it is searched
-        tolerance = max(sampling, 1 / reach)
-        # against noise, which would stretch the range
-        smooth = np.asarray(cv2.medianBlur(sweep[-1], _MEDIAN), np.float32)
-        return _patches(_trusted(*sweep, tolerance, self._flat) & self.seen, smooth, tolerance)
-
-    def _positions(self, reach: int, distances: set[int]) -> list[tuple[int, int]]:
+    def positions(self, reach: int, distances: Sequence[int]) -> _Positions:
         """Grid positions in the row and the column of the reference view; any others where those are not there."""
         t0, s0 = self._own
         present = [
@@ -209,78 +244,81 @@ class _Views:
         ]
         cross = [(t, s) for t, s in present if t == t0 or s == s0]
         if len(cross) < 2:
-            return self._bright(present[:: math.ceil(len(present) / _MOST_VIEWS)]) if present else []
+            return self._bright(present[:: math.ceil(len(present) / _MOST_VIEWS)])
         return self._bright([(t, s) for t, s in cross if max(abs(t - t0), abs(s - s0)) in distances] or cross)
 
-    def _bright(self, positions: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    def candidates(self, reach: int, low: float, high: float, sampling: float) -> FloatMap:
+        """Disparities between two, ``sampling`` pixels apart in views ``reach`` steps away."""
+        sampling /= reach
+        numbers = np.arange(math.floor(low / self.factor / sampling), math.ceil(high / self.factor / sampling) + 1)
+        return (numbers * sampling).astype(np.float32)
+
+    def offsets(self, positions: _Positions, own: _Position | None = None) -> FloatMap:
+        """Baselines (V, 2) from a view, the reference view unless given, to others."""
+        baselines = self.light_field.baselines
+        return np.asarray(baselines[tuple(np.transpose(positions))] - baselines[own or self._own], np.float32)
+
+    def sweep(
+        self, positions: _Positions, candidates: FloatMap, own: _Position | None = None, truncation: float = _TRUNCATION
+    ) -> tuple[FloatMap, FloatMap, FloatMap, FloatMap]:
+        """Match a view, the reference view unless given, with others (:func:`coarse_sweep`)."""
+        views = np.stack([self._view(position) for position in positions])
+        offsets = self.offsets(positions, own)
+        return coarse_sweep(self._view(own or self._own), views, offsets, candidates, truncation, _RADIUS)
+
+    def ends(self, reach: int, low: float, high: float, sampling: float) -> tuple[float, float, float]:
+        """Lowest and highest disparity that can be trusted, by views at most ``reach`` away, and how far most move."""
+        positions = self.positions(reach, [max(1, round(reach * n / 4)) for n in range(1, 5)])
+        candidates = self.candidates(reach, low, high, sampling)
+        lowest, second, mean, disparity = self.sweep(positions, candidates)
+        # neighbours agree within a pixel of the most distant view, however finely it is searched
+        tolerance = max(sampling, 1) / reach
+        trusted = _trusted(lowest, second, mean, disparity, tolerance, self._flat) & self.seen
+        if len(positions) <= _FEW_VIEWS:
+            trusted &= self._matches_back(positions, candidates, disparity, tolerance)
+        # against noise, which would stretch the range
+        smooth = np.asarray(cv2.medianBlur(disparity, _MEDIAN), np.float32)
+        # of few views a match that is hardly clear counts less
+        unclear = np.divide(lowest, second, out=np.ones_like(lowest), where=trusted)
+        pixels, patches = _patches(trusted, np.minimum(1, len(positions) * (1 - unclear)) ** 2, smooth, tolerance)
+        if pixels.size < _FEWEST_PIXELS:
+            raise SepiError(
+                f"{self.light_field.name}: the disparity range cannot be estimated, too few pixels match between the "
+                "views; give one (MIN MAX, pixels per view step)"
+            )
+        low, high = np.quantile(pixels, [_OUTLIERS, 1 - _OUTLIERS])
+        # small surfaces far before or behind the others are not outliers
+        found = min(low, patches.min()), max(high, patches.max()), np.quantile(abs(pixels), _USUAL)
+        low, high, usual = (self.factor * float(value) for value in found)
+        return low, high, usual
+
+    def _matches_back(
+        self, positions: _Positions, candidates: FloatMap, disparity: FloatMap, tolerance: float
+    ) -> BoolMap:
+        """Whether the first of the other views, matched with all others, has the same disparity there, shape (H, W)."""
+        first, *others = positions
+        back = self.sweep([self._own, *others], candidates, first)[-1]
+        down, across = self.offsets([first])[0]
+        y, x = np.indices(disparity.shape, np.float32)
+        there = cv2.remap(back, x - disparity * across, y - disparity * down, cv2.INTER_NEAREST, borderValue=math.inf)
+        return np.asarray(abs(there - disparity) < tolerance)
+
+    def _bright(self, positions: _Positions) -> _Positions:
         """Those that are not much darker than the reference view; all, if that leaves too few."""
         views = self.light_field.rgb_views
         limit = _LEAST_BRIGHTNESS * float(views[self._own].mean())
         bright = [position for position in positions if float(views[position].mean()) >= limit]
         return bright if len(bright) > 1 else positions
 
-    def _view(self, position: tuple[int, int]) -> FloatMap:
+    def _view(self, position: _Position) -> FloatMap:
         if position not in self._prepared:
             view = np.asarray(mean_of_channels(as_unit_float(self.light_field.rgb_views[position])), np.float32)
             # as bright as the reference: lenses darken the views towards the edge of the grid
             mean = float(view.mean())
             if position != self._own and mean > 0:
                 view *= np.float32(self._brightness / mean)
-            self._prepared[position] = _prepared(view, self._factor)
+            self._prepared[position] = _prepared(view, self.factor)
         return self._prepared[position]
-
-
-def _searched(views: _Views) -> tuple[float, float, float]:
-    """Lowest and highest disparity of a wide search, and its sampling."""
-    nearest, farthest = views.distances()
-    if nearest > _REACHES[0]:
-        raise SepiError(f"{views.light_field.name}: no view within {_REACHES[0]} steps of the centre is present")
-    best, sampling, extent = _Found(np.empty(0, np.float32), np.empty(0, np.float32)), 1.0, 0.0
-    size = views.reference.size
-    for reach in [n for n in _REACHES if nearest <= n <= farthest] or [nearest]:
-        # at most half a picture at the most distant view
-        widest = max(views.reference.shape) / 2 / reach
-        for wanted in sorted({min(wanted, widest) for wanted in _EXTENTS}):
-            if wanted < extent:
-                continue
-            number = max(1, math.ceil(wanted * reach))
-            candidates = (np.arange(-number, number + 1) / reach).astype(np.float32)
-            found = views.sweep(reach, range(1, reach + 1), candidates, _SEARCH_RADIUS)
-            if found.pixels.size > best.pixels.size:
-                best, sampling, extent = found, 1 / reach, wanted
-            if found.pixels.size > _ENOUGH * size and _largest(found) < wanted - max(1, 2 / reach):
-                break
-        if best.pixels.size > _ENOUGH * size and _largest(best) / sampling < _FAR:
-            break
-    if best.pixels.size < _FEWEST_PIXELS:
-        raise _undecided(views.light_field)
-    low, high = np.quantile(best.pixels, [_SEARCH_OUTLIERS, 1 - _SEARCH_OUTLIERS])
-    return float(low), float(high), sampling
-
-
-def _measured(views: _Views, low: float, high: float) -> tuple[_Found, int]:
-    """Disparities between two, by views as far away as possible; and how far that is."""
-    _, farthest = views.distances()
-    movement = min(_MOST_MOVEMENT, _MOST_MOVEMENT_PART * min(views.reference.shape))
-    reach = int(max(1, min(farthest, movement / max(abs(low), abs(high)))))
-    sampling = _SAMPLING / reach
-    numbers = np.arange(math.floor(low / sampling), math.ceil(high / sampling) + 1)
-    distances = [max(1, round(reach * n / 4)) for n in range(1, 5)]
-    return views.sweep(reach, distances, (numbers * sampling).astype(np.float32), _RADIUS), reach
-
-
-def _largest(found: _Found) -> float:
-    """Largest absolute disparity but for outliers; infinite if there are none."""
-    if not found.pixels.size:
-        return math.inf
-    return float(abs(np.quantile(found.pixels, [_BEYOND, 1 - _BEYOND])).max())
-
-
-def _undecided(light_field: LightField) -> SepiError:
-    return SepiError(
-        f"{light_field.name}: the disparity range cannot be estimated, too few pixels match between the views; "
-        "give one (MIN MAX, pixels per view step)"
-    )
 
 
 def _prepared(grey: FloatMap, factor: int) -> FloatMap:
@@ -313,8 +351,10 @@ def _trusted(
     return clear & (agreeing(disparity, clear, _SUPPORT_WINDOW, tolerance) >= _LEAST_SUPPORT)
 
 
-def _patches(trusted: BoolMap, disparity: FloatMap, tolerance: float) -> _Found:
-    """Trusted pixels in patches that are large enough: neighbours whose disparities are close to each other's."""
+def _patches(trusted: BoolMap, weight: FloatMap, disparity: FloatMap, tolerance: float) -> tuple[FloatMap, FloatMap]:
+    """Disparities of trusted pixels in patches that are large enough, neighbours whose disparities are close to each
+    other's, and the median of each patch.
+    """
     H, W = trusted.shape
     # a pixel between any two neighbours says whether they are joined
     joined = np.zeros((2 * H - 1, 2 * W - 1), np.uint8)
@@ -322,10 +362,10 @@ def _patches(trusted: BoolMap, disparity: FloatMap, tolerance: float) -> _Found:
     joined[::2, 1::2] = trusted[:, 1:] & trusted[:, :-1] & (abs(np.diff(disparity, axis=1)) < tolerance)
     joined[1::2, ::2] = trusted[1:] & trusted[:-1] & (abs(np.diff(disparity, axis=0)) < tolerance)
     labels = cv2.connectedComponents(joined, connectivity=4)[1][::2, ::2].ravel()
-    areas = np.bincount(labels[trusted.ravel()], minlength=int(labels.max()) + 1)
+    areas = np.bincount(labels, np.where(trusted, weight, 0).ravel())
     kept = trusted.ravel() & (areas[labels] >= max(_FEWEST_PIXELS, _PATCH * trusted.size))
     labels, pixels = labels[kept], disparity.ravel()[kept]
     order = np.lexsort((pixels, labels))
     starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
     middles = starts + np.diff(starts, append=labels.size) // 2
-    return _Found(pixels, pixels[order][middles])
+    return pixels, pixels[order][middles]
