@@ -173,7 +173,7 @@ def settle_range(light_field: LightField, given: tuple[float, float] | None = No
         warnings.warn(
             f"{light_field.source or light_field.name}: {100 * share:.0f} % of the textured pixels match nowhere in "
             f"the disparity range ({known.source}) of {known.minimum:g} to {known.maximum:g} pixels per view step; "
-            "give another one by --disparity-range",
+            "where the views are in the right order, give another one by --disparity-range",
             SepiWarning,
             stacklevel=2,
         )
