@@ -183,8 +183,8 @@ def settle_range(light_field: LightField, given: tuple[float, float] | None = No
 def unmatched(light_field: LightField) -> float:
     """Part of the textured pixels that match nowhere in the light field's disparity range, 0..1.
 
-    Only those count that the other views show over the whole range. Where nearer things hide some from all of these, it
-    is up to 0.06 of a range that holds the scene.
+    Only those count that the other views show over the whole range. What nearer things hide is up to 0.05 of them, in
+    tiny or very distant views 0.07.
 
     Raises
     ------
@@ -198,7 +198,10 @@ def unmatched(light_field: LightField) -> float:
     # the lowest cost is none at an end of the candidates
     step = _SAMPLING * views.factor / reach
     candidates = views.candidates(reach, known.minimum - step, known.maximum + step, _SAMPLING)
-    cost = views.sweep(positions, candidates, truncation=math.inf)[0]
+    # what hides a pixel from the views on one side does not from those on the other
+    before = {place for place in positions if sum(place) < sum(light_field.reference_position)}
+    sides = filter(None, (sorted(before), sorted({*positions} - before)))
+    cost = np.minimum.reduce([views.sweep(side, candidates, truncation=math.inf)[0] for side in sides])
     texture = cv2.blur(abs(views.reference), (2 * _RADIUS + 1, 2 * _RADIUS + 1))
     # the mean of filtered noise is a quarter of its deviation
     textured = views.seen & (texture > max(_TEXTURE, noise_of_reference_view(light_field) / views.factor))
