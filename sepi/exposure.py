@@ -12,7 +12,6 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.channels import mean_of_channels
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, FloatMap, LightField, full_scale
 
 # values that tell of brightness, full range = 1: neither black nor burnt out
@@ -158,4 +157,4 @@ def _small(light_field: LightField, place: tuple[int, int], step: int) -> tuple[
 
 
 def _grey(view: FloatMap) -> FloatMap:
-    return np.ascontiguousarray(mean_of_channels(view), np.float32)
+    return np.ascontiguousarray(np.mean(cv2.split(view), axis=0), np.float32)

@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.channels import mean_of_channels
 from sepi.image.noise import noise_level
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.stage import Parameters
@@ -80,4 +79,4 @@ def depth_discontinuities(disparity: FloatMap, threshold: float) -> BoolMap:
 
 
 def _smooth_grey(reference_view: FloatMap, sigma: float) -> FloatMap:
-    return np.asarray(cv2.GaussianBlur(mean_of_channels(reference_view), (0, 0), sigma), np.float32)
+    return np.asarray(cv2.GaussianBlur(np.mean(cv2.split(reference_view), axis=0), (0, 0), sigma), np.float32)

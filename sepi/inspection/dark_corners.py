@@ -9,7 +9,6 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from sepi.channels import largest_channel
 from sepi.lightfield import BoolMap, FloatMap
 
 # What is black, as part of the brightest there is; how much of a picture a lens leaves black: more is background
@@ -33,7 +32,7 @@ def dark_corners(reference_view: FloatMap, shape: tuple[int, ...], reach: int) -
     ndarray, bool
         Of ``shape``; all False where more is black than a lens leaves, since then it is the scene's background.
     """
-    brightness = largest_channel(reference_view)
+    brightness = np.max(cv2.split(reference_view), axis=0)
     black = brightness < _BLACK * np.quantile(brightness, 0.99)
     if black.mean() > _MOST_BLACK:
         return np.zeros(shape, bool)

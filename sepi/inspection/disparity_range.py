@@ -18,7 +18,6 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from sepi.channels import largest_channel, mean_of_channels
 from sepi.errors import SepiError, SepiWarning
 from sepi.image.noise import noise_of_reference_view
 from sepi.inspection.coarse_sweep import agreeing, coarse_sweep
@@ -227,7 +226,7 @@ class _Views:
         self.reference = self._view(self._own)
         self.seen = ~dark_corners(light_field.reference_view, self.reference.shape, _HIGH_PASS + _RADIUS)
         view = light_field.reference_view
-        brightest = float(np.quantile(largest_channel(view), 0.99))
+        brightest = float(np.quantile(np.max(cv2.split(view), axis=0), 0.99))
         self._flat = max(_FLAT * brightest, _FLAT_BLOCKS if _has_blocks(view) else 0.0)
         away = abs(np.argwhere(light_field.present) - self._own).max(axis=1)
         self.nearest, self._farthest = int(away[away > 0].min()), int(away.max())
@@ -315,7 +314,8 @@ class _Views:
 
     def _view(self, position: _Position) -> FloatMap:
         if position not in self._prepared:
-            view = np.asarray(mean_of_channels(as_unit_float(self.light_field.rgb_views[position])), np.float32)
+            colours = as_unit_float(self.light_field.rgb_views[position])
+            view = np.asarray(np.mean(cv2.split(colours), axis=0), np.float32)
             # as bright as the reference: lenses darken the views towards the edge of the grid
             mean = float(view.mean())
             if position != self._own and mean > 0:
@@ -335,7 +335,7 @@ def _prepared(grey: FloatMap, factor: int) -> FloatMap:
 
 def _has_blocks(view: FloatMap) -> bool:
     """Whether strong JPEG compression left its blocks in a picture, (H, W, 3)."""
-    grey = mean_of_channels(view)
+    grey = np.mean(cv2.split(view), axis=0)
     ratios = []
     for picture in (grey, grey.T):
         faint = np.minimum(abs(np.diff(picture, axis=1)), _FAINT).mean(axis=0)

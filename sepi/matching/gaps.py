@@ -15,7 +15,6 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.channels import largest_channel
 from sepi.kernels import gaps as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.denoising import guide_of
@@ -123,7 +122,8 @@ def compared_depths(
 def _plain(guide: FloatMap, distance: float) -> BoolMap:
     """Pixels with whose neighbours no channel changes by ``distance``."""
     square = np.ones((3, 3), np.uint8)
-    return np.asarray(largest_channel(cv2.dilate(guide, square) - cv2.erode(guide, square)) < np.float32(distance))
+    change = cv2.dilate(guide, square) - cv2.erode(guide, square)
+    return np.asarray(np.max(cv2.split(change), axis=0) < np.float32(distance))
 
 
 def _outvoted(voters: BoolMap, better: BoolMap, seeing: FloatMap, others: int) -> BoolMap:

@@ -20,7 +20,6 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.channels import largest_channel
 from sepi.image.noise import SATURATED, noise_level, noise_of_reference_view
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale, require_light_field
 from sepi.stage import HIGH, LOW, SIGMA, StageMaps
@@ -219,7 +218,7 @@ def _mean_of_dark(light_field: LightField, disparity: FloatMap, limit: float) ->
         if light_field.missing is not None:
             view[light_field.missing[t, s]] = 1
         seen = cv2.remap(view, *position, cv2.INTER_LINEAR, borderValue=(1, 1, 1))
-        dark = largest_channel(seen) <= limit
+        dark = np.max(cv2.split(seen), axis=0) <= limit
         total += seen * dark[..., None]
         number += dark
     return total / number[..., None], number

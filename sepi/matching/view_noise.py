@@ -19,7 +19,6 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.channels import mean_of_channels
 from sepi.image.noise import BLACK, SATURATED, mask_energy
 from sepi.kernels import view_noise as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
@@ -134,9 +133,8 @@ def view_noise(light_field: LightField) -> ViewNoise:
     differences = np.empty((rows, columns), np.float32)
     kernels.least_differences(views, *place, moves, differences)
     between = np.minimum(differences * unit**2 / 2, 1)
-    within, level = (
-        _of_blocks(values, between.shape, kernels.BLOCK) for values in (mask_energy(image), mean_of_channels(image))
-    )
+    brightness = np.mean(cv2.split(image), axis=0)
+    within, level = (_of_blocks(values, between.shape, kernels.BLOCK) for values in (mask_energy(image), brightness))
     # what is black, overexposed or flat has none of the noise that the rest has
     tells = (within > 0) & (level > BLACK) & (level < SATURATED)
     even = np.ones((PARTS, PARTS), np.float32)
@@ -185,7 +183,7 @@ def expected_variance(light_field: LightField, noise: ViewNoise) -> npt.NDArray[
         Colours in 0..1.
     """
     height, width = light_field.shape
-    level = cv2.blur(np.ascontiguousarray(mean_of_channels(light_field.reference_view)), WINDOW)
+    level = cv2.blur(np.ascontiguousarray(np.mean(cv2.split(light_field.reference_view), axis=0)), WINDOW)
     by_place = cv2.resize(noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
     return np.asarray(np.interp(level, noise.brightness, noise.variance) * by_place, np.float64)
 

@@ -20,7 +20,6 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.channels import sum_of_channels
 from sepi.image.noise import noise_of_reference_view
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.base_detail import BaseDetailParameters
@@ -234,7 +233,8 @@ def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: Uniform
     """
     down, across = np.gradient(mean, axis=(0, 1))
     size = 2 * parameters.window_radius + 1
-    energy = cv2.blur(sum_of_channels(down**2 + across**2), (size, size))
+    squared = np.asarray(down**2 + across**2)
+    energy = cv2.blur(np.sum(cv2.split(squared), axis=0), (size, size))
     # central differences halve the noise along each of the two axes; three channels
     return np.asarray(energy < parameters.noise_factor * 3 * variance)
 
@@ -266,6 +266,6 @@ def uniform_regions(
     size = 2 * (parameters.window_radius + parameters.growth) + 1
     near = cv2.blur(core.astype(np.float32), (size, size))
     colour = cv2.blur(mean * core[..., None].astype(np.float32), (size, size)) / np.maximum(near, 1e-9)[..., None]
-    alike = sum_of_channels((mean - colour) ** 2) < 27 * variance + parameters.colour_tolerance**2
+    alike = np.sum(cv2.split((mean - colour) ** 2), axis=0) < 27 * variance + parameters.colour_tolerance**2
     # a running sum leaves rounding errors where there is nothing
     return np.asarray(core | ((near > 0.5 / size**2) & alike & (confidence < parameters.grow_confidence)))

@@ -15,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.channels import sum_of_channels
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.stage import Parameters, relative_confidence
 
@@ -78,7 +77,7 @@ def data_weight(disparity: FloatMap, confidence: FloatMap, parameters: WlsParame
 def smoothness_coefficient(reference_view: FloatMap, confidence: FloatMap, parameters: WlsParameters) -> FloatMap:
     """S = s_c s_t of Eq. 11-12; shape (H, W), float32."""
     dx, dy = (cv2.Sobel(reference_view, cv2.CV_32F, *order, ksize=3, scale=1 / 8) for order in ((1, 0), (0, 1)))
-    squared = sum_of_channels(np.atleast_3d(dx) ** 2 + np.atleast_3d(dy) ** 2)
+    squared = np.sum(cv2.split(np.atleast_3d(dx) ** 2 + np.atleast_3d(dy) ** 2), axis=0)
     return np.asarray(np.exp(-parameters.tau_2 * confidence) / (squared + parameters.gradient_floor**2), np.float32)
 
 
