@@ -20,7 +20,8 @@ struct array_caster {
 
     NB_TYPE_CASTER(View, make_caster<Given>::Name)
 
-    bool from_python(handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
+    // once for each type, not for each argument: modules are smaller, and built sooner
+    [[gnu::noinline]] bool from_python(handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
         make_caster<Given> caster;
         if (!caster.from_python(source, flags & ~uint32_t(cast_flags::convert), cleanup)) return false;
         value.data = caster.value.data();
@@ -48,7 +49,7 @@ template <class Struct>
 struct type_caster<Struct> {
     NB_TYPE_CASTER(Struct, const_name("tuple[typing.Any, ...]"))
 
-    bool from_python(handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
+    [[gnu::noinline]] bool from_python(handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
         using Fields = decltype(values_of(value.fields()));
         make_caster<Fields> caster;
         // numbers may be NumPy's
