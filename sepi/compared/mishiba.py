@@ -190,7 +190,7 @@ def lattice_costs(light_field: LightField, disparities: FloatMap, parameters: Mi
 def least_interpolated(
     guide: FloatMap, costs: FloatMap, parameters: MishibaParameters, progress: Progress
 ) -> tuple[npt.NDArray[np.int64], FloatMap]:
-    """Candidates of least interpolated cost, and what ``keep_least`` (``kernels/mishiba.hpp``) keeps.
+    """Candidates of least interpolated cost, and what ``keep_least`` (``kernels/mishiba.cpp``) keeps.
 
     Parameters
     ----------

@@ -12,14 +12,6 @@ namespace nb = nanobind;
 using namespace nb::literals;
 
 void bind_boundaries(nb::module_ &);
-void bind_error_bars(nb::module_ &);
-void bind_image(nb::module_ &);
-void bind_inspection(nb::module_ &);
-void bind_scoring(nb::module_ &);
-void bind_scenes(nb::module_ &);
-void bind_compared(nb::module_ &);
-void bind_rendered(nb::module_ &);
-void bind_applications(nb::module_ &);
 
 // Whether the processor has what x86-64-v3 adds to the baseline, as far as kernels use it, and the system keeps its
 // registers. Not by __builtin_cpu_supports: zig's own library, linked for that, brings an exp and a memcpy that are slow.
@@ -42,9 +34,7 @@ NB_MODULE(_native, m) {
     m.def("has_x86_64_v3", &has_x86_64_v3, "Whether this processor can use kernels that are built for x86-64-v3.");
     m.def("thread_count", &sepi::thread_count, "Threads of a loop, the caller's among them.");
     m.def("set_thread_count", &sepi::set_thread_count, "count"_a, "Have each loop use so many threads.");
-    for (const auto bind : {bind_boundaries, bind_error_bars, bind_image, bind_inspection, bind_scoring, bind_scenes, bind_compared,
-                            bind_rendered, bind_applications})
-        bind(m);
+    bind_boundaries(m);
     for (const auto &[name, fill] : sepi::Submodule::all()) {
         auto submodule = m.def_submodule(name);
         fill(submodule);

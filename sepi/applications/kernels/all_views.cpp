@@ -1,13 +1,33 @@
-#include "all_views.hpp"
-
+// The maps of all views, made of those of some.
+//
+// A pixel of a map is a square of a surface: its middle has the pixel's disparity, each corner what the pixels that
+// meet there, and belong together, agree on. Where they do not, the corner comes apart, each pixel going on by its own
+// slope. Seen from another view, a square becomes four triangles round its middle; disparity is linear on each of them,
+// since a plane in one view is a plane in all.
 #include <cmath>
 #include <vector>
 
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
 namespace sepi {
 namespace {
+
+constexpr float EMPTY = -1e9f;          // disparity where no surface is seen: nothing is nearer
+constexpr float TOLERANCE = 0.1f;       // disparities that differ by no more are of one surface, pixels per view step
+constexpr double MOST_STRETCHED = 2;    // a surface that a view sees so many times larger is left to maps that saw it better
+constexpr float LEAST_WEIGHT = 0.05f;   // vote of a map where its confidence is 0: beside depth steps all are small, and there they differ
+
+// The maps that are carried: the fields of sepi.applications.all_views.Sources, in their order.
+struct Sources {
+    Array<const float, 3> disparity, confidence;  // (N, H, W)
+    Array<const float, 4> bars;                   // (N or 0, H, W, 3)
+    Array<const float, 4> corners;                // (N, H, W, 4)
+    Array<const double, 2> baselines;             // (N, 2)
+
+    auto fields() { return std::tie(disparity, confidence, bars, corners, baselines); }
+};
 
 constexpr double TOUCHING = -1e-3;  // part of a triangle by which a pixel may miss it: no cracks between neighbours
 constexpr double EDGE_ON = 1e-3;    // part of its area in its own view below which a triangle is seen from its edge, or from behind
@@ -49,6 +69,32 @@ void draw_triangle(Point a, Point b, Point c, std::int32_t pixel, Array<float, 2
             const float d = float(a.disparity + of_b * (b.disparity - a.disparity) + of_c * (c.disparity - a.disparity));
             float &shown = nearest(Index(y), Index(x));
             if (d > shown) shown = d, origin(Index(y), Index(x)) = pixel;
+        }
+    }
+}
+
+// The surfaces of a map as a view sees them that stands v down and u across from the map's: the nearest disparity
+// (H, W), EMPTY where there is none, and the number of the map's pixel that is seen, or -1. What it sees stretched too
+// much is left out.
+void carry(Array<const float, 2> disparity, Array<const float, 3> corners, double v, double u, Array<float, 2> nearest,
+           Array<std::int32_t, 2> origin) {
+    const Index H = disparity.shape[0], W = disparity.shape[1];
+    for (Index y = 0; y < H; ++y) {
+        std::fill_n(nearest.at(y), W, EMPTY);
+        std::fill_n(origin.at(y), W, -1);
+    }
+    const auto seen = [&](double y, double x, double d) { return Point{y - d * v, x - d * u, d}; };
+    for (Index y = 0; y < H; ++y) {
+        for (Index x = 0; x < W; ++x) {
+            const Point middle = seen(double(y), double(x), disparity(y, x));
+            if (middle.y < -1 || middle.y > H || middle.x < -1 || middle.x > W) continue;
+            const auto at = [&](Index corner) { return seen(y + CORNERS[corner].down, x + CORNERS[corner].across, corners(y, x, corner)); };
+            Point before = at(3);
+            for (Index corner = 0; corner < 4; ++corner) {
+                const Point here = at(corner);
+                draw_triangle(middle, before, here, std::int32_t(y * W + x), nearest, origin);
+                before = here;
+            }
         }
     }
 }
@@ -167,8 +213,8 @@ void extend_background(double v, double u, Array<float, 2> disparity, Array<bool
     }
 }
 
-}  // namespace
-
+// Disparity at the corners of each pixel of a map (H, W), clockwise from the top left, out (H, W, 4). Pixels that meet
+// in a corner belong together where what they say of it differs by no more than the tolerance.
 void corner_disparities(Array<const float, 2> disparity, Array<float, 3> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const Scratch<float, 3> slopes(2, H, W);
@@ -197,28 +243,8 @@ void corner_disparities(Array<const float, 2> disparity, Array<float, 3> out) {
     });
 }
 
-void carry(Array<const float, 2> disparity, Array<const float, 3> corners, double v, double u, Array<float, 2> nearest, Array<std::int32_t, 2> origin) {
-    const Index H = disparity.shape[0], W = disparity.shape[1];
-    for (Index y = 0; y < H; ++y) {
-        std::fill_n(nearest.at(y), W, EMPTY);
-        std::fill_n(origin.at(y), W, -1);
-    }
-    const auto seen = [&](double y, double x, double d) { return Point{y - d * v, x - d * u, d}; };
-    for (Index y = 0; y < H; ++y) {
-        for (Index x = 0; x < W; ++x) {
-            const Point middle = seen(double(y), double(x), disparity(y, x));
-            if (middle.y < -1 || middle.y > H || middle.x < -1 || middle.x > W) continue;
-            const auto at = [&](Index corner) { return seen(y + CORNERS[corner].down, x + CORNERS[corner].across, corners(y, x, corner)); };
-            Point before = at(3);
-            for (Index corner = 0; corner < 4; ++corner) {
-                const Point here = at(corner);
-                draw_triangle(middle, before, here, std::int32_t(y * W + x), nearest, origin);
-                before = here;
-            }
-        }
-    }
-}
-
+// The maps (V, H, W) of views with baselines (V, 2), bars (V, H, W, 3) where the sources have them, and where no source
+// shows anything and the background was extended.
 void maps_of_views(const Sources &sources, Array<const double, 2> baselines, Array<float, 3> disparity, Array<float, 3> confidence, Array<float, 4> bars,
                    Array<bool, 3> extended) {
     parallel_for(0, baselines.shape[0], [&](Index view) {
@@ -229,4 +255,13 @@ void maps_of_views(const Sources &sources, Array<const double, 2> baselines, Arr
     });
 }
 
+const Submodule submodule("all_views", [](nb::module_ &m) {
+    m.attr("EMPTY") = EMPTY;
+    m.attr("TOLERANCE") = TOLERANCE;
+    m.def("corner_disparities", &corner_disparities, Unlocked(), "disparity"_a, "out"_a);
+    m.def("carry", &carry, Unlocked(), "disparity"_a, "corners"_a, "v"_a, "u"_a, "nearest"_a, "origin"_a);
+    m.def("maps_of_views", &maps_of_views, Unlocked(), "sources"_a, "baselines"_a, "disparity"_a, "confidence"_a, "bars"_a, "extended"_a);
+});
+
+}  // namespace
 }  // namespace sepi

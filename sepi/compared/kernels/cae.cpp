@@ -1,14 +1,17 @@
-#include "cae.hpp"
-
+// The constrained angular entropy and the constrained adaptive defocus.
 #include <cmath>
 #include <limits>
 
+#include "kernels/arguments.hpp"
 #include "kernels/exponential.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
 namespace sepi {
 namespace {
+
+constexpr Index LEVELS = 256;  // bins of the histograms, over colours in 0..1
+constexpr Index PATCH = 5;     // width of a sub-patch in pixels; three by three of them make up the neighbourhood of a pixel
 
 // Bin of a colour; what resampling overshoots goes to the last ones.
 inline std::int16_t level_of(float colour) { return std::int16_t(std::clamp(double(colour) * (LEVELS - 1) + 0.5, 0.0, LEVELS - 1.0)); }
@@ -36,8 +39,8 @@ float entropy(const std::int16_t *patch, Index N, Index own, Array<const float, 
     return logarithm(total) - mixed / total;
 }
 
-}  // namespace
-
+// Entropy of each channel's angular patch, each view weighted by how near its level is to that of the reference view.
+// sheared (N, 3, H, W), own (3, H, W) the reference view, weights[d] at a difference of d levels, 0 beyond; out (3, H, W).
 void constrained_entropies(Array<const float, 4> sheared, Array<const float, 3> own, Array<const float, 1> weights, Array<float, 3> out) {
     const Index N = sheared.shape[0], C = sheared.shape[1], H = sheared.shape[2], W = sheared.shape[3];
     parallel_for(0, H, [&](Index y) {
@@ -53,6 +56,8 @@ void constrained_entropies(Array<const float, 4> sheared, Array<const float, 3> 
     });
 }
 
+// Least over the sub-patches round a pixel of their weighted mean response and what their colours add to it.
+// response (H, W, K), guide (H, W, 3), out (H, W, K). Beyond its border a picture goes on as it ends.
 void constrained_least_patch(Array<const float, 3> response, Array<const float, 3> guide, float sigma, float constraint, Array<float, 3> out) {
     const Index H = response.shape[0], W = response.shape[1], K = response.shape[2], reach = 3 * PATCH / 2;
     const float scale = float(-1 / (6.0 * double(sigma) * double(sigma)));
@@ -81,4 +86,12 @@ void constrained_least_patch(Array<const float, 3> response, Array<const float, 
     });
 }
 
+const Submodule submodule("cae", [](nb::module_ &m) {
+    m.attr("LEVELS") = LEVELS;
+    m.attr("PATCH") = PATCH;
+    m.def("constrained_entropies", &constrained_entropies, Unlocked(), "sheared"_a, "own"_a, "weights"_a, "out"_a);
+    m.def("constrained_least_patch", &constrained_least_patch, Unlocked(), "response"_a, "guide"_a, "sigma"_a, "constraint"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

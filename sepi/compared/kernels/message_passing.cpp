@@ -1,6 +1,10 @@
-#include "message_passing.hpp"
-
+// Tree-reweighted message passing, on one thread: each pixel waits for the one before it.
+//
+// messages (4, H, W, K) is what comes to a pixel from its neighbour at the left, above, at the right, below;
+// costs (H, W, K) are those of its labels, across and down (H, W) the weights of the edges to the next pixels.
 #include <limits>
+
+#include "kernels/arguments.hpp"
 
 namespace sepi {
 namespace {
@@ -28,8 +32,7 @@ void believe(const float *cost, Array<const float, 4> messages, Index y, Index x
     for (Index k = 0; k < messages.shape[3]; ++k) out[k] = cost[k] + left[k] + above[k] + right[k] + below[k];
 }
 
-}  // namespace
-
+// One pass forth, to the right and down, and one back.
 void pass_messages(Array<const float, 3> costs, Array<const float, 2> across, Array<const float, 2> down, float truncation, Array<float, 4> messages) {
     const Index H = costs.shape[0], W = costs.shape[1], K = costs.shape[2];
     const Scratch<float, 1> beliefs(K);
@@ -48,6 +51,7 @@ void pass_messages(Array<const float, 3> costs, Array<const float, 2> across, Ar
     }
 }
 
+// A label for each pixel in turn, given those of the pixels before it and what those after it say.
 void decode(Array<const float, 3> costs, Array<const float, 2> across, Array<const float, 2> down, float truncation, Array<const float, 4> messages,
             Array<std::int64_t, 2> labels) {
     for (Index y = 0; y < costs.shape[0]; ++y) {
@@ -68,4 +72,10 @@ void decode(Array<const float, 3> costs, Array<const float, 2> across, Array<con
     }
 }
 
+const Submodule submodule("message_passing", [](nb::module_ &m) {
+    m.def("pass_messages", &pass_messages, Unlocked(), "costs"_a, "across"_a, "down"_a, "truncation"_a, "messages"_a);
+    m.def("decode", &decode, Unlocked(), "costs"_a, "across"_a, "down"_a, "truncation"_a, "messages"_a, "labels"_a);
+});
+
+}  // namespace
 }  // namespace sepi

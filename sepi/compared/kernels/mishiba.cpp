@@ -1,7 +1,7 @@
-#include "mishiba.hpp"
-
+// The fast method with one-bit features.
 #include <cmath>
 
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
@@ -36,8 +36,10 @@ std::int32_t weighted_median(const std::int32_t *values, const std::int32_t *wei
     return low;
 }
 
-}  // namespace
-
+// Share of the pairs of views whose bits differ, at every step-th row and column; 1 is as many different pairs as there
+// can be, and where there is no pair. Views that show a pixel beyond their border take no part.
+// details (N, H, W), whose signs are the bits; offsets (K, N, 2), down and across from a reference pixel to its sample,
+// for each candidate, in pixels; out (K, ceil(H / step), ceil(W / step)).
 void pair_costs(Array<const float, 3> details, Array<const double, 3> offsets, Index step, Array<float, 3> out) {
     const Index N = details.shape[0], H = details.shape[1], W = details.shape[2], K = offsets.shape[0], columns = out.shape[2];
     double farthest = 0;
@@ -75,6 +77,10 @@ void pair_costs(Array<const float, 3> details, Array<const double, 3> offsets, I
     });
 }
 
+// Interpolate the costs of candidate k to all pixels, and keep what each pixel's least cost needs. Candidates come in
+// rising order from 0 on. slopes (h, w, 3) and constants (h, w): costs as a linear function of the guide's colours, at
+// every step-th row and column; guide (H, W, 3); labels (H, W), candidate of least cost so far; kept (H, W, 5), least
+// cost so far, cost of the candidate before it, of that after it, of candidate k - 1, and the sum.
 void keep_least(Index k, Array<const float, 3> slopes, Array<const float, 2> constants, Array<const float, 3> guide, Index step, Array<std::int64_t, 2> labels,
                 Array<float, 3> kept) {
     const Index last_row = constants.shape[0] - 1, last_column = constants.shape[1] - 1;
@@ -102,6 +108,9 @@ void keep_least(Index k, Array<const float, 3> slopes, Array<const float, 2> con
     });
 }
 
+// For each pixel, the value of least absolute differences to its datum and to its neighbours as they are, all (H, W).
+// Neighbours are up to radius times gap pixels away, every gap-th one; table: weight of one by the squared difference
+// of colours, an entry for each per_entry, 0 beyond. A window's weights add up to less than 2^31.
 void median_pass(Array<const std::int32_t, 2> current, Array<const std::int32_t, 2> data, Array<const std::int32_t, 2> data_weights,
                  Array<const float, 3> guide, Index radius, Index gap, Array<const std::int32_t, 1> table, double per_entry, Array<std::int32_t, 2> out) {
     const Index H = current.shape[0], W = current.shape[1], most = (2 * radius + 1) * (2 * radius + 1) + 1, reach = radius * gap;
@@ -126,4 +135,12 @@ void median_pass(Array<const std::int32_t, 2> current, Array<const std::int32_t,
     });
 }
 
+const Submodule submodule("mishiba", [](nb::module_ &m) {
+    m.def("pair_costs", &pair_costs, Unlocked(), "details"_a, "offsets"_a, "step"_a, "out"_a);
+    m.def("keep_least", &keep_least, Unlocked(), "k"_a, "slopes"_a, "constants"_a, "guide"_a, "step"_a, "labels"_a, "kept"_a);
+    m.def("median_pass", &median_pass, Unlocked(), "current"_a, "data"_a, "data_weights"_a, "guide"_a, "radius"_a, "gap"_a, "table"_a,
+          "per_entry"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

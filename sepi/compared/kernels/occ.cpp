@@ -1,9 +1,14 @@
-#include "occ.hpp"
-
+// Angular patches that an edge splits in two.
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
 namespace sepi {
+namespace {
 
+// What the halves of P patches show of views sheared by a candidate, sheared (N, 3, H, W), counted from the colours of
+// the reference view (3, H, W): means (P, 2, 3), and variances (P, 2), means over the channels.
+// places (P, 3): row, column and number of the edge's orientation; halves (orientations, 2, N): views of the two halves,
+// of which none is empty.
 void moments_of_halves(Array<const float, 4> sheared, Array<const float, 3> reference, Strided<const std::int64_t, 2> places,
                        Array<const bool, 3> halves, Array<float, 3> means, Array<float, 2> variances) {
     parallel_for(0, places.shape[0], [&](Index p) {
@@ -29,4 +34,10 @@ void moments_of_halves(Array<const float, 4> sheared, Array<const float, 3> refe
     });
 }
 
+const Submodule submodule("occ", [](nb::module_ &m) {
+    m.def("moments_of_halves", &moments_of_halves, Unlocked(), "sheared"_a, "reference"_a, "places"_a, "halves"_a, "means"_a,
+          "variances"_a);
+});
+
+}  // namespace
 }  // namespace sepi

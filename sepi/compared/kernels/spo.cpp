@@ -1,7 +1,8 @@
+// The spinning parallelogram operator: what lies on either side of a line, as histograms.
+//
 // An EPI is worked off along its columns. The histograms of the columns in reach are held in a ring, so that each column
 // is counted once for all the parallelograms that it lies in.
-#include "spo.hpp"
-
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
@@ -64,8 +65,12 @@ float common(float *__restrict left, const float *right, Index C, Index bins) {
     return even + odd;
 }
 
-}  // namespace
-
+// Distance between the halves of a parallelogram round every pixel: chi-square distance of their two histograms, each of
+// sum 1, mean over the channels; out (H, W), 0..1.
+// lines (N, C, H, W): EPIs sheared by a candidate, so that its lines are columns; row y of view n is row n of EPI y.
+// Colours in 0..1, each of which counts for the two of so many bins between whose middles it lies; what lies beyond the
+// middle of the first or last bin counts for that. Columns beyond the ends are like the last ones.
+// shares (R): weights of a view's column at distances 1..R from the line; those of all views add up to 1.
 void half_distances(Array<const float, 4> lines, Array<const float, 1> shares, Index bins, Array<float, 2> out) {
     const Index C = lines.shape[1], W = lines.shape[3], R = shares.shape[0], size = 2 * R + 1;
     parallel_for(0, lines.shape[2], [&](Index y) {
@@ -84,4 +89,9 @@ void half_distances(Array<const float, 4> lines, Array<const float, 1> shares, I
     });
 }
 
+const Submodule submodule("spo", [](nb::module_ &m) {
+    m.def("half_distances", &half_distances, Unlocked(), "lines"_a, "shares"_a, "bins"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

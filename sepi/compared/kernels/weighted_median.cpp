@@ -1,13 +1,15 @@
-#include "weighted_median.hpp"
-
+// The weighted median of a map.
 #include <vector>
 
+#include "kernels/arguments.hpp"
 #include "kernels/exponential.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
 namespace sepi {
+namespace {
 
+// As sepi.compared.weighted_median; values, weight and out (H, W), guide (H, W, 3).
 void weighted_medians(Array<const float, 2> values, Array<const float, 3> guide, Index radius, double sigma, Array<const float, 2> weight,
                       Array<float, 2> out) {
     const Index H = values.shape[0], W = values.shape[1];
@@ -28,4 +30,9 @@ void weighted_medians(Array<const float, 2> values, Array<const float, 3> guide,
     });
 }
 
+const Submodule submodule("weighted_median", [](nb::module_ &m) {
+    m.def("weighted_medians", &weighted_medians, Unlocked(), "values"_a, "guide"_a, "radius"_a, "sigma"_a, "weight"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

@@ -1,12 +1,22 @@
-#include "mixture.hpp"
-
+// Distribution of a pixel's error.
 #include <cmath>
 #include <numbers>
 
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
 namespace sepi {
 namespace {
+
+// Mean absolute deviation of the other surface's disparity: as part of its distance, and the least, pixels per view step.
+constexpr double RIM_WIDTH = 0.2, LEAST_RIM = 0.01;
+
+// Parameters of each pixel's error, (H, W).
+struct ErrorMixture {
+    Array<const float, 2> scale, outlier_scale, outlier, rim, above, below;
+
+    auto fields() { return std::tie(scale, outlier_scale, outlier, rim, above, below); }
+};
 
 constexpr int EVALUATIONS = 40;
 constexpr double FARTHEST = 1e12;   // no bound is farther away, pixels
@@ -67,8 +77,8 @@ struct PixelError {
     }
 };
 
-}  // namespace
-
+// Standard deviation, distances of the lower and of the upper bound, each with probability tail beyond it, and
+// probability of an error up to close: out (4, H, W).
 void describe(const ErrorMixture &mixture, double tail, double close, Array<float, 3> out) {
     // standard deviation of a normal distribution, over its mean absolute value
     const double normal = std::sqrt(std::numbers::pi / 2);
@@ -85,4 +95,11 @@ void describe(const ErrorMixture &mixture, double tail, double close, Array<floa
     });
 }
 
+const Submodule submodule("mixture", [](nb::module_ &m) {
+    m.attr("RIM_WIDTH") = RIM_WIDTH;
+    m.attr("LEAST_RIM") = LEAST_RIM;
+    m.def("describe", &describe, Unlocked(), "mixture"_a, "tail"_a, "close"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

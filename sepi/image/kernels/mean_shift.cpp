@@ -1,8 +1,8 @@
-#include "mean_shift.hpp"
-
+// Mean shift: climbing from points to the modes of the distribution round them.
 #include <array>
 #include <cmath>
 
+#include "kernels/arguments.hpp"
 #include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
 
@@ -54,8 +54,9 @@ Float8 modes_of(Array<const float, 3> planes, Index y, Index x, Index radius) {
     return where[3];
 }
 
-}  // namespace
-
+// Disparity, times unit, of the mode that each pixel of the mask (H, W) belongs to, in modes (H, W); others stay.
+// planes (4, H + 2 radius, W + 2 radius + room), with a margin of what is like nothing, are three colours and disparity
+// in units of their bandwidths.
 void patch_modes(Array<const float, 3> planes, Array<const bool, 2> mask, Index radius, float unit, Array<float, 2> modes) {
     const Index W = mask.shape[1];
     parallel_for(0, mask.shape[0], [&](Index y) {
@@ -70,6 +71,7 @@ void patch_modes(Array<const float, 3> planes, Array<const bool, 2> mask, Index 
     });
 }
 
+// Move each of modes (N, D) to the mode of samples (N, D) that it belongs to.
 void sample_modes(Array<const double, 2> samples, double bandwidth, Array<double, 2> modes) {
     const Index N = samples.shape[0], D = samples.shape[1];
     const double factor = -0.5 / (bandwidth * bandwidth);
@@ -97,4 +99,10 @@ void sample_modes(Array<const double, 2> samples, double bandwidth, Array<double
     });
 }
 
+const Submodule submodule("mean_shift", [](nb::module_ &m) {
+    m.def("patch_modes", &patch_modes, Unlocked(), "planes"_a, "mask"_a, "radius"_a, "unit"_a, "modes"_a);
+    m.def("sample_modes", &sample_modes, Unlocked(), "samples"_a, "bandwidth"_a, "modes"_a);
+});
+
+}  // namespace
 }  // namespace sepi

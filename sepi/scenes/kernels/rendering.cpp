@@ -1,14 +1,28 @@
-#include "rendering.hpp"
-
+// Exact rendering of the built-in scenes: planar surfaces, and what rays meet of them.
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "kernels/arguments.hpp"
 #include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
 
 namespace sepi {
 namespace {
+
+// Texels that follow those of each row of a texture, as it goes on periodically: as many as a sample reaches.
+constexpr Index BEYOND = 3;
+
+// Surfaces, as they are in a view: the fields of sepi.scenes.rendering.Drawing, in their order.
+struct Drawing {
+    Array<const double, 2> edges;                    // (E, 4): x0, y0, x1, y1
+    Array<const std::int64_t, 1> first_edge;         // (P + 1)
+    Array<const double, 2> planes;                   // (P, 3): disparity at 0, along x, along y
+    Array<const float, 2> texels;                    // (N, 4)
+    Array<const std::int64_t, 1> first_texel, side;  // (P)
+
+    auto fields() { return std::tie(edges, first_edge, planes, texels, first_texel, side); }
+};
 
 // A surface hides a point only if it is nearer by more than rounding: points on the edge between two faces.
 constexpr double TOLERANCE = 1e-9;
@@ -100,12 +114,12 @@ Float8 add_sample(const Drawing &drawing, Index p, double x, double y, Float8 to
 
 float colour_of(Float8 total, Index channel) { return total[channel] + total[4 + channel]; }
 
-}  // namespace
-
+// Disparity and index of the nearest surface at the centre of each pixel, (H, W); -1 for none.
 void nearest(const Drawing &drawing, Array<double, 2> disparity, Array<std::int64_t, 2> owner) {
     parallel_for(0, disparity.shape[0], [&](Index row) { fill_row(drawing, double(row), 1, disparity.shape[1], disparity.at(row), owner.at(row)); });
 }
 
+// Mean of the textures under all samples of each pixel in the view of baseline (v, u); picture (size, size, 3).
 void shade(const Drawing &drawing, double v, double u, Index samples, Array<float, 3> picture) {
     const Index size = picture.shape[0], width = size * samples;
     parallel_for(0, size, [&](Index line) {
@@ -128,6 +142,8 @@ void shade(const Drawing &drawing, double v, double u, Index samples, Array<floa
     });
 }
 
+// Mark the pixels (H, W) whose point is hidden in the view of baseline (v, u), as which surfaces, and boxes (P, 4) round
+// them, are given.
 void hide(const Drawing &drawing, Array<const double, 2> boxes, Array<const double, 2> disparity, double v, double u, Array<bool, 2> hidden) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for_pixels(H, W, [&](Index row, Index column) {
@@ -140,6 +156,9 @@ void hide(const Drawing &drawing, Array<const double, 2> boxes, Array<const doub
     });
 }
 
+// What rays (N, 3) from origin (3) meet first: depths (N) in lengths of the ray, infinite for nothing, and colours (N, 3) of
+// the textures there, black for nothing. Surface p lies where normals (P, 3) times a point are 1; edges and boxes are in
+// pixels of the view from the world's origin, whose (focal length, x, y) are pinhole.
 void cast(const Drawing &drawing, Array<const double, 2> boxes, Array<const double, 2> normals, Array<const double, 1> origin, Array<const double, 2> rays,
           Array<const double, 1> pinhole, Array<double, 1> depth, Array<double, 2> colours) {
     const auto product = [](const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
@@ -161,4 +180,13 @@ void cast(const Drawing &drawing, Array<const double, 2> boxes, Array<const doub
     });
 }
 
+const Submodule submodule("rendering", [](nb::module_ &m) {
+    m.attr("BEYOND") = BEYOND;
+    m.def("nearest", &nearest, Unlocked(), "drawing"_a, "disparity"_a, "owner"_a);
+    m.def("shade", &shade, Unlocked(), "drawing"_a, "v"_a, "u"_a, "samples"_a, "picture"_a);
+    m.def("hide", &hide, Unlocked(), "drawing"_a, "boxes"_a, "disparity"_a, "v"_a, "u"_a, "hidden"_a);
+    m.def("cast", &cast, Unlocked(), "drawing"_a, "boxes"_a, "normals"_a, "origin"_a, "rays"_a, "pinhole"_a, "depth"_a, "colours"_a);
+});
+
+}  // namespace
 }  // namespace sepi

@@ -1,7 +1,7 @@
-#include "regions.hpp"
-
+// Regions for evaluation.
 #include <cmath>
 
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
@@ -33,8 +33,8 @@ bool hidden_in(Array<const double, 2> ground_truth, Index y, Index x, double v, 
     return false;
 }
 
-}  // namespace
-
+// Pixels (H, W) that at least one of the views at baselines (N, 2) does not see, by the disparities of the ground truth,
+// -inf where unknown, of which none is above nearest.
 void occluded(Array<const double, 2> ground_truth, Array<const double, 2> baselines, double nearest, Array<bool, 2> out) {
     parallel_for_pixels(out.shape[0], out.shape[1], [&](Index y, Index x) {
         out(y, x) = false;
@@ -42,4 +42,9 @@ void occluded(Array<const double, 2> ground_truth, Array<const double, 2> baseli
     });
 }
 
+const Submodule submodule("regions", [](nb::module_ &m) {
+    m.def("occluded", &occluded, Unlocked(), "ground_truth"_a, "baselines"_a, "nearest"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi
