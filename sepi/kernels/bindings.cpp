@@ -1,4 +1,4 @@
-// The extension module: a submodule for each source of kernels, by what it says itself or the bindings beside it.
+// The extension module: a submodule for each source of kernels, by what that says itself.
 #include "arguments.hpp"
 #include "floor.hpp"
 #include "lanes.hpp"
@@ -10,8 +10,6 @@
 
 namespace nb = nanobind;
 using namespace nb::literals;
-
-void bind_boundaries(nb::module_ &);
 
 // Whether the processor has what x86-64-v3 adds to the baseline, as far as kernels use it, and the system keeps its
 // registers. Not by __builtin_cpu_supports: zig's own library, linked for that, brings an exp and a memcpy that are slow.
@@ -34,7 +32,6 @@ NB_MODULE(_native, m) {
     m.def("has_x86_64_v3", &has_x86_64_v3, "Whether this processor can use kernels that are built for x86-64-v3.");
     m.def("thread_count", &sepi::thread_count, "Threads of a loop, the caller's among them.");
     m.def("set_thread_count", &sepi::set_thread_count, "count"_a, "Have each loop use so many threads.");
-    bind_boundaries(m);
     for (const auto &[name, fill] : sepi::Submodule::all()) {
         auto submodule = m.def_submodule(name);
         fill(submodule);

@@ -1,14 +1,17 @@
-#include "surface_shares.hpp"
-
+// What is behind the nearer surfaces beside depth steps, by the views that see it, and how bright views are.
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 #include "view_samples.hpp"
 
 namespace sepi {
 namespace {
+
+constexpr Index FEWEST_VIEWS = 3;  // that see a piece of background, before its colour counts
+constexpr float UNSEEN = -1;       // in place of the variance of a background that fewer see; negative
 
 constexpr float NONE = std::numeric_limits<float>::infinity();
 constexpr double MOST_DEVIATION2 = 0.01;  // squared residual that one view counts at most in the background's variance
@@ -41,8 +44,9 @@ float median(const float *values, Index n) {
     return n % 2 || below < middle ? least_from(low) : (most_below(low) + least_from(low)) * 0.5f;
 }
 
-}  // namespace
-
+// How bright each view is beside the reference, and how badly it shows the same, over some clean pixels: the ratio of the
+// sums of the colours, and the mean absolute difference of one channel, 0..1, that is left, NaN of views that show none
+// of the pixels; (N,). Pixels that a view does not show are missing (T, S, H, W), none if that is (T, S, 0, 0).
 void brightness_of_views(const RimViews &views, const Sides &sides, Array<const bool, 4> missing, Array<double, 1> brightness,
                          Array<double, 1> residual) {
     const Index H = sides.disparity.shape[0], W = sides.disparity.shape[1];
@@ -78,6 +82,9 @@ void brightness_of_views(const RimViews &views, const Sides &sides, Array<const 
     std::visit(look, views.lines);
 }
 
+// Rows begin..end of the more distant surfaces where they are wanted (H, W), medians over the views that see them, and of
+// disparity layer (H, W), also where a nearer one hides them. Into background (H, W, 4): colours, and the variance of the
+// views' colours, mean of the channels, or UNSEEN.
 void background_of(const RimViews &views, Array<const float, 2> layer, Array<const bool, 2> wanted, Index begin, Index end,
                    Array<float, 3> background) {
     const Index W = layer.shape[1];
@@ -122,4 +129,12 @@ void background_of(const RimViews &views, Array<const float, 2> layer, Array<con
     std::visit(look, views.lines);
 }
 
+const Submodule submodule("background", [](nb::module_ &m) {
+    m.def("brightness_of_views", &brightness_of_views, Unlocked(), "views"_a, "sides"_a, "missing"_a, "brightness"_a, "residual"_a);
+    m.def("background_of", &background_of, Unlocked(), "views"_a, "layer"_a, "wanted"_a, "begin"_a, "end"_a, "background"_a);
+    m.attr("FEWEST_VIEWS") = FEWEST_VIEWS;
+    m.attr("UNSEEN") = UNSEEN;
+});
+
+}  // namespace
 }  // namespace sepi

@@ -1,13 +1,21 @@
-#include "colour_mixture.hpp"
-
+// The evidence by colour mixture.
 #include <cmath>
 #include <vector>
 
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
 namespace sepi {
 namespace {
+
+// The least and the largest disparity of each pixel and its eight neighbours: the fields of
+// sepi.boundaries.surroundings.Surroundings, in their order; (H, W).
+struct Surroundings {
+    Array<const float, 2> farthest, nearest;
+
+    auto fields() { return std::tie(farthest, nearest); }
+};
 
 constexpr double WIDTH = 1;            // of the window's weights, pixels
 constexpr double APART = 0.019;        // squared distance of a colour from all mixtures at which it counts 1/e, in units of their variance
@@ -19,8 +27,7 @@ struct Side {
     double weight = 0, colour[3] = {}, colour2 = 0;
 };
 
-}  // namespace
-
+// How surely little of the nearer surface is in a pixel, 0..1, into out (H, W) where it is any; guide (H, W, 3).
 void mixture_evidence(Array<const float, 2> disparity, const Surroundings &around, Strided<const float, 3> guide, double discontinuity, Index radius,
                       double contrast, double threshold, double least_variance, Array<float, 2> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
@@ -65,4 +72,10 @@ void mixture_evidence(Array<const float, 2> disparity, const Surroundings &aroun
     });
 }
 
+const Submodule submodule("colour_mixture", [](nb::module_ &m) {
+    m.def("mixture_evidence", &mixture_evidence, Unlocked(), "disparity"_a, "around"_a, "guide"_a, "discontinuity"_a, "radius"_a,
+          "contrast"_a, "threshold"_a, "least_variance"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi

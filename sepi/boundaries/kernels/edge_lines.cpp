@@ -1,19 +1,34 @@
-#include "edge_lines.hpp"
-
+// The edges beside depth steps.
 #include <limits>
 
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
 namespace sepi {
 namespace {
+
+// From one share that has a cost to the next that an edge may leave.
+constexpr Index STEPS = 3;
+
+// Edges through a patch of three by three pixels: the fields of sepi.boundaries.edge_lines.Edges, in their order.
+struct Edges {
+    Array<const std::uint8_t, 2> shares;  // (M, 9), in steps
+    Array<const bool, 1> is_near;         // (M,)
+    Array<const float, 1> costs;          // (M,)
+    Array<const float, 1> weights;        // (9,)
+
+    auto fields() { return std::tie(shares, is_near, costs, weights); }
+};
 
 constexpr Index PATCH = 9;       // pixels of a patch, row after row
 constexpr float MOST = 0.2f;     // cost of a neighbour that an edge does not fit
 constexpr float OUTSIDE = 0.3f;  // cost of a pixel away from all steps that is the other surface's
 constexpr Index AT_ONCE = 64;    // pixels that a thread does at a stretch
 
-}  // namespace
-
+// By how much the best edge that leaves a pixel to the farther surface costs less than the best that does not, into
+// evidence (n,), for pixels (n,) of the map (H, W). Between their surfaces lies middle (H, W). Shares of the nearer one
+// have costs (n, K), from 0 to 1, the best of each 0; number (H, W) is a pixel's row of them, or -1: it lies beside no
+// step, and stays on its side.
 void evidence_of_lines(Array<const float, 2> disparity, Array<const float, 2> middle, Array<const std::int64_t, 2> number, Array<const float, 2> costs,
                        const Edges &edges, Array<const std::int64_t, 1> pixels, Array<float, 1> evidence) {
     const Index H = disparity.shape[0], W = disparity.shape[1], K = costs.shape[1], finest = STEPS * (K - 1);
@@ -49,4 +64,11 @@ void evidence_of_lines(Array<const float, 2> disparity, Array<const float, 2> mi
     });
 }
 
+const Submodule submodule("edge_lines", [](nb::module_ &m) {
+    m.def("evidence_of_lines", &evidence_of_lines, Unlocked(), "disparity"_a, "middle"_a, "number"_a, "costs"_a, "edges"_a, "pixels"_a,
+          "evidence"_a);
+    m.attr("STEPS") = STEPS;
+});
+
+}  // namespace
 }  // namespace sepi

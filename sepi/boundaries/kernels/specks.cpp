@@ -1,12 +1,16 @@
-#include "specks.hpp"
-
+// Specks of a map.
 #include <array>
 #include <cmath>
 #include <numeric>
 #include <vector>
 
-namespace sepi {
+#include "kernels/arguments.hpp"
 
+namespace sepi {
+namespace {
+
+// Pixels of parts of a map (H, W) that are small: of most_pixels, or of most_of_hole with nothing but nearer pixels
+// round them. Of one part are neighbours, of eight, that differ by difference at most.
 void specks_of(Array<const float, 2> disparity, float difference, Index most_pixels, Index most_of_hole, Array<bool, 2> specks) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const float *d = disparity.data;
@@ -39,4 +43,9 @@ void specks_of(Array<const float, 2> disparity, float difference, Index most_pix
     }
 }
 
+const Submodule submodule("specks", [](nb::module_ &m) {
+    m.def("specks_of", &specks_of, Unlocked(), "disparity"_a, "difference"_a, "most_pixels"_a, "most_of_hole"_a, "specks"_a);
+});
+
+}  // namespace
 }  // namespace sepi

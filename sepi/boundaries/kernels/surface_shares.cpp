@@ -1,12 +1,25 @@
-#include "surface_shares.hpp"
-
+// How much of a pixel beside a depth step each view shows as the nearer of its two surfaces: how badly each share explains
+// what they show.
 #include <cmath>
 
+#include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 #include "view_samples.hpp"
 
 namespace sepi {
 namespace {
+
+// The pixels beside a depth step, and the two surfaces that may be theirs; (H, W).
+struct Rim {
+    Array<float, 2> near, far;
+    Array<bool, 2> inside, is_near;
+
+    auto fields() { return std::tie(near, far, inside, is_near); }
+};
+
+constexpr Index FEWEST_SAMPLES = 8;  // views from which a share is told
+constexpr Index FEWEST_ALONE = 3;    // views from which it is told whether a pixel moves with the more distant surface alone
+constexpr Index SHARES = 12;         // that are tried, from 0 to 1; none is one half
 
 constexpr Index LITTLE = 3;            // shares that a pixel may have which moves with the more distant surface
 constexpr double SAME_SURFACE = 0.25;  // difference of disparity, pixels per view step
@@ -218,8 +231,11 @@ struct ShownPixel {
     }
 };
 
-}  // namespace
-
+// How badly each share of the nearer surface explains what the views show of the pixels (n,) of a rim: mean robust
+// residuals, 0..1, of shares from 0 to 1, into costs (n, SHARES), and told (n,) set; both left alone where the views do
+// not tell. Along the nearer surface's disparity each view shows the same share of that surface before another piece of
+// background (H, W, 4), which is that of background_of. A view counts half at the squared residual scale2, to which
+// the squared difference of both surfaces' colours adds, times contrast2: errors of samples grow with it.
 void costs_of_shares(const RimViews &views, const Rim &rim, Array<const float, 3> background, const Sides &sides, double scale2, double contrast2,
                      Array<const std::int64_t, 1> pixels, Array<float, 2> costs, Array<bool, 1> told) {
     const Index W = sides.disparity.shape[1], count = pixels.shape[0];
@@ -233,4 +249,13 @@ void costs_of_shares(const RimViews &views, const Rim &rim, Array<const float, 3
     std::visit(look, views.lines);
 }
 
+const Submodule submodule("surface_shares", [](nb::module_ &m) {
+    m.def("costs_of_shares", &costs_of_shares, Unlocked(), "views"_a, "rim"_a, "background"_a, "sides"_a, "scale2"_a, "contrast2"_a,
+          "pixels"_a, "costs"_a, "told"_a);
+    m.attr("FEWEST_SAMPLES") = FEWEST_SAMPLES;
+    m.attr("FEWEST_ALONE") = FEWEST_ALONE;
+    m.attr("SHARES") = SHARES;
+});
+
+}  // namespace
 }  // namespace sepi

@@ -1,11 +1,41 @@
-// Where views show a pixel of some disparity, and the colours between their pixels.
+// What is handed over of a map and its views; where these show a pixel of some disparity, and the colours between their pixels.
 #pragma once
+
+#include <tuple>
+#include <variant>
 
 #include "kernels/lanes.hpp"
 #include "kernels/sampling.hpp"
-#include "surface_shares.hpp"
 
 namespace sepi {
+
+// The views that are compared, and what hides what in them.
+struct RimViews {
+    std::variant<Array<const std::uint8_t, 4>, Array<const std::uint16_t, 4>, Array<const float, 4>> lines;  // (T, S, H, W C)
+    Index channels;
+    Array<const float, 1> units;            // (N,)
+    Strided<const std::int64_t, 2> places;  // (N, 2)
+    Strided<const double, 2> baselines;     // (N, 2)
+    Array<const float, 4> nearest;          // (T, S, n, W)
+    Index low;                              // first row of nearest
+    float margin;
+
+    auto fields() { return std::tie(lines, channels, units, places, baselines, nearest, low, margin); }
+
+    Index number() const { return units.shape[0]; }
+};
+
+// The surfaces of a map, and what the reference view shows of them.
+struct Sides {
+    Array<const float, 2> disparity;  // (H, W)
+    Strided<const float, 3> guide;    // (H, W, 3)
+    Array<const bool, 2> clean;       // (H, W)
+    Index clean_radius;
+
+    auto fields() { return std::tie(disparity, guide, clean, clean_radius); }
+
+    std::array<float, 3> colour(Index y, Index x) const { return {guide(y, x, 0), guide(y, x, 1), guide(y, x, 2)}; }
+};
 
 template <class Colour>
 struct ViewSamples {
