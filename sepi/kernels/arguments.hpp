@@ -81,7 +81,7 @@ struct Submodule {
 
 }  // namespace sepi
 
-// What all bindings say
+// What all sources say
 namespace nb = nanobind;
 using namespace nb::literals;
 using sepi::Unlocked;

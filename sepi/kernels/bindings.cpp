@@ -1,15 +1,11 @@
 // The extension module: a submodule for each source of kernels, by what that says itself.
 #include "arguments.hpp"
-#include "floor.hpp"
 #include "lanes.hpp"
 #include "parallel.hpp"
 
 #if defined(__x86_64__)
 #include <cpuid.h>
 #endif
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 // Whether the processor has what x86-64-v3 adds to the baseline, as far as kernels use it, and the system keeps its
 // registers. Not by __builtin_cpu_supports: zig's own library, linked for that, brings an exp and a memcpy that are slow.
@@ -36,8 +32,4 @@ NB_MODULE(_native, m) {
         auto submodule = m.def_submodule(name);
         fill(submodule);
     }
-
-    auto floor = m.def_submodule("floor");
-    floor.def("samples", &sepi::samples, sepi::Unlocked(), "passes"_a, "data"_a, "out"_a);
-    floor.def("windows", &sepi::windows, sepi::Unlocked(), "passes"_a, "data"_a, "out"_a);
 }

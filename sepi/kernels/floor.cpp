@@ -1,5 +1,6 @@
-#include "floor.hpp"
-
+// The operations of the plane sweep, on a few numbers that stay in the first cache, at fixed places: what they cost where
+// nothing else does.
+#include "arguments.hpp"
 #include "lanes.hpp"
 #include "parallel.hpp"
 
@@ -24,8 +25,8 @@ void add_passes(Index passes, Array<const float, 3> data, Array<float, 2> out, c
     });
 }
 
-}  // namespace
-
+// Samples, polynomials of their distance, and their robust residuals: so many passes over data (threads, 7, N), added to
+// out (threads, N). N is a multiple of LANES.
 void samples(Index passes, Array<const float, 3> data, Array<float, 2> out) {
     add_passes(passes, data, out, [](Float8 distance, const Float8 *values, Float8 total) {
         Float8 z = values[4];
@@ -35,6 +36,7 @@ void samples(Index passes, Array<const float, 3> data, Array<float, 2> out) {
     });
 }
 
+// Rows of a window, seven multiply-adds each.
 void windows(Index passes, Array<const float, 3> data, Array<float, 2> out) {
     add_passes(passes, data, out, [](Float8 weight, const Float8 *values, Float8 total) {
         for (int k = 0; k < 7; ++k) total = fma(weight + spread(0.01f * float(k)), values[k], total);
@@ -42,4 +44,10 @@ void windows(Index passes, Array<const float, 3> data, Array<float, 2> out) {
     });
 }
 
+const Submodule submodule("floor", [](nb::module_ &m) {
+    m.def("samples", &samples, Unlocked(), "passes"_a, "data"_a, "out"_a);
+    m.def("windows", &windows, Unlocked(), "passes"_a, "data"_a, "out"_a);
+});
+
+}  // namespace
 }  // namespace sepi
