@@ -110,8 +110,8 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     reliable_confidence: float = Field(
         0.5, gt=0, le=1, description="confidence within two pixels from which discontinuities in the data are believed"
     )
-    rtol: float = Field(1e-4, gt=0, lt=1, description="relative residual at which the last round's solver stops")
-    first_rtol: float = Field(1e-3, gt=0, lt=1, description="the same for all rounds before it")
+    rtol: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the last round's solver stops")
+    first_rtol: float = Field(3e-3, gt=0, lt=1, description="the same for all rounds before it")
     max_iterations: int = Field(200, ge=1, description="iterations after which the solver stops anyway")
 
     @model_validator(mode="after")
