@@ -15,6 +15,7 @@ from bench.cases import GROUPS
 from bench.measure import Case, Measurement, Result, measured, read_result
 from bench.scene import Scene
 from sepi.command import SepiGroup
+from sepi.compared.methods import LEARNED
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
@@ -158,7 +159,8 @@ def digests(scene: str, size: int, views: int, threads: tuple[int, ...], variant
     from bench.digests import digests as digests_of
 
     conditions = [*map(Condition, threads), Condition(threads[-1], baseline=True)]
-    chosen = variants or tuple(VARIANTS)
+    # a network is not among the things that the package brings
+    chosen = variants or tuple(name for name in VARIANTS if name not in LEARNED)
     with tqdm(conditions, disable=None, leave=False, bar_format="{n}/{total} {desc} |{bar}|") as bar:
         found = [digests_of(condition, chosen, scene, size, views) for condition in bar]
     rows = []
