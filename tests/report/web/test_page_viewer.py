@@ -158,10 +158,11 @@ def test_the_read_out_shows_the_interval(same_page: Any, example: Example) -> No
             point_at(same_page, x, y)
             shown = read_out(same_page)
             low, high = map(float, shown["interval a"].split(" … "))
-            value = maps.disparity[y, x]
+            # from what the page has for the value, which is kept in steps, too
+            value, own = float(shown["value a"]), maps.disparity[y, x]
             # half a step of a logarithm is 6 %, of two 12 %, and the ends are shown to three decimals; two digits of
             # sigma are another 5 %
-            for shown_reach, reach in ((value - low, value - maps.low[y, x]), (high - value, maps.high[y, x] - value)):
+            for shown_reach, reach in ((value - low, own - maps.low[y, x]), (high - value, maps.high[y, x] - own)):
                 assert abs(shown_reach - reach) <= 0.125 * reach + 0.0006
             assert float(shown["sigma a"]) == pytest.approx(maps.sigma[y, x], rel=0.12)
             assert shown["sigma b"] == "–"
