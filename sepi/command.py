@@ -131,11 +131,20 @@ def shown_errors() -> Iterator[None]:
         if error.filename is None:
             raise
         raise _Shown(one_line(f"{error.filename}: {error.strerror}")) from error
-    except MemoryError as error:
-        raise _Shown(f"not enough memory ({str(error) or 'no more is to be had'})") from error
+    except Exception as error:
+        if not _is_of_memory(error):
+            raise
+        raise _Shown(one_line(f"not enough memory ({str(error) or 'no more is to be had'})")) from error
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _is_of_memory(error: Exception) -> bool:
+    """Whether there was too little memory, also for the stack of a thread, or within OpenCV."""
+    cv2 = sys.modules.get("cv2")
+    within_opencv = cv2 is not None and isinstance(error, cv2.error) and error.code == cv2.Error.StsNoMem
+    return isinstance(error, MemoryError) or within_opencv or str(error) == "can't start new thread"
 
 
 def _show_warning(
