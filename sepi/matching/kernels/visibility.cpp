@@ -82,7 +82,17 @@ struct NearestInView {
                     continue;
                 }
             }
-            for (Index x = begin; x < std::min(W, begin + LANES); ++x) add(row, y, x, false, false);
+            for (Index x = begin; x < std::min(W, begin + LANES); ++x) {
+                // most fall on no position
+                const double i = double(y) - row[x] * down, j = double(x) - row[x] * across;
+                const Index here = Index(std::floor(i)) + 1, beside = Index(std::floor(j)) + 1;
+                if ((down != 0 && i == double(here - 1)) || (across != 0 && j == double(beside - 1))) {
+                    add(row, y, x, false, false);
+                } else if (0 <= here && here <= H && 0 <= beside && beside <= W) {
+                    float &nearest_so_far = squares.array()(here, beside);
+                    nearest_so_far = std::max(nearest_so_far, row[x]);
+                }
+            }
         }
         add(row, y, 0, true, false);
         add(row, y, W - 1, false, true);
