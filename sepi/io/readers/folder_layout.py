@@ -7,10 +7,11 @@ from math import gcd, isqrt, prod
 from pathlib import Path
 
 from sepi.errors import SepiError
+from sepi.io.readers.name_groups import EXAMPLES
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_counts import Kind, fill, origin
 from sepi.io.readers.view_files import MAX_VIEWS
-from sepi.io.readers.view_names import EXAMPLES, ViewNumbers
+from sepi.io.readers.view_names import ViewNumbers
 
 _POSITIONS_PER_PICTURE = 100
 # part of what it filled before that a grid must still be filled when it is widened for views that are left out

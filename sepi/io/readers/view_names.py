@@ -4,36 +4,17 @@ from __future__ import annotations
 
 import functools
 import re
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from os.path import commonprefix
 
 from sepi.errors import SepiError
-from sepi.io.readers.view_counts import Counting, Kind, Values, counting, fill, origin
-
-EXAMPLES = "'view_{row}_{column}.png' or 'img{number}.jpg'"
-
-CAMERAS = ("cam", "camera")
-"""Words for a camera in names of folders and pictures."""
+from sepi.io.readers.name_groups import EXAMPLES, MAX_DIGITS, NameGroup
+from sepi.io.readers.view_counts import Counting, Kind, fill
 
 _FIELDS = ("row", "column", "number")
-_MAX_DIGITS = 18
-# decimals of a decimal number that counts views
-_FINE = 6
-_FINEST = 10**_FINE
-# part of the largest group of names from which on another group is as likely the views
-_RIVAL = 0.5
-# last word before a number, what says which number it is, and what says that it is no place
-_WORD = re.compile(r"([A-Z]?[a-z]+|[A-Z]+)[ _.=(\[-]*$")
-_AXES = {"x": "column", "c": "column", "col": "column", "column": "column", "y": "row", "r": "row", "row": "row"}
 # names of the two views of a pair
 _PAIRS = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("l", "r"), ("L", "R"))
-_NO_PLACE = frozenset(["frame", "frm", "time", "t", "exp", "exposure", "ev", "iso", "focus", "ch", "channel"])
-# in place of a decimal number; no name has it
-_MARK = "\0"
-
 _DECIMAL = r"(?P<decimal>[+-]*+(?<![0-9.])[0-9]++\.[0-9]++(?![0-9.]))|"
 _INTEGER = r"(?P<integer>[+-]*+[0-9]++)"
 # ways to find the numbers, and whether decimals may count: camera positions beside numbers that count, names such as
@@ -188,195 +169,17 @@ def _no_numbers(_: str) -> None:
     return None
 
 
-def _best_reading(source: str, names: Sequence[str]) -> tuple[_Group, Counting | None]:
+def _best_reading(source: str, names: Sequence[str]) -> tuple[NameGroup, Counting | None]:
     """The names cut in the way that gives a grid; else in the first that gives any count."""
     readings = []
     for form, decimals_count in _FORMS:
-        group = _Group(source, names, form, decimals_count)
+        group = NameGroup(source, names, form, decimals_count)
         readings.append((group, counted := group.counting()))
         if counted is not None and counted.kind is Kind.GRID:
             row, column = (group.columns[at] for at in counted.columns)
             if fill(row, column):
                 return readings[-1]
     return next((reading for reading in readings if reading[1] is None or reading[1].columns), readings[0])
-
-
-class _Group:
-    """The largest group of names that are alike but for their numbers.
-
-    Parameters
-    ----------
-    source : str
-        For messages.
-    names : sequence of str
-    form : pattern
-        Of the numbers.
-    decimals_count : bool
-        Whether decimal numbers may count views.
-    """
-
-    def __init__(self, source: str, names: Sequence[str], form: re.Pattern[str], decimals_count: bool) -> None:
-        self._form, self._decimals_count = form, decimals_count
-        cut = {name: self._cut(name) for name in names}
-        groups: dict[tuple[str, ...], list[str]] = defaultdict(list)
-        for name in names:
-            if cut[name].numbers or cut[name].decimals:
-                groups[cut[name].texts].append(name)
-        self.names = _largest(source, groups)
-        self._texts = cut[self.names[0]].texts
-        cuts = [cut[name] for name in self.names]
-        self._hyphens = _separators([[signs for signs, _ in name.numbers] for name in cuts])
-        # where some names have a decimal number and others a whole one, they do not say where cameras stood
-        self._decimals_alike = len({tuple("." in text for _, text in name.numbers) for name in cuts}) == 1
-        decimals = [[signs for signs, _ in name.decimals] for name in cuts] if self._decimals_alike else []
-        self._decimal_hyphens = _separators(decimals)
-        # decimals that count do so in steps of their own
-        self._origins = [(0, 1)] * len(cuts[0].numbers)
-        self.columns = self._values()
-        if decimals_count:
-            self._origins = [origin(values) for values in self.columns]
-            self.columns = self._values()
-        self._words = [word[1].lower() if (word := _WORD.search(text)) else "" for text in self._texts[:-2]]
-        self._beside = self._no_places()
-        # what counts something else than places is the same for all of them
-        self.places = [(0,) * len(values) if at in self._beside else values for at, values in enumerate(self.columns)]
-
-    def _values(self) -> list[Values]:
-        columns = range(len(self._origins))
-        return list(zip(*(self.numbers_of(name, columns) or () for name in self.names), strict=True))
-
-    def _no_places(self) -> list[int]:
-        """Numbers that count frames, exposures and the like, where others differ, too.
-
-        A word at the start of the names is one of all numbers unless each has a word: ``frame_03_07``. Axes of a light
-        field may be called t and s. Pictures in a camera's folder are its own.
-        """
-        words = {at: self._words[at] for at, values in enumerate(self.columns) if len(set(values)) > 1}
-        other = _NO_PLACE - {"t"} if "s" in words.values() else _NO_PLACE
-        found = [
-            at
-            for at, word in words.items()
-            if (word in other and (at > 0 or all(words.values())))
-            or (at > 0 and "/" in self._texts[at] and self._words[0] in CAMERAS)
-        ]
-        return found if len(found) < len(words) else []
-
-    def counting(self) -> Counting | None:
-        """How its numbers count views; None where they leave it open, or views have several pictures."""
-        several = len(set(zip(*self.places, strict=True))) < len(set(zip(*self.columns, strict=True)))
-        return None if several else counting(self.places)
-
-    def why_open(self) -> str:
-        """What is unclear where nothing is counted."""
-        if not self._beside:
-            return "no two of them alone fill a grid"
-        words = " and ".join(f"'{self._words[at] or self._texts[at]}'" for at in self._beside)
-        return f"those after {words} count no views, so that one value of each is to be chosen"
-
-    def numbers_of(self, name: str, columns: Sequence[int]) -> tuple[int, ...] | None:
-        """Some of the numbers of a name; None where it is unlike those of the group."""
-        cut = self._cut(name)
-        if cut.texts != self._texts:
-            return None
-        values = (_signed(*cut.numbers[at], self._hyphens[at]) for at in columns)
-        return tuple(
-            (value - self._origins[at][0]) // self._origins[at][1] for value, at in zip(values, columns, strict=True)
-        )
-
-    def decimals_of(self, name: str) -> tuple[float, ...]:
-        """The decimal numbers of one of the group's names; none where not all names have them in the same places."""
-        if not self._decimals_alike:
-            return ()
-        decimals = zip(self._cut(name).decimals, self._decimal_hyphens, strict=True)
-        return tuple(-float(text) if _is_minus(signs, hyphen) else float(text) for (signs, text), hyphen in decimals)
-
-    def row_first(self, columns: tuple[int, ...]) -> tuple[tuple[int, ...], bool]:
-        """Row and column in that order, and whether the words before them say so: ``x3_y7``, ``c3r7``."""
-        said = [_AXES.get(self._words[at], "") for at in columns]
-        return (columns[::-1] if said == ["column", "row"] else columns), sorted(said) == ["column", "row"]
-
-    def pattern(self, columns: Sequence[int], fixed: bool = False) -> str:
-        """The pattern that takes these numbers; others that differ are free, or ``fixed`` as in the first name."""
-        words = ("{row}", "{column}") if len(columns) == 2 else ("{number}",)
-        fields = dict(zip(columns, words, strict=True))
-        parts = []
-        for at, (signs, text) in enumerate(self._cut(self.names[0]).numbers):
-            free = not fixed and len(set(self.columns[at])) > 1
-            parts.append(self._hyphens[at] + fields[at] if at in fields else "*" if free else signs + text)
-            parts.append(self._texts[at + 1])
-        ending = self.names[0].rpartition(".")[2] if self._texts[-1] else ""
-        return (self._texts[0] + "".join(parts) + ("." + ending if ending else "")).replace(_MARK, "*")
-
-    def suggestion(self) -> str:
-        """A pattern in quotes: of the first number of which each picture has another, else of the last two places."""
-        varying = [at for at, values in enumerate(self.places) if len(set(values)) > 1]
-        single = [at for at in varying if len(set(self.places[at])) == len(self.names)]
-        columns = single[:1] or self.row_first(tuple(varying[-2:]))[0]
-        return f"'{self.pattern(columns, fixed=not single)}'"
-
-    def _cut(self, name: str) -> _Cut:
-        stem, dot, suffix = name.rpartition(".")
-        if not dot:
-            stem, suffix = name, ""
-        texts, numbers, decimals, at = [""], [], [], 0
-        for match in self._form.finditer(stem):
-            text = match[0].lstrip("+-")
-            signs = match[0][: -len(text)]
-            texts[-1] += stem[at : match.start()]
-            at = match.end()
-            if match.lastgroup == "decimal":
-                decimals.append((signs, text))
-            if match.lastgroup == "decimal" and not self._decimals_count:
-                # names with other decimals are alike
-                texts[-1] += _MARK
-            elif len(text) > _MAX_DIGITS:
-                texts[-1] += match[0]
-            else:
-                numbers.append((signs, text))
-                texts.append("")
-        texts[-1] += stem[at:]
-        return _Cut((*texts, suffix.lower()), tuple(numbers), tuple(decimals))
-
-
-@dataclass(frozen=True)
-class _Cut:
-    """A name cut into the text between its numbers and, each with what stands before it of + and -, its numbers."""
-
-    texts: tuple[str, ...]
-    numbers: tuple[tuple[str, str], ...]
-    decimals: tuple[tuple[str, str], ...]
-
-
-def _largest(source: str, groups: Mapping[tuple[str, ...], list[str]]) -> list[str]:
-    ranked = sorted(groups.values(), key=len, reverse=True)
-    if not ranked:
-        raise SepiError(f"{source}: no picture's name has a number; expected names such as {EXAMPLES}")
-    # one stray picture is none of two views; of more, half as many may be the views of something else
-    if len(ranked) > 1 and len(ranked[1]) >= min(len(ranked[0]), max(2, _RIVAL * len(ranked[0]))):
-        raise SepiError(
-            f"{source}: about as many pictures are named like {ranked[0][0]} as like {ranked[1][0]} ({len(ranked[0])} "
-            f"and {len(ranked[1])}); say which are the views with --pattern, such as {EXAMPLES}"
-        )
-    return ranked[0]
-
-
-def _separators(signs: Sequence[Sequence[str]]) -> list[str]:
-    """Of the signs before each number, those that all names have: hyphens, where no sign is a plus."""
-    columns = [list(column) for column in zip(*signs, strict=True)]
-    signed = any("+" in sign for column in columns for sign in column)
-    # of texts that are no paths
-    return [commonprefix([sign[:-1] for sign in column] if signed else column) for column in columns]  # noqa: RUF071
-
-
-def _is_minus(signs: str, separator: str) -> bool:
-    return "-" in signs[len(separator) :]
-
-
-def _signed(signs: str, text: str, separator: str) -> int:
-    # the digits of a decimal that counts, as those of all others of its place in thousandths of thousandths
-    whole, _, part = text.partition(".")
-    value = int(whole) * _FINEST + int(part.ljust(_FINE, "0")[:_FINE]) if part else int(whole)
-    return -value if _is_minus(signs, separator) else value
 
 
 def _compiled(source: str, pattern: str) -> re.Pattern[str]:
@@ -402,7 +205,7 @@ def _compiled(source: str, pattern: str) -> re.Pattern[str]:
         if part == "*":
             segments.append("")
         elif part[0] == "{":
-            segments[-1] += rf"(?<![0-9])(?P<{part[1:-1]}>[+-]?[0-9]{{1,{_MAX_DIGITS}}}+)(?![0-9])"
+            segments[-1] += rf"(?<![0-9])(?P<{part[1:-1]}>[+-]?[0-9]{{1,{MAX_DIGITS}}}+)(?![0-9])"
         else:
             segments[-1] += re.escape(part)
     first, *middle = segments
