@@ -69,6 +69,7 @@ test-system: $(READY)
 # next `make` puts back. Python does not free all at its end
 KERNEL_TESTS := tests/matching tests/boundaries tests/regularization tests/error_bars tests/inspection tests/compared tests/applications
 sanitize: $(READY)
+	mkdir -p build
 	CXX=g++ $(BUILD) -G Ninja -S . -B build/sanitized -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O1 \
 		-DSEPI_SANITIZE=address,undefined -DSEPI_LEVELS=native -DPython_EXECUTABLE="$(CURDIR)/$(BIN)/python" >build/sanitized.log
 	$(BUILD) --build build/sanitized
