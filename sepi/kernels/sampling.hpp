@@ -67,12 +67,6 @@ inline std::optional<Place> place_within(double down, double across, Index H, In
     return Place{row, column, down - double(row), across - double(column)};
 }
 
-// The same, unless a pixel right of it or below it lies outside.
-inline std::optional<Place> place_amid(double down, double across, Index H, Index W) {
-    const auto place = place_within(down, across, H, W);
-    return place && place->row < H - 1 && place->column < W - 1 ? place : std::nullopt;
-}
-
 // Whether a test holds for all pixels (i, j) that a bilinear sample looks at.
 template <class Test>
 bool all_about(const Place &at, const Test &test) {

@@ -181,8 +181,7 @@ class Surfaces:
         corner, normal, uv, gradient = (part[faces] for part in self._planes)
         corner = corner - [*frame[:2], 0]
         volume = np.sum(normal * corner, axis=1)
-        begins, texels = self._texels
-        starts = np.array([(begins[id(pattern)], *_raster(pattern).shape[:2]) for pattern in self._patterns])
+        starts, texels = self._starts, self._texels[1]
         start, sizes = starts[self.thing[faces], 0], starts[self.thing[faces], 1:]
         total = np.zeros((len(faces), 3))
         for fine in np.ndindex(_FINE, _FINE):
@@ -214,6 +213,12 @@ class Surfaces:
         for raster, first, after in zip(rasters.values(), begins, begins[1:], strict=False):
             texels[first:after] = srgb_decoded(raster).reshape(-1, 3)
         return dict(zip(rasters, begins, strict=False)), texels
+
+    @cached_property
+    def _starts(self) -> npt.NDArray[np.int64]:
+        """Of each thing's pattern: where it begins in the list of texels, its height and width."""
+        begins, _ = self._texels
+        return np.array([(begins[id(pattern)], *_raster(pattern).shape[:2]) for pattern in self._patterns])
 
 
 def _raster(pattern: Pattern | Vector) -> FloatArray:

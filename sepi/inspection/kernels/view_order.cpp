@@ -18,7 +18,10 @@ Array<const float, 2> patch_at(Array<const float, 2> picture, Index y, Index x, 
 
 // Where a patch of the reference view begins in another, if that shows all of it.
 std::optional<Place> patch_within(Array<const float, 2> view, Index y, Index x, float d, float down, float across, Index side) {
-    return place_amid(double(y) - double(d * down), double(x) - double(d * across), view.shape[0] - side + 1, view.shape[1] - side + 1);
+    const Index H = view.shape[0] - side, W = view.shape[1] - side;
+    const auto place = place_within(double(y) - double(d * down), double(x) - double(d * across), H + 1, W + 1);
+    // and the row and column beyond, of which samples take
+    return place && place->row < H && place->column < W ? place : std::nullopt;
 }
 
 // Sum of the squared differences of a patch and the samples of a view that begin at a place.
