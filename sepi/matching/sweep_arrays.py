@@ -111,7 +111,7 @@ class ExpectedCosts(NamedTuple):
 
 
 class Visibility(NamedTuple):
-    """In which views a pixel is seen.
+    """In which views a pixel is seen, and in which it is looked for at which candidates.
 
     Attributes
     ----------
@@ -122,11 +122,17 @@ class Visibility(NamedTuple):
         By how much an occluder must be nearer, pixels per view step.
     occluded_view_weight : float32
         Weight of a view in which the pixel is occluded; none where the view has no pixel.
+    searched : ndarray, shape (T, S), bool
+        The views that compare all candidates. Others compare the likely ones.
+    likely : ndarray, shape (2, H, W) or (2, 0, 0), int32
+        The first and the last of these, 0..K-1; empty where all views compare all candidates.
     """
 
     nearest: FloatMap
     occlusion_margin: np.float32
     occluded_view_weight: np.float32
+    searched: BoolMap
+    likely: npt.NDArray[np.int32]
 
 
 def sampled_candidates(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> Candidates:

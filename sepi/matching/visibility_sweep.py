@@ -3,7 +3,8 @@
 A view sees pixel ``p`` at candidate ``d`` unless something nearer than ``d`` occludes the position where ``p`` would be
 seen. What occludes it is known from a first depth map: each view gets a z-buffer of that map. This is the idea of the
 half-SEPI, with the part of the views chosen view by view. All maps but the last only tell what is hidden where: a few
-views, spread over the grid, and every other candidate are enough for them. The compiled loops are in
+views, spread over the grid, and every other candidate are enough for them. A few views compare all candidates with the
+pixel, the others those near the map before, so that a wrong map can be put right. The compiled loops are in
 ``kernels/visibility.cpp``.
 """
 
@@ -12,7 +13,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import ClassVar
 
+import cv2
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import variance_of_residuals
@@ -47,6 +50,9 @@ TEXTURE = 1.85
 
 In views without noise the mask sees texture, and of strong texture few pixels of a window have nearly the same colour.
 """
+
+LIKELY_RADIUS, LIKELY_CANDIDATES = 8, 5
+"""Pixels around, and candidates beyond, within which those of a map make candidates likely."""
 
 BYTES_PER_CANDIDATE = 8
 """Of each pixel: two at a time of the costs, their averages, and these smoothed."""
@@ -91,6 +97,12 @@ class VisibleViewsParameters(VisibilitySweepParameters, GapParameters):
         le=1,
         description="noise of one channel from which on views are compared with the mean of others, instead of the "
         "reference view, colours in 0..1",
+    )
+    searched_views: int = Field(
+        13,
+        ge=2,
+        description="views that compare all candidates, at least, and all where there is noise; others compare those "
+        "near the map before",
     )
     occluded_view_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is occluded")
 
@@ -290,7 +302,7 @@ def _add_costs(
     views = base_detail_decomposition(light_field, parameters, band.rows, present)
     if mean is not None:
         views = compared_with(views, mean, parameters, band.rows)
-    visibility = _visibility(light_field, present, disparity, parameters, band)
+    visibility = _visibility(light_field, present, disparity, disparities, parameters, band)
     scales = parameters.colour_scale, parameters.detail_scale
     scales2 = np.array([views.squared_scale(scale) for scale in scales], np.float32)
     candidates = sampled_candidates(disparities, light_field.baselines)
@@ -304,6 +316,7 @@ def _visibility(
     light_field: LightField,
     present: BoolMap,
     disparity: FloatMap | None,
+    disparities: FloatMap,
     parameters: VisibilitySweepParameters,
     band: Band,
 ) -> Visibility:
@@ -312,6 +325,22 @@ def _visibility(
         everywhere = np.empty((*light_field.grid, band.rows.high - band.rows.low, 0), np.float32)
         if light_field.missing is not None:
             everywhere = nearest_surfaces(light_field, None, present, band.rows)
-        return Visibility(everywhere, np.float32(0), np.float32(1))
-    nearest = nearest_surfaces(light_field, disparity, present, band.rows)
-    return Visibility(nearest, np.float32(parameters.occlusion_margin), np.float32(parameters.occluded_view_weight))
+        return Visibility(everywhere, np.float32(0), np.float32(1), present, np.empty((2, 0, 0), np.int32))
+    # in noise, the mean of fewer views is the lowest of many candidates' by chance
+    noisy = isinstance(light_field, DenoisedLightField)
+    return Visibility(
+        nearest_surfaces(light_field, disparity, present, band.rows),
+        np.float32(parameters.occlusion_margin),
+        np.float32(parameters.occluded_view_weight),
+        present if noisy else spread_views(light_field, parameters.searched_views),
+        _likely_candidates(disparity, disparities),
+    )
+
+
+def _likely_candidates(disparity: FloatMap, candidates: FloatMap) -> npt.NDArray[np.int32]:
+    """The first and the last candidate near those of a map around each pixel; shape (2, H, W)."""
+    window = np.ones((2 * LIKELY_RADIUS + 1, 2 * LIKELY_RADIUS + 1), np.uint8)
+    numbers = (disparity - candidates[0]) / (candidates[1] - candidates[0])
+    first = np.ceil(cv2.erode(numbers, window) - LIKELY_CANDIDATES)
+    last = np.floor(cv2.dilate(numbers, window) + LIKELY_CANDIDATES)
+    return np.stack([first, last]).clip(0, len(candidates) - 1).astype(np.int32)

@@ -83,6 +83,14 @@ def test_all_maps_but_the_last_compare_few_views(monkeypatch) -> None:
     assert compared == [(13, 11), (13, 11), (13, 11), (41, 21)]
 
 
+def test_a_wrong_map_is_put_right() -> None:
+    """Few views search far from it: who looked near it alone would keep what the stage before got wrong."""
+    field = render("curved_occluders", size=96)
+    wrong = np.full(field.shape, field.require_disparity_range().maximum, np.float32)
+    found = depth_from_visible_views(field, wrong, VisibleViewsParameters(occlusion_margin=10), no_progress)
+    assert np.mean(np.abs(found.disparity - field.ground_truth) > 0.1) <= 0.05
+
+
 def z_buffer_twin(disparity, dt, ds):
     H, W = disparity.shape
     nearest = np.full((H, W), EMPTY)
@@ -105,7 +113,7 @@ def sampled(values, y, x):
     return sum(values[top + i, left + j] * weights[i][j] for i, j in np.ndindex(2, 2)) / 2**14
 
 
-def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales, shares):
+def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales, shares, compared):
     t0, s0 = light_field.reference_position
     H, W = light_field.shape
     rows, columns = np.mgrid[:H, :W].astype(float)
@@ -130,6 +138,7 @@ def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales,
                 near = near.astype(int).clip(0, [[[H - 1]], [[W - 1]]])
                 beyond = d + 1.5 * margin - nearest[t, s][near[0], near[1]]
                 seen = np.clip(beyond / max(margin, 1e-6), hidden, 1)
+            seen = seen * compared[k, t, s]
             for values, scale, share in zip(planes, scales, shares, strict=False):
                 sample = np.stack([sampled(c, y, x) for c in values[t, s]])
                 squared = ((sample - values[t0, s0]) ** 2).sum(axis=0)
@@ -156,11 +165,18 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool, geo
     )
     scales, shares = np.array([0.02, 0.01], np.float32), np.array([0.4, 0.6], np.float32)
     cost = np.empty((7, 11, 13), np.float32)
-    seen = Visibility(nearest, np.float32(0.1), np.float32(0.05))
+    # some views compare all candidates, the others few, in a part of the picture
+    searched = np.indices((3, 4)).sum(axis=0) % 2 == 0
+    likely = np.sort(np.random.default_rng(2).integers(0, 7, (2, 11, 13), np.int32), axis=0)
+    numbers = np.arange(7)[:, None, None]
+    compared = searched[:, :, None, None] | ((likely[0] <= numbers) & (numbers <= likely[1]))[:, None, None]
+    if not visible:
+        compared, searched, likely = np.ones((7, 3, 4, 1, 1), bool), present, np.empty((2, 0, 0), np.int32)
+    seen = Visibility(nearest, np.float32(0.1), np.float32(0.05), searched, likely)
     candidates = sampled_candidates(disparities, light_field.baselines)
     visibility.sweep_visible_rows(views, seen, scales, shares, candidates, 0, 11, cost)
     expected = sweep_twin(
-        light_field, views, nearest if visible else None, disparities, np.float32(0.1), 0.05, scales, shares
+        light_field, views, nearest if visible else None, disparities, np.float32(0.1), 0.05, scales, shares, compared
     )
     np.testing.assert_allclose(cost, expected, atol=2e-5)
 

@@ -30,13 +30,17 @@ struct BaseDetail {
     }
 };
 
-// In which views a pixel is seen.
+// In which views a pixel is seen, and in which it is looked for at which candidates.
 struct Visibility {
     Array<const float, 4> nearest;  // (T, S, n, W) or (T, S, n, 0), and LANES numbers behind it; rows as those of the detail
     float occlusion_margin, occluded_view_weight;
+    Array<const bool, 2> searched;        // (T, S): the views that compare all candidates; others compare the likely ones
+    Array<const std::int32_t, 3> likely;  // (2, H or 0, W): the first of these, and the last
 
-    auto fields() { return std::tie(nearest, occlusion_margin, occluded_view_weight); }
+    auto fields() { return std::tie(nearest, occlusion_margin, occluded_view_weight, searched, likely); }
 };
+
+using Columns = std::vector<std::pair<Index, Index>>;  // stretches of a row: first column, and what follows the last
 
 constexpr float ROUNDING = 1.0f / 512;  // how far a position is from the same in single precision, at most, pixels
 constexpr float LEAST_MARGIN = 1e-6f;   // by which an occluder must be nearer
@@ -130,7 +134,7 @@ struct VisibleRow {
     const float detail_scale2 = float(scales2(1) * (detail_steps * detail_steps) / 3);
     // of the rows of the view; where there is no detail it is 0, and fits
     const Scratch<std::int32_t, 3> view_pairs = zeros<std::int32_t, 3>(height(), 4, width);
-    const Scratch<float, 2> own = zeros<float, 2>(4, width);
+    const Scratch<float, 2> own = zeros<float, 2>(6, width);  // colours, detail, and the first and the last likely candidate
     const Scratch<float, 3> sums = zeros<float, 3>(K, 2, width);  // of the costs, and of their weights
 
     // Cost of every candidate in row y.
@@ -140,6 +144,7 @@ struct VisibleRow {
         load_rows<float>(views.guide, y, reference, [](auto colour) { return whole(colour * COLOUR_STEPS) * float(ONE); });
         for (Index x = 0; x < W && views.reference_detail.shape[0] > 0; ++x)
             reference(3, 0, x) = float(views.reference_detail(y - views.low, x) * ONE);
+        const std::vector<Columns> everywhere(K, {{0, W}}), likely = likely_columns(y);
         for (Index t = 0; t < views.present.shape[0]; ++t) {
             for (Index s = 0; s < views.present.shape[1]; ++s) {
                 if (!views.present(t, s) || (t == views.t0 && s == views.s0)) continue;
@@ -147,7 +152,7 @@ struct VisibleRow {
                 const auto [low, high] = std::minmax<Index>({y + candidates.down(r, 0), y + candidates.down(r, K - 1)});
                 const Index first = std::clamp<Index>(low, 0, H - 2), last = std::clamp<Index>(high, 0, H - 2) + 2;
                 load_view(t, s, first, last);
-                add_view(t, s, first, y);
+                add_view(t, s, first, y, visibility.searched(t, s) ? everywhere : likely);
             }
         }
         for (Index k = 0; k < K; ++k) {
@@ -155,6 +160,22 @@ struct VisibleRow {
             float *out = cost.at(k, y);
             for (Index x = 0; x < W; ++x) out[x] = weight[x] > 0 ? sum[x] / weight[x] : 1.0f;
         }
+    }
+
+    // Of each candidate, stretches of row y with all pixels in which it is likely.
+    std::vector<Columns> likely_columns(Index y) const {
+        std::vector<Columns> columns(K);
+        for (Index begin = 0; begin < W && visibility.likely.shape[1] > 0; begin += LANES) {
+            const Index end = std::min(W, begin + LANES);
+            const auto *first = visibility.likely.at(0, y), *last = visibility.likely.at(1, y);
+            std::copy(first + begin, first + end, own.array().at(4, begin));
+            std::copy(last + begin, last + end, own.array().at(5, begin));
+            for (Index k = *std::min_element(first + begin, first + end); k <= *std::max_element(last + begin, last + end); ++k) {
+                if (columns[k].empty() || columns[k].back().second < begin) columns[k].emplace_back(begin, 0);
+                columns[k].back().second = end;
+            }
+        }
+        return columns;
     }
 
     // Rows begin..end of a view, colours and detail: each value and its right neighbour in one number.
@@ -171,11 +192,11 @@ struct VisibleRow {
         }
     }
 
-    // Add one view, whose rows from low on are loaded, at every candidate of row y.
-    void add_view(Index t, Index s, Index low, Index y) {
+    // Add one view, whose rows from low on are loaded, to row y, in the columns of every candidate.
+    void add_view(Index t, Index s, Index low, Index y, const std::vector<Columns> &columns) {
         const Index r = candidates.row(t, s), c = candidates.column(t, s), pitch = width;
         const auto nearest = visibility.nearest[t][s];
-        const bool some_hide = nearest.shape[1] > 0;
+        const bool some_hide = nearest.shape[1] > 0, searched = visibility.searched(t, s);
         const Float8 hidden = spread(visibility.occluded_view_weight);
         const float margin = visibility.occlusion_margin, steepness = 1 / std::max(margin, LEAST_MARGIN);
         const std::array scale2{colour_scale2, detail_scale2}, share{shares(0), shares(1)};
@@ -184,42 +205,46 @@ struct VisibleRow {
             const Index left = candidates.across(c, k);
             const float fx = candidates.fx(c, k);
             // on the last column itself nothing beyond it is read with any weight
-            const Index first = std::max<Index>(0, -left), last = std::min(W, fx == 0 ? W - left : W - 1 - left);
-            if (top < 0 || top > H - 2 || last <= first) continue;
+            const Index within = std::max<Index>(0, -left), beyond = std::min(W, fx == 0 ? W - left : W - 1 - left);
+            if (top < 0 || top > H - 2) continue;
             // of neighbours, pairs of whole numbers of 16 bits: pixel and right neighbour, above and below
             const auto below = std::int64_t(double(fy) * ONE + 0.5), right = std::int64_t((ONE - below) * double(fx) + 0.5);
             const auto lower_right = std::int64_t(below * double(fx) + 0.5);
             const Int8 upper = pair_of(ONE - below - right, right), lower = pair_of(below - lower_right, lower_right);
             // a surface hides more and more, from half a margin nearer to one and a half: it is not known better
-            const Float8 limit = spread(candidates.disparities(k) + 1.5f * margin);
+            const Float8 limit = spread(candidates.disparities(k) + 1.5f * margin), number = spread(float(k));
             const Index lower_row = top - views.low + is_nearer_next(candidates.down(r, k), fy);
-            const float *before = some_hide ? nearest.at(lower_row, first + left + is_nearer_next(left, fx)) : nullptr;
-            const std::int32_t *pairs = view_pairs.array().at(top - low, 0, first + left);
-            const float *reference = own.array().data + first;
-            float *sum = sums.array().at(k, 0, first);
-            for (Index rest = last - first; rest > 0; rest -= LANES, pairs += LANES, reference += LANES, sum += LANES) {
-                Float8 seen = spread(1);
-                if (some_hide) {
-                    const Float8 found = load(before);
-                    seen = found < MISSING ? larger(hidden, smaller(seen, (limit - found) * steepness)) : Float8{};
-                    before += LANES;
+            for (const auto &[begin, end] : columns[k]) {
+                const Index first = std::max(begin, within), last = std::min(end, beyond);
+                const float *before = some_hide ? nearest.at(lower_row, first + left + is_nearer_next(left, fx)) : nullptr;
+                const std::int32_t *pairs = view_pairs.array().at(top - low, 0, first + left);
+                const float *reference = own.array().data + first;
+                float *sum = sums.array().at(k, 0, first);
+                for (Index rest = last - first; rest > 0; rest -= LANES, pairs += LANES, reference += LANES, sum += LANES) {
+                    Float8 seen = spread(1);
+                    if (some_hide) {
+                        const Float8 found = load(before);
+                        seen = found < MISSING ? larger(hidden, smaller(seen, (limit - found) * steepness)) : Float8{};
+                        before += LANES;
+                    }
+                    if (!searched) seen = (load(reference + 4 * pitch) <= number) & (load(reference + 5 * pitch) >= number) ? seen : Float8{};
+                    // pixels beyond the last add nothing to what others have added
+                    if (rest < LANES) seen = first_lanes(seen, rest, 0);
+                    const auto residual = [&](Index channel) {
+                        Int8 above, under;
+                        std::memcpy(&above, pairs + channel * pitch, sizeof above);
+                        std::memcpy(&under, pairs + (4 + channel) * pitch, sizeof under);
+                        const Int8 sample = dot_of_pairs(above, upper) + dot_of_pairs(under, lower);
+                        return __builtin_convertvector(sample, Float8) - load(reference + channel * pitch);
+                    };
+                    const Float8 red = residual(0), green = residual(1), blue = residual(2), detail = residual(3);
+                    const Float8 colours2 = fma(blue, blue, fma(green, green, red * red)), detail2 = detail * detail;
+                    // z / (z + scale) of either, by one division
+                    const Float8 of_colours = colours2 + scale2[0], of_detail = detail2 + scale2[1];
+                    const Float8 both = fma(share[0] * colours2, of_detail, share[1] * detail2 * of_colours);
+                    store(sum, fma(seen, both / (of_colours * of_detail), load(sum)));
+                    store(sum + pitch, load(sum + pitch) + seen);
                 }
-                // pixels beyond the last add nothing to what others have added
-                if (rest < LANES) seen = first_lanes(seen, rest, 0);
-                const auto residual = [&](Index channel) {
-                    Int8 above, under;
-                    std::memcpy(&above, pairs + channel * pitch, sizeof above);
-                    std::memcpy(&under, pairs + (4 + channel) * pitch, sizeof under);
-                    const Int8 sample = dot_of_pairs(above, upper) + dot_of_pairs(under, lower);
-                    return __builtin_convertvector(sample, Float8) - load(reference + channel * pitch);
-                };
-                const Float8 red = residual(0), green = residual(1), blue = residual(2), detail = residual(3);
-                const Float8 colours2 = fma(blue, blue, fma(green, green, red * red)), detail2 = detail * detail;
-                // z / (z + scale) of either, by one division
-                const Float8 of_colours = colours2 + scale2[0], of_detail = detail2 + scale2[1];
-                const Float8 both = fma(share[0] * colours2, of_detail, share[1] * detail2 * of_colours);
-                store(sum, fma(seen, both / (of_colours * of_detail), load(sum)));
-                store(sum + pitch, load(sum + pitch) + seen);
             }
         }
     }
