@@ -90,9 +90,9 @@ def share_costs(
     present = np.zeros(light_field.grid, bool)
     present[tuple(views.places.T)] = True
     # how far from a pixel the pieces of background lie that views show with it
-    step = float((rim.near - rim.far).max())
-    moved = math.ceil(step * float(np.abs(views.baselines).max())) + 2
-    rows_moved = math.ceil(step * float(np.abs(views.baselines[:, 0]).max())) + 1
+    step = np.where(rim.inside, rim.near - rim.far, 0)
+    moved = np.ceil(step * np.abs(views.baselines).max()) + 2
+    rows_moved = math.ceil(float(step.max()) * float(np.abs(views.baselines[:, 0]).max())) + 1
     farthest = float(np.abs(disparity).max())
     height, width = light_field.shape
     layer, wanted = _more_distant_layer(disparity, rim, views.margin, moved)
@@ -134,17 +134,18 @@ def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryPara
     return views._replace(units=units, places=places[alike], baselines=baselines[alike])
 
 
-def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32, reach: int) -> tuple[FloatMap, BoolMap]:
+def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32, moved: FloatMap) -> tuple[FloatMap, BoolMap]:
     """The map with the more distant surface of the next step in place of all that is nearer, and how far it is known.
 
     That is so many pixels from a step. Of steps that are equally near the most distant surface is taken.
     """
     behind = np.where(rim.inside, rim.far, np.float32(np.inf))
-    for step in range(reach):
+    # pixels that are left to where views show what is behind the next step
+    left = np.where(rim.inside, moved, -1).astype(np.float32)
+    for step in range(int(left.max())):
         unknown = np.isinf(behind)
         # by turns, so that what is reached is nearly round
         around = cv2.getStructuringElement(cv2.MORPH_RECT if step % 2 else cv2.MORPH_CROSS, (3, 3))
         behind[unknown] = cv2.erode(behind, around)[unknown]
-    outside = (~rim.inside).astype(np.uint8)
-    distance = cv2.distanceTransform(outside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    return np.where(disparity > behind + margin, behind, disparity), np.isfinite(behind) & (distance <= reach)
+        left = np.maximum(left, cv2.dilate(left, np.ones((3, 3), np.uint8)) - 1)
+    return np.where(disparity > behind + margin, behind, disparity), np.isfinite(behind) & (left >= 0)

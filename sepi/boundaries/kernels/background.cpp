@@ -15,7 +15,7 @@ constexpr float UNSEEN = -1;       // in place of the variance of a background t
 
 constexpr float NONE = std::numeric_limits<float>::infinity();
 constexpr double MOST_DEVIATION2 = 0.01;  // squared residual that one view counts at most in the background's variance
-constexpr Index STRIDE = 4;               // pixels from one to the next, from all borders on, that tell the brightness of a view
+constexpr Index ACROSS = 64;              // pixels, of the shorter side, that tell the brightness of a view
 constexpr double MOST_DIFFERENCE = 0.1;   // of one channel, that counts in a view's residual
 
 // Median of n numbers, NONE after them, by halving the interval that it lies in: counting vectorises, and sorting does not.
@@ -49,7 +49,7 @@ float median(const float *values, Index n) {
 // of the pixels; (N,). Pixels that a view does not show are missing (T, S, H, W), none if that is (T, S, 0, 0).
 void brightness_of_views(const RimViews &views, const Sides &sides, Array<const bool, 4> missing, Array<double, 1> brightness,
                          Array<double, 1> residual) {
-    const Index H = sides.disparity.shape[0], W = sides.disparity.shape[1];
+    const Index H = sides.disparity.shape[0], W = sides.disparity.shape[1], stride = std::max<Index>(1, std::min(H, W) / ACROSS);
     const auto look = [&](auto lines) {
         const ViewSamples samples_of{views, lines};
         parallel_for(0, views.number(), [&](Index view) {
@@ -61,9 +61,9 @@ void brightness_of_views(const RimViews &views, const Sides &sides, Array<const 
             std::vector<std::pair<std::array<float, 3>, std::array<float, 3>>> shown;
             double own = 1e-9, other = 1e-9, rest = 0;
             for (Index y = 0; y < H; ++y) {
-                if (std::min(y, H - 1 - y) % STRIDE) continue;
+                if (std::min(y, H - 1 - y) % stride) continue;
                 for (Index x = 0; x < W; ++x) {
-                    if (std::min(x, W - 1 - x) % STRIDE) continue;
+                    if (std::min(x, W - 1 - x) % stride) continue;
                     const auto place = samples_of.place_in(view, sides.disparity(y, x), y, x);
                     if (!sides.clean(y, x) || !place || !shows(place->row, place->column)) continue;
                     const auto there = samples_of.sample(view, *place);
