@@ -33,6 +33,17 @@ def require_memory(number: int) -> None:
         raise MemoryError(f"{number // 10**6} MB more are needed than a limit on this process leaves") from error
 
 
+def take_blas_buffer() -> None:
+    """Have OpenBLAS take its buffer, while there is memory for it.
+
+    Raises
+    ------
+    MemoryError
+    """
+    require_memory(BLAS_BUFFER)
+    np.linalg.solve(np.eye(1), np.ones(1))
+
+
 def give_back_memory() -> None:
     """Have the C library give back what arrays have freed, as far as the system's can.
 

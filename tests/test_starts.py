@@ -188,7 +188,7 @@ import numpy as np
 from sepi import kernels
 from sepi.kernels import semi_global
 kernels.set_thread_count(2)
-averaged, disparities = np.zeros((8, 8, 8), np.float32), np.linspace(0, 1, 8, dtype=np.float32)
+averaged, disparities = np.zeros((8, 8, 16), np.uint16), np.linspace(0, 1, 8, dtype=np.float32)
 disparity, margin = np.empty((2, 8, 8), np.float32)
 def loop():
     semi_global.choose(averaged, averaged, disparities, 0.1, disparity, margin)

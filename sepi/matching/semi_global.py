@@ -2,8 +2,8 @@
 
 The volume is averaged over a small window with weights that fall quickly with the difference of colour, so that edges
 stay where the colours change, and then smoothed along eight paths: a change by one candidate costs ``small_penalty``,
-a larger one ``large_penalty``, which is weakened where the colours change. The compiled loops are in
-``kernels/semi_global.cpp``.
+a larger one ``large_penalty``, which is weakened where the colours change. Averaged and smoothed costs are whole
+numbers of 16 bits. The compiled loops are in ``kernels/semi_global.cpp``.
 
 References
 ----------
@@ -19,9 +19,9 @@ from typing import Annotated, Self
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
-from sepi.kernels import LANES
 from sepi.kernels import semi_global as kernels
 from sepi.lightfield import FloatMap
 from sepi.stage import Parameters
@@ -40,6 +40,12 @@ ENOUGH_VIEWS = 25
 
 BAND_BYTES = 2**24
 """Of both volumes, in the rows that all paths go through before any goes on: they stay in the cache of all threads."""
+
+ROWS_AT_ONCE = 64
+"""Rows of costs that are averaged together."""
+
+CostVolume = npt.NDArray[np.uint16]
+"""Costs of shape (H, W, K'): candidates side by side, as many as fill vectors."""
 
 # times the radius of the window, where there are few
 _MOST_WIDENED = 2
@@ -110,7 +116,7 @@ class SmoothedResult:
 
 
 class CostVolumes:
-    """Memory for the costs of a sweep and for what smoothing makes of them, which the next sweep uses again.
+    """Memory for averaged costs and for what smoothing makes of them, which the next sweep uses again.
 
     To be given new memory takes a process as long as to fill it.
 
@@ -123,33 +129,25 @@ class CostVolumes:
     """
 
     def __init__(self, candidates: int, shape: tuple[int, int]) -> None:
-        self._shape = shape
-        self._costs, self._averaged = np.empty((2, self._padded(candidates) * shape[0] * shape[1]), np.float32)
+        self.shape = shape
+        self._rooms = np.empty((2, self._padded(candidates) * shape[0] * shape[1]), np.uint16)
 
     def _padded(self, candidates: int) -> int:
-        return -(-candidates // LANES) * LANES
+        return -(-candidates // kernels.AT_ONCE) * kernels.AT_ONCE
 
-    def costs(self, candidates: int) -> FloatMap:
-        """Room for the costs of so many candidates, (K, H, W)."""
-        height, width = self._shape
-        return self._costs[: candidates * height * width].reshape(candidates, height, width)
-
-    def averaged_and_smoothed(self, candidates: int) -> tuple[FloatMap, FloatMap]:
-        """Room for averaged costs and for smoothed ones, which takes the place of :meth:`costs`; (H, W, K')."""
-        shape = (*self._shape, self._padded(candidates))
-        averaged, smoothed = (room[: math.prod(shape)].reshape(shape) for room in (self._averaged, self._costs))
+    def averaged_and_smoothed(self, candidates: int) -> tuple[CostVolume, CostVolume]:
+        """Room for averaged costs and for smoothed ones, (H, W, K')."""
+        shape = (*self.shape, self._padded(candidates))
+        averaged, smoothed = (room[: math.prod(shape)].reshape(shape) for room in self._rooms)
         return averaged, smoothed
 
 
-def smooth_and_choose(
-    volumes: CostVolumes, disparities: FloatMap, guide: FloatMap, contrast: float, parameters: SmoothingParameters
-) -> SmoothedResult:
-    """Average, smooth, and take the best candidate of each pixel.
+class AveragedCosts:
+    """Costs of a sweep, averaged over pixels of one's own colour; a few rows at a time, as they come.
 
     Parameters
     ----------
     volumes : CostVolumes
-        Its costs, 0..1, of so many candidates as there are disparities; they are overwritten.
     disparities : ndarray, shape (K,), float32
         Uniform, pixels per view step.
     guide : ndarray, shape (H, W, 3), float32
@@ -158,20 +156,52 @@ def smooth_and_choose(
         Expected squared difference of two pixels of one surface, summed over RGB: of noise, and of texture; widens the
         window's colour weights.
     parameters : SmoothingParameters
-
-    Returns
-    -------
-    SmoothedResult
     """
-    variance = parameters.window_sigma**2 + contrast
-    averaged, smoothed = volumes.averaged_and_smoothed(len(disparities))
-    colours = np.stack(cv2.split(guide), dtype=np.float32)
-    kernels.aggregate(volumes.costs(len(disparities)), colours, parameters.window_radius, variance, averaged)
-    penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
-    band = max(1, BAND_BYTES // (2 * averaged[0].nbytes))
-    kernels.semi_global(averaged, colours, *penalties, band, smoothed)
-    same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))
-    disparity, margin = np.empty((2, *guide.shape[:2]), np.float32)
-    kernels.choose(smoothed, averaged, disparities, same, disparity, margin)
-    margin = np.maximum(margin, 0)
-    return SmoothedResult(disparity, (margin / (margin + np.float32(HALF_CONFIDENT))).astype(np.float32))
+
+    def __init__(
+        self,
+        volumes: CostVolumes,
+        disparities: FloatMap,
+        guide: FloatMap,
+        contrast: float,
+        parameters: SmoothingParameters,
+    ) -> None:
+        self._disparities, self._parameters = disparities, parameters
+        self._colours = np.stack(cv2.split(guide), dtype=np.float32)
+        self._variance = parameters.window_sigma**2 + contrast
+        self._averaged, self._smoothed = volumes.averaged_and_smoothed(len(disparities))
+        self._height, width = volumes.shape
+        rows = min(self._height, ROWS_AT_ONCE) + 2 * parameters.window_radius
+        # where there are none yet, nothing that is not finite
+        self._costs = np.zeros((len(disparities), rows, width), np.float32)
+        # rows of the picture: the first that there are costs of, the first without, the first that is not averaged
+        self._top = self._next = self._done = 0
+
+    def room(self, rows: int) -> FloatMap:
+        """Where costs of the next rows belong, at most :data:`ROWS_AT_ONCE`; shape (K, rows, W), 0..1."""
+        first = self._next - self._top
+        return self._costs[:, first : first + rows]
+
+    def add(self, rows: int) -> None:
+        """Average what can be, now that costs of so many rows more are there."""
+        radius = self._parameters.window_radius
+        self._next += rows
+        begin, end = self._done, self._next if self._next == self._height else max(self._done, self._next - radius)
+        window = radius, self._variance
+        kernels.aggregate(self._costs, self._top, self._colours, *window, begin, end, self._averaged)
+        # windows of the next rows reach back
+        kept = slice(max(0, end - radius - self._top), self._next - self._top)
+        self._costs[:, : kept.stop - kept.start] = self._costs[:, kept].copy()
+        self._top, self._done = self._top + kept.start, end
+
+    def smoothed(self) -> SmoothedResult:
+        """Smooth the averaged costs, and take the best candidate of each pixel."""
+        parameters, disparities = self._parameters, self._disparities
+        penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
+        band = max(1, BAND_BYTES // (2 * self._averaged[0].nbytes))
+        kernels.semi_global(self._averaged, self._colours, *penalties, band, self._smoothed)
+        same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))
+        disparity, margin = np.empty((2, *self._colours.shape[1:]), np.float32)
+        kernels.choose(self._smoothed, self._averaged, disparities, same, disparity, margin)
+        margin = np.maximum(margin, 0)
+        return SmoothedResult(disparity, (margin / (margin + np.float32(HALF_CONFIDENT))).astype(np.float32))

@@ -33,14 +33,17 @@ from sepi.matching.denoising import DenoisedLightField, guide_of
 from sepi.matching.gaps import GapParameters, with_open_gaps
 from sepi.matching.nearest_surfaces import EMPTY, nearest_surfaces, z_buffers
 from sepi.matching.row_bands import Band, row_bands
-from sepi.matching.semi_global import CostVolumes, SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
+from sepi.matching.semi_global import (
+    ROWS_AT_ONCE,
+    AveragedCosts,
+    CostVolumes,
+    SmallPenalty,
+    SmoothedResult,
+    SmoothingParameters,
+)
 from sepi.matching.sweep_arrays import Visibility, sampled_candidates
 from sepi.matching.view_subsets import spread_views
 from sepi.stage import Needs, Progress
-
-ROWS_PER_REPORT = 128
-"""Rows of the picture between two calls of the progress function."""
-
 
 CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**30)
 """The optimisation goes back to the views, so these need not be as fine as the paper's."""
@@ -54,8 +57,8 @@ In views without noise the mask sees texture, and of strong texture few pixels o
 LIKELY_RADIUS, LIKELY_CANDIDATES = 8, 5
 """Pixels around, and candidates beyond, within which those of a map make candidates likely."""
 
-BYTES_PER_CANDIDATE = 8
-"""Of each pixel: two at a time of the costs, their averages, and these smoothed."""
+BYTES_PER_CANDIDATE = 5
+"""Of each pixel: averages of the costs, these smoothed, and costs of a few rows."""
 
 BYTES_PER_PIXEL = 2 + 4
 """Of a pixel of a view: the detail, and the z-buffer."""
@@ -254,28 +257,16 @@ def _sweep(
     Pixels are compared with their ``mean``, where there is one, instead of the reference view.
     """
     disparities = light_field.require_disparity_range().candidates(parameters.fewer(light_field, sampling))
-    height = light_field.shape[0]
-    cost = volumes.costs(len(disparities))
-    for band in row_bands(light_field, present, float(np.abs(disparities).max()), BYTES_PER_PIXEL):
-        # the smoothing takes about a fifth of the time
-        _add_costs(
-            light_field,
-            present,
-            disparity,
-            mean,
-            parameters,
-            band,
-            disparities,
-            cost,
-            lambda row: progress(0.8 * row / height),
-        )
     guide = guide_of(light_field, mean)
     variance = variance_of_residuals(_contrast_of_surfaces(light_field), guide.shape[2])
     shown = light_field.present
     if light_field.missing is not None:
         shown = shown & ~light_field.missing.all(axis=(2, 3))
-    smoothing = parameters.for_views(int(shown.sum()))
-    result = smooth_and_choose(volumes, disparities, guide, variance, smoothing)
+    costs = AveragedCosts(volumes, disparities, guide, variance, parameters.for_views(int(shown.sum())))
+    for band in row_bands(light_field, present, float(np.abs(disparities).max()), BYTES_PER_PIXEL):
+        # the smoothing takes about a tenth of the time
+        _add_costs(light_field, present, disparity, mean, parameters, band, disparities, costs, progress)
+    result = costs.smoothed()
     progress(1.0)
     return result
 
@@ -295,10 +286,10 @@ def _add_costs(
     parameters: VisibilitySweepParameters,
     band: Band,
     disparities: FloatMap,
-    cost: FloatMap,
-    done: Callable[[int], None],
+    costs: AveragedCosts,
+    progress: Progress,
 ) -> None:
-    """Cost of every candidate, 0..1, for the rows of a band, into ``cost (K, H, W)``."""
+    """Add the cost of every candidate for the rows of a band."""
     views = base_detail_decomposition(light_field, parameters, band.rows, present)
     if mean is not None:
         views = compared_with(views, mean, parameters, band.rows)
@@ -306,10 +297,12 @@ def _add_costs(
     scales = parameters.colour_scale, parameters.detail_scale
     scales2 = np.array([views.squared_scale(scale) for scale in scales], np.float32)
     candidates = sampled_candidates(disparities, light_field.baselines)
-    for begin in range(band.begin, band.end, ROWS_PER_REPORT):
-        end = min(band.end, begin + ROWS_PER_REPORT)
-        kernels.sweep_visible_rows(views, visibility, scales2, parameters.shares, candidates, begin, end, cost)
-        done(end)
+    for begin in range(band.begin, band.end, ROWS_AT_ONCE):
+        end = min(band.end, begin + ROWS_AT_ONCE)
+        room = costs.room(end - begin)
+        kernels.sweep_visible_rows(views, visibility, scales2, parameters.shares, candidates, begin, end, room)
+        costs.add(end - begin)
+        progress(0.9 * end / light_field.shape[0])
 
 
 def _visibility(

@@ -19,7 +19,7 @@ from scipy.sparse.linalg import spsolve
 from sepi.image.superpixels import Adjacency, FloatArray, Superpixels
 from sepi.kernels import planes as kernels
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.memory import BLAS_BUFFER, require_memory
+from sepi.memory import take_blas_buffer
 
 UNIT = 15.0
 """Length over which gradients are measured, pixels: about a superpixel, so that the three unknowns are alike."""
@@ -140,7 +140,7 @@ def propagate(
     trust = np.ones(len(affinity))
     data_weight = weight
     blocks = np.arange(len(segments))
-    require_memory(BLAS_BUFFER)
+    take_blas_buffer()
     for spread in _shrinking(coupling.tolerance):
         left, right = _normal_equations(segments, disparity, data_weight, design)
         continuity = _continuity(adjacent, at_first, at_second, strength * trust, coupling.slope, len(segments))

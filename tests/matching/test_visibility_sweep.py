@@ -7,7 +7,7 @@ import pytest
 from geometries import GEOMETRIES, standing
 from several_threads import SEVERAL, threads
 
-from sepi.kernels import LANES, semi_global, visibility
+from sepi.kernels import semi_global, visibility
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.nearest_surfaces import EMPTY, z_buffers
@@ -234,20 +234,32 @@ def path_twin(cost, guide, dy, dx, small, large, weakening):
     return path
 
 
-def test_smoothing_equals_a_plain_twin() -> None:
+def averaged_by_kernel(cost, guide, radius, variance):
+    """By the kernel, in two parts; what was there before must not matter."""
+    K, H, W = cost.shape
+    colours = np.moveaxis(guide, 2, 0).copy()
+    out = np.full((H, W, -(-K // semi_global.AT_ONCE) * semi_global.AT_ONCE), 7, np.uint16)
+    half, top = H // 2, max(0, H // 2 - radius)
+    semi_global.aggregate(cost[:, : half + radius].copy(), 0, colours, radius, variance, 0, half, out)
+    semi_global.aggregate(cost[:, top:].copy(), top, colours, radius, variance, half, H, out)
+    return out
+
+
+@pytest.mark.parametrize(("large", "scale"), [(0.5, 2**2), (12.5, 2**5)])
+def test_smoothing_equals_a_plain_twin(large: float, scale: int) -> None:
+    """Paths are sums of whole numbers, of costs cut to fewer bits; with larger penalties of fewer."""
     random = np.random.default_rng(3)
     K, H, W = 6, 8, semi_global.PATHS_AT_ONCE + 5
     cost, guide = random.random((K, H, W)).astype(np.float32), random.random((H, W, 3)).astype(np.float32) * 0.1
-    # what was there before must not matter
-    volume, smoothed = np.full((2, H, W, LANES), 7, np.float32)
-    colours = np.moveaxis(guide, 2, 0).copy()
-    semi_global.aggregate(cost, colours, 2, 0.01, volume)
-    averaged = volume[:, :, :K]
-    np.testing.assert_allclose(averaged, aggregate_twin(cost, guide, 2, 0.01), atol=1e-5)
-    semi_global.semi_global(volume, colours, 0.1, 0.5, 5, 3, smoothed)
+    volume = averaged_by_kernel(cost, guide, 2, 0.01)
+    averaged = volume[:, :, :K] / semi_global.ONE
+    np.testing.assert_allclose(averaged, aggregate_twin(cost, guide, 2, 0.01), atol=2e-5)
+    smoothed = np.full_like(volume, 7)
+    semi_global.semi_global(volume, np.moveaxis(guide, 2, 0).copy(), 0.1, large, 5, 3, smoothed)
     directions = [(0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
-    expected = sum(path_twin(averaged.astype(float), guide, *d, 0.1, 0.5, 5) for d in directions)
-    np.testing.assert_allclose(smoothed[:, :, :K], expected, atol=1e-4)
+    steps, one = volume[:, :, :K] // scale, semi_global.ONE / scale
+    expected = sum(path_twin(steps / one, guide, *d, 0.1, large, 5) for d in directions)
+    np.testing.assert_allclose(smoothed[:, :, :K] / (one / 4), expected, atol=40 / one)
 
 
 @pytest.mark.parametrize(("shape", "radius"), [((2, 2), 4), ((3, 1), 2), ((9, 3), 4)])
@@ -255,9 +267,8 @@ def test_a_window_may_be_wider_than_the_picture(shape: tuple[int, int], radius: 
     """What is beyond the picture's ends is no part of it: a sliver of a picture had another depth in each run."""
     random = np.random.default_rng(4)
     cost, guide = random.random((5, *shape)).astype(np.float32), random.random((*shape, 3)).astype(np.float32) * 0.1
-    averaged = np.empty((*shape, LANES), np.float32)
-    semi_global.aggregate(cost, np.moveaxis(guide, 2, 0).copy(), radius, 0.01, averaged)
-    np.testing.assert_allclose(averaged[:, :, :5], aggregate_twin(cost, guide, radius, 0.01), atol=1e-5)
+    averaged = averaged_by_kernel(cost, guide, radius, 0.01)[:, :, :5] / semi_global.ONE
+    np.testing.assert_allclose(averaged, aggregate_twin(cost, guide, radius, 0.01), atol=2e-5)
 
 
 def test_margin_tells_one_minimum_from_two() -> None:
@@ -265,13 +276,13 @@ def test_margin_tells_one_minimum_from_two() -> None:
     disparities = np.linspace(-1, 1, 21).astype(np.float32)
     one = np.minimum(1, np.abs(disparities - 0.5))
     two = np.minimum(one, np.abs(disparities + 0.5))
-    volume = np.full((1, 3, 24), 1e9, np.float32)
-    volume[0, :, :21] = one, two, np.full(21, 0.3)
+    volume = np.full((1, 3, 2 * semi_global.AT_ONCE), semi_global.ONE, np.uint16)
+    volume[0, :, :21] = np.rint(np.stack([one, two, np.full(21, 0.3)]) * semi_global.ONE)
     disparity, margin = np.empty((2, 1, 3), np.float32)
     semi_global.choose(volume, volume, disparities, 0.25, disparity, margin)
-    assert disparity[0, 0] == pytest.approx(0.5, abs=1e-6)
-    assert margin[0, 0] == pytest.approx(0.3, abs=1e-6)
-    np.testing.assert_allclose(margin[0, 1:], 0, atol=1e-6)
+    assert disparity[0, 0] == pytest.approx(0.5, abs=1e-5)
+    assert margin[0, 0] == pytest.approx(0.3, abs=1e-4)
+    np.testing.assert_allclose(margin[0, 1:], 0, atol=1e-4)
 
 
 def test_grey_views_give_the_depth_of_equal_colours() -> None:

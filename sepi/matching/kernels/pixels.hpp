@@ -112,7 +112,8 @@ void window_weights(Array<const float, 3> guide, Index y, Index begin, Index end
 }
 
 // Where the parabola through three costs side by side is least, from the middle one; 0 if it bends by no more than so much.
-inline double vertex(const float *middle, double least) {
+template <class Number>
+double vertex(const Number *middle, double least) {
     const double bend = middle[-1] - 2 * double(middle[0]) + middle[1];
     return bend > least ? 0.5f * (middle[-1] - middle[1]) / bend : 0;
 }

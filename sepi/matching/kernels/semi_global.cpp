@@ -1,5 +1,5 @@
-// Semi-global smoothing of a cost volume, after averaging over pixels of one's own colour. Smoothed are volumes of the
-// shape (H, W, K'): candidates lie side by side, as many as fill vectors, and those too many are out of reach.
+// Semi-global smoothing of a cost volume, after averaging over pixels of one's own colour. Both volumes are of the shape
+// (H, W, K'), in whole numbers of 16 bits: candidates lie side by side, as many as fill vectors.
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
@@ -9,38 +9,51 @@ namespace {
 // Paths from row to row that a thread follows together: their costs lie side by side, and fit in its cache.
 constexpr Index PATHS_AT_ONCE = 32;
 
-constexpr float UNREACHABLE = 1e9f;
+constexpr float ONE = 65535;           // a cost of 1, once averaged
+constexpr Index AT_ONCE = 2 * LANES;   // candidates
+constexpr std::uint16_t MOST = 0x7FFC;  // cost of a path, in steps of its own; a quarter of eight of them fits in 16 bits
 
 // What costs are smoothed with, into out (H, W, K').
 struct Smoothing {
-    Array<const float, 3> cost, guide;
-    float small, large, weakening;
-    Array<float, 3> out;
+    Array<const std::uint16_t, 3> cost;
+    Array<const float, 3> guide;
+    double small, large, weakening;
+    Array<std::uint16_t, 3> out;
+
+    // A step of a path is so many of the averaged costs', as a power of 2: the penalty and a cost together are less than MOST.
+    const int shift = [this] {
+        int bits = 1;
+        while (bits < 8 && (1 + std::max(1.5 * small, large)) * ONE / double(1 << bits) > 0x8000) ++bits;
+        return bits;
+    }();
+
+    std::uint16_t in_steps(double penalty) const { return std::uint16_t(std::min<double>(MOST, penalty * (ONE / double(1 << shift)) + 0.5)); }
 
     // One pixel further along a path, from (y - dy, x - dx): path[1:-1] = cost + best - least, which is added to out; the
     // least of it. The best of: before of the same candidate, of one beside it plus small, and the least of all plus what is
     // left of large where colours change. before and path have an unreachable candidate at either end.
-    float next_pixel(Index y, Index x, Index dy, Index dx, float *before, float least, float *path) const {
+    std::uint16_t next_pixel(Index y, Index x, Index dy, Index dx, std::uint16_t *before, std::uint16_t least, std::uint16_t *path) const {
         const Index K = cost.shape[2], row = y - dy, column = x - dx;
-        float penalty = 0;
+        double penalty = 0;
         if (row < 0 || row >= cost.shape[0] || column < 0 || column >= cost.shape[1]) {
             // before the first pixel all candidates cost nothing: its costs are its own
-            std::fill_n(before + 1, K, 0.0f);
+            std::fill_n(before + 1, K, 0);
             least = 0;
         } else {
             float change = 0;
             for (Index c = 0; c < 3; ++c) change += std::abs(guide(c, y, x) - guide(c, row, column));
-            penalty = std::max(small * 1.5f, large / (1.0f + change * weakening));
+            penalty = std::max(small * 1.5, large / (1 + double(change) * weakening));
         }
-        const Float8 whole = spread(least), jump = spread(least + penalty), step = spread(small);
-        const float *own = cost.at(y, x);
-        float *sum = out.at(y, x);
-        Float8 lowest = spread(UNREACHABLE);
-        for (Index k = 0; k < K; k += LANES) {
-            const Float8 best = smaller(smaller(load(before + k + 1), jump), smaller(load(before + k), load(before + k + 2)) + step);
-            const Float8 value = load(own + k) + best - whole;
+        const Word16 whole = Word16{} + least, jump = whole + in_steps(penalty), step = Word16{} + in_steps(small), most = Word16{} + MOST;
+        const std::uint16_t *own = cost.at(y, x);
+        std::uint16_t *sum = out.at(y, x);
+        Word16 lowest = most;
+        for (Index k = 0; k < K; k += AT_ONCE) {
+            const Word16 beside = smaller(load_words(before + k), load_words(before + k + 2)) + step;
+            const Word16 best = smaller(smaller(load_words(before + k + 1), jump), beside);
+            const Word16 value = smaller((load_words(own + k) >> shift) + best - whole, most);
             store(path + k + 1, value);
-            store(sum + k, load(sum + k) + value);
+            store(sum + k, load_words(sum + k) + ((value + 2) >> 2));
             lowest = smaller(value, lowest);
         }
         return least_of(lowest);
@@ -49,9 +62,9 @@ struct Smoothing {
     // The paths along row y.
     void along_row(Index y) const {
         const Index W = cost.shape[1];
-        const auto paths = Scratch<float, 2>(2, cost.shape[2] + 2).filled(UNREACHABLE);
+        const auto paths = Scratch<std::uint16_t, 2>(2, cost.shape[2] + 2).filled(MOST);
         for (const Index dx : {1, -1}) {
-            float least = 0;
+            std::uint16_t least = 0;
             for (Index i = 0; i < W; ++i) least = next_pixel(y, dx > 0 ? i : W - 1 - i, 0, dx, paths.array().at((i + 1) % 2), least, paths.array().at(i % 2));
         }
     }
@@ -59,7 +72,7 @@ struct Smoothing {
     // Paths from row to row in the rows begin..end: those that began in columns from first on.
     // One that leaves the picture at a side goes on, as a new one, at the other: all have a pixel in each row.
     // paths (2, n, K' + 2) are their costs in the row before and here, in turn, least (n) the least of the row before.
-    void along_lines(Array<float, 3> paths, float *least, Index first, Index begin, Index end, Index dy, Index dx) const {
+    void along_lines(Array<std::uint16_t, 3> paths, std::uint16_t *least, Index first, Index begin, Index end, Index dy, Index dx) const {
         const Index H = cost.shape[0], W = cost.shape[1];
         for (Index i = begin; i < end; ++i) {
             for (Index line = 0; line < std::min(PATHS_AT_ONCE, W - first); ++line) {
@@ -72,44 +85,47 @@ struct Smoothing {
 
 // By how much the least cost of other candidates exceeds that of those that belong to the winner's minimum; 0 where
 // there is no other.
-float margin_of(const float *costs, Index K, const float *disparities, float found, Index best, float same) {
-    Float8 own = spread(UNREACHABLE), other = own;
+float margin_of(const std::uint16_t *costs, Index K, const float *disparities, float found, Index best, float same) {
+    constexpr float NONE = 2 * ONE;
+    Float8 own = spread(NONE), other = own;
     Int8 before_best = Int8{0, 1, 2, 3, 4, 5, 6, 7} - std::int32_t(best);
     for (Index k = 0; k < K; k += LANES, before_best += LANES) {
         const Float8 cost = load(costs + k), beyond = load(disparities + k) - found;
         const Int8 is_own = (larger(beyond, -beyond) <= same) | (before_best == 0);
-        own = smaller(own, is_own ? cost : spread(UNREACHABLE));
-        other = smaller(other, is_own ? spread(UNREACHABLE) : cost);
+        own = smaller(own, is_own ? cost : spread(NONE));
+        other = smaller(other, is_own ? spread(NONE) : cost);
     }
     const float least = least_of(other);
-    return least < UNREACHABLE ? least - least_of(own) : 0.0f;
+    return least < NONE ? (least - least_of(own)) / ONE : 0.0f;
 }
 
-// Mean over a window with weights exp(-|colour difference|^2 / (2 variance)); cost (K, H, W), guide (3, H, W), out (H, W, K').
-void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index radius, float variance, Array<float, 3> out) {
-    const Index K = cost.shape[0], H = cost.shape[1], W = cost.shape[2], size = 2 * radius + 1;
-    parallel_for(0, H, [&](Index y) {
+// Rows begin..end of the costs' mean over a window with weights exp(-|colour difference|^2 / (2 variance)), into out (H, W, K').
+// cost (K, n, W), 0..1, are of the rows from top on; those beyond the picture are its border's. guide (3, H, W).
+void aggregate(Array<const float, 3> cost, Index top, Array<const float, 3> guide, Index radius, float variance, Index begin, Index end,
+               Array<std::uint16_t, 3> out) {
+    const Index K = cost.shape[0], H = out.shape[0], W = out.shape[1], size = 2 * radius + 1;
+    parallel_for(begin, end, [&](Index y) {
         const Scratch<float, 2> weights(size * size, W + LANES);
         const auto exponent = [width = 2 * double(variance)](float apart2) { return -double(apart2) / width; };
         window_weights(guide, y, 0, W, radius, weights.array(), exponent);
         // what lies beyond the picture weighs nothing: it may be other rows, but for those with no memory beside them
         const auto at_ends = zeros<float, 2>(size, W + 2 * radius + LANES);
         const Scratch<const float *, 1> places(size * size);
-        const float *first = cost.data, *last = first + K * H * W;
+        const float *first = cost.data, *last = cost.at(K - 1, cost.shape[1]);
         // a few candidates at a time: each pixel's are written together
         const Scratch<float, 2> total(LANES, W + LANES);
-        for (Index begin = 0; begin < K; begin += LANES) {
-            if (begin + LANES > K) std::fill_n(total.array().data, LANES * (W + LANES), UNREACHABLE);
-            for (Index k = begin; k < std::min(K, begin + LANES); ++k) {
+        for (Index few = 0; few < out.shape[2]; few += LANES) {
+            if (few + LANES > K) std::fill_n(total.array().data, LANES * (W + LANES), 1.0f);
+            for (Index k = few; k < std::min(K, few + LANES); ++k) {
                 for (Index i = 0; i < size; ++i) {
-                    const float *row = cost.at(k, clamped(y + i - radius, H));
+                    const float *row = cost.at(k, clamped(y + i - radius, H) - top);
                     if (row - first < radius || last - row < W + radius + LANES) row = std::copy_n(row, W, at_ends.array().at(i, radius)) - W;
                     for (Index j = 0; j < size; ++j) places.array()(i * size + j) = row + j - radius;
                 }
                 const auto add = [weight = weights.array().data, pitch = W + LANES, place = places.array().data](Float8 sum, Index n, Index x) {
                     return fma(load(weight + n * pitch + x), load(place[n] + x), sum);
                 };
-                float *sums = total.array().at(k - begin);
+                float *sums = total.array().at(k - few);
                 radius == 2 ? sum_products(W, std::integral_constant<Index, 25>(), sums, add) : sum_products(W, size * size, sums, add);
             }
             // rows of eight candidates become those of a pixel each
@@ -117,7 +133,7 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
                 Float8 block[LANES];
                 for (Index k = 0; k < LANES; ++k) block[k] = load(total.array().at(k, x));
                 transpose(block);
-                for (Index i = 0; i < LANES && x + i < W; ++i) store(out.at(y, x + i, begin), block[i]);
+                for (Index i = 0; i < LANES && x + i < W; ++i) store(out.at(y, x + i, few), block[i] * ONE);
             }
         }
     });
@@ -125,18 +141,18 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
 
 // Sum of the smoothed costs along eight paths, into out; cost and out (H, W, K'), guide (3, H, W). All paths of a direction go through
 // band rows before any goes on, so that costs and sums come from memory once for the paths down and once for those up.
-void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float small, float large, float weakening, Index band,
-                 Array<float, 3> out) {
+void semi_global(Array<const std::uint16_t, 3> cost, Array<const float, 3> guide, double small, double large, double weakening, Index band,
+                 Array<std::uint16_t, 3> out) {
     const Index H = cost.shape[0], W = cost.shape[1], K = cost.shape[2];
     const Smoothing smoothing{cost, guide, small, large, weakening, out};
     const Index pieces = (W + PATHS_AT_ONCE - 1) / PATHS_AT_ONCE;
     for (const Index dy : {1, -1}) {
-        const auto paths = Scratch<float, 4>(3 * pieces, 2, PATHS_AT_ONCE, K + 2).filled(UNREACHABLE);
-        const auto least = zeros<float, 2>(3 * pieces, PATHS_AT_ONCE);
+        const auto paths = Scratch<std::uint16_t, 4>(3 * pieces, 2, PATHS_AT_ONCE, K + 2).filled(MOST);
+        const auto least = zeros<std::uint16_t, 2>(3 * pieces, PATHS_AT_ONCE);
         for (Index begin = 0; begin < H; begin += band) {
             const Index end = std::min(H, begin + band);
             parallel_for(begin, dy > 0 ? end : begin, [&](Index y) {
-                std::fill_n(out.at(y), W * K, 0.0f);
+                std::fill_n(out.at(y), W * K, 0);
                 smoothing.along_row(y);
             });
             for (const Index dx : {0, 1, -1}) {
@@ -153,18 +169,16 @@ void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float 
 // Winner of each pixel, refined by a parabola, and by how much the averaged cost of other minima exceeds its own:
 // negative where another minimum is lower before smoothing, 0 where there is no other. Candidates closer than same to
 // the winner belong to its minimum; smoothed and averaged (H, W, K'), disparities (K).
-void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Array<const float, 1> disparities, float same, Array<float,
-            2> disparity, Array<float, 2> margin) {
+void choose(Array<const std::uint16_t, 3> smoothed, Array<const std::uint16_t, 3> averaged, Array<const float, 1> disparities, float same,
+            Array<float, 2> disparity, Array<float, 2> margin) {
     const Index K = disparities.shape[0], padded = smoothed.shape[2];
     const auto of_candidates = zeros<float, 1>(padded);
     std::copy_n(disparities.data, K, of_candidates.array().data);
     const double spacing = double(disparities(K - 1) - disparities(0)) / double(K - 1);
     parallel_for_pixels(disparity.shape[0], disparity.shape[1], [&](Index y, Index x) {
-        const float *costs = smoothed.at(y, x);
         // the first of equal ones
-        Float8 least = load(costs);
-        for (Index k = LANES; k < padded; k += LANES) least = smaller(load(costs + k), least);
-        const Index best = std::find(costs, costs + padded - 1, least_of(least)) - costs;
+        const std::uint16_t *costs = smoothed.at(y, x);
+        const Index best = std::min_element(costs, costs + K) - costs;
         const double offset = 0 < best && best < K - 1 ? vertex(costs + best, 1e-9) : 0;
         const float found = float(disparities(best) + offset * spacing);
         disparity(y, x) = found;
@@ -173,8 +187,11 @@ void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Arra
 }
 
 const Submodule submodule("semi_global", [](nb::module_ &m) {
+    m.attr("AT_ONCE") = AT_ONCE;
+    m.attr("ONE") = ONE;
     m.attr("PATHS_AT_ONCE") = PATHS_AT_ONCE;
-    m.def("aggregate", &aggregate, Unlocked(), "cost"_a, "guide"_a, "radius"_a, "variance"_a, "out"_a);
+    m.def("aggregate", &aggregate, Unlocked(), "cost"_a, "top"_a, "guide"_a, "radius"_a, "variance"_a, "begin"_a, "end"_a,
+          "out"_a);
     m.def("semi_global", &semi_global, Unlocked(), "cost"_a, "guide"_a, "small"_a, "large"_a, "weakening"_a, "band"_a, "out"_a);
     m.def("choose", &choose, Unlocked(), "smoothed"_a, "averaged"_a, "disparities"_a, "same"_a, "disparity"_a, "margin"_a);
 });

@@ -127,7 +127,7 @@ struct VisibleRow {
     const Candidates &candidates;
     const Array<float, 3> cost;
 
-    const Index K = cost.shape[0], H = cost.shape[1], W = cost.shape[2], width = W + LANES;
+    const Index K = cost.shape[0], H = views.guide.shape[0], W = cost.shape[2], width = W + LANES;
     // in steps of the whole numbers; the detail counts as three equal channels
     const double colour_steps = double(COLOUR_STEPS) * ONE, detail_steps = ONE / double(views.detail_unit);
     const float colour_scale2 = float(scales2(0) * (colour_steps * colour_steps));
@@ -137,8 +137,8 @@ struct VisibleRow {
     const Scratch<float, 2> own = zeros<float, 2>(6, width);  // colours, detail, and the first and the last likely candidate
     const Scratch<float, 3> sums = zeros<float, 3>(K, 2, width);  // of the costs, and of their weights
 
-    // Cost of every candidate in row y.
-    void sweep(Index y) {
+    // Cost of every candidate in row y, into row n of the costs.
+    void sweep(Index y, Index n) {
         // the reference view, times what the weights of samples sum to
         const Array<float, 3> reference{own.array().data, {4, 1, W}, {width, 0, 1}};
         load_rows<float>(views.guide, y, reference, [](auto colour) { return whole(colour * COLOUR_STEPS) * float(ONE); });
@@ -157,7 +157,7 @@ struct VisibleRow {
         }
         for (Index k = 0; k < K; ++k) {
             const float *sum = sums.array().at(k, 0), *weight = sums.array().at(k, 1);
-            float *out = cost.at(k, y);
+            float *out = cost.at(k, n);
             for (Index x = 0; x < W; ++x) out[x] = weight[x] > 0 ? sum[x] / weight[x] : 1.0f;
         }
     }
@@ -290,12 +290,12 @@ void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &vie
     });
 }
 
-// Cost of every candidate for rows begin..end, into cost (K, H, W), over the views in which nothing nearer occludes the
+// Cost of every candidate for rows begin..end, into cost (K, end - begin, W), over the views in which nothing nearer occludes the
 // pixel: 0..1; 1 where no view is left. scales2 (2,) and shares (2,) are the square of the robust scale, and the share in
 // the cost, of colours and of detail.
 void sweep_visible_rows(const BaseDetail &views, const Visibility &visibility, Array<const float, 1> scales2, Array<const float, 1> shares,
                         const Candidates &candidates, Index begin, Index end, Array<float, 3> cost) {
-    parallel_for(begin, end, [&](Index y) { VisibleRow{views, visibility, scales2, shares, candidates, cost}.sweep(y); });
+    parallel_for(begin, end, [&](Index y) { VisibleRow{views, visibility, scales2, shares, candidates, cost}.sweep(y, y - begin); });
 }
 
 const Submodule submodule("visibility", [](nb::module_ &m) {
