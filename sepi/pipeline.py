@@ -118,8 +118,6 @@ def _after_all_stages(
 
         maps = STAGES[stage][choice].run(light_field, maps, settings[stage], of_all)
         of_all(1.0)
-        if number == 0:
-            # what later stages free the next ones take
-            give_back_memory()
+        give_back_memory()
     assert maps is not None  # there are stages
     return maps
