@@ -3,10 +3,8 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
-#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/variant.h>
 
-#include <tuple>
 #include <vector>
 
 #include "array.hpp"
@@ -39,22 +37,27 @@ struct type_caster<sepi::Array<T, N>> : array_caster<sepi::Array<T, N>, T, N> {}
 template <class T, int N>
 struct type_caster<sepi::Strided<T, N>> : array_caster<sepi::Strided<T, N>, T, N> {};
 
-// Of references.
-template <class... Fields>
-std::tuple<Fields...> values_of(std::tuple<Fields &...>);
-
-// A NamedTuple becomes a struct of the same fields in the same order, which its fields() lists.
+// A NamedTuple becomes a struct of the same fields in the same order, which its fields() visits.
 template <class Struct>
-    requires requires(Struct one) { one.fields(); }
+    requires requires(Struct one) { one.fields([](auto &...) { return true; }); }
 struct type_caster<Struct> {
     NB_TYPE_CASTER(Struct, const_name("tuple[typing.Any, ...]"))
 
-    [[gnu::noinline]] bool from_python(handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
-        using Fields = decltype(values_of(value.fields()));
-        make_caster<Fields> caster;
+    bool from_python(handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
+        return value.fields([&](auto &...fields) {
+            Py_ssize_t n = 0;
+            return PyTuple_Check(source.ptr()) && PyTuple_GET_SIZE(source.ptr()) == sizeof...(fields) &&
+                   (taken(PyTuple_GET_ITEM(source.ptr(), n++), flags, cleanup, fields) && ...);
+        });
+    }
+
+  private:
+    template <class Field>
+    [[gnu::noinline]] static bool taken(handle source, uint32_t flags, cleanup_list *cleanup, Field &field) noexcept {
+        make_caster<Field> caster;
         // numbers may be NumPy's
         if (!caster.from_python(source, flags | cast_flags::convert, cleanup)) return false;
-        value.fields() = caster.operator Fields();
+        field = caster.operator cast_t<Field>();
         return true;
     }
 };

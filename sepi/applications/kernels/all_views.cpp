@@ -26,7 +26,7 @@ struct Sources {
     Array<const float, 4> corners;                // (N, H, W, 4)
     Array<const double, 2> baselines;             // (N, 2)
 
-    auto fields() { return std::tie(disparity, confidence, bars, corners, baselines); }
+    bool fields(auto visit) { return visit(disparity, confidence, bars, corners, baselines); }
 };
 
 constexpr double TOUCHING = -1e-3;  // part of a triangle by which a pixel may miss it: no cracks between neighbours

@@ -14,7 +14,7 @@ namespace {
 struct Surroundings {
     Array<const float, 2> farthest, nearest;
 
-    auto fields() { return std::tie(farthest, nearest); }
+    bool fields(auto visit) { return visit(farthest, nearest); }
 };
 
 constexpr double WIDTH = 1;            // of the window's weights, pixels

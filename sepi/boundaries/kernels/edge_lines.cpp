@@ -17,7 +17,7 @@ struct Edges {
     Array<const float, 1> costs;          // (M,)
     Array<const float, 1> weights;        // (9,)
 
-    auto fields() { return std::tie(shares, is_near, costs, weights); }
+    bool fields(auto visit) { return visit(shares, is_near, costs, weights); }
 };
 
 constexpr Index PATCH = 9;       // pixels of a patch, row after row

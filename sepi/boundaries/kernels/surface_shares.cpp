@@ -14,7 +14,7 @@ struct Rim {
     Array<float, 2> near, far;
     Array<bool, 2> inside, is_near;
 
-    auto fields() { return std::tie(near, far, inside, is_near); }
+    bool fields(auto visit) { return visit(near, far, inside, is_near); }
 };
 
 constexpr Index FEWEST_SAMPLES = 8;  // views from which a share is told

@@ -1,7 +1,6 @@
 // What is handed over of a map and its views; where these show a pixel of some disparity, and the colours between their pixels.
 #pragma once
 
-#include <tuple>
 #include <variant>
 
 #include "kernels/lanes.hpp"
@@ -20,7 +19,7 @@ struct RimViews {
     Index low;                              // first row of nearest
     float margin;
 
-    auto fields() { return std::tie(lines, channels, units, places, baselines, nearest, low, margin); }
+    bool fields(auto visit) { return visit(lines, channels, units, places, baselines, nearest, low, margin); }
 
     Index number() const { return units.shape[0]; }
 };
@@ -32,7 +31,7 @@ struct Sides {
     Array<const bool, 2> clean;       // (H, W)
     Index clean_radius;
 
-    auto fields() { return std::tie(disparity, guide, clean, clean_radius); }
+    bool fields(auto visit) { return visit(disparity, guide, clean, clean_radius); }
 
     std::array<float, 3> colour(Index y, Index x) const { return {guide(y, x, 0), guide(y, x, 1), guide(y, x, 2)}; }
 };

@@ -15,7 +15,7 @@ constexpr double RIM_WIDTH = 0.2, LEAST_RIM = 0.01;
 struct ErrorMixture {
     Array<const float, 2> scale, outlier_scale, outlier, rim, above, below;
 
-    auto fields() { return std::tie(scale, outlier_scale, outlier, rim, above, below); }
+    bool fields(auto visit) { return visit(scale, outlier_scale, outlier, rim, above, below); }
 };
 
 constexpr int EVALUATIONS = 40;

@@ -23,7 +23,7 @@ struct SplineViews {
     Array<const float, 2> baselines;         // (N, 2), theirs, down and across
     Array<const float, 1> scales2, shares;   // of colours and of detail
 
-    auto fields() { return std::tie(splines, unit, low, reference, places, baselines, scales2, shares); }
+    bool fields(auto visit) { return visit(splines, unit, low, reference, places, baselines, scales2, shares); }
 };
 
 // Where views are hidden: the fields of sepi.matching.aligned_views.Seeing.
@@ -31,7 +31,7 @@ struct Seeing {
     Array<const float, 4> nearest;  // (T, S, n, W), rows from the splines' low on
     float occlusion_margin;
 
-    auto fields() { return std::tie(nearest, occlusion_margin); }
+    bool fields(auto visit) { return visit(nearest, occlusion_margin); }
 };
 
 using Four = std::array<Float8, 4>;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <tuple>
 #include <variant>
 
 #include "kernels/exponential.hpp"
@@ -31,7 +30,7 @@ struct AskedViews {
     Index low;
     float margin;
 
-    auto fields() { return std::tie(asked, baselines, nearest, low, margin); }
+    bool fields(auto visit) { return visit(asked, baselines, nearest, low, margin); }
 
     // Calls body(t, s, down, across) for each.
     template <class Body>

@@ -1,7 +1,6 @@
 // Arrays that plane sweeps work on, in named groups: the fields of sepi.matching.sweep_arrays, in their order.
 #pragma once
 
-#include <tuple>
 #include <utility>
 #include <variant>
 
@@ -18,7 +17,7 @@ struct ViewStack {
     float scale2;
     Array<const std::int64_t, 4> shown;  // (T, S, H or 0, 2)
 
-    auto fields() { return std::tie(colours, t0, s0, groups, subsets, scale2, shown); }
+    bool fields(auto visit) { return visit(colours, t0, s0, groups, subsets, scale2, shown); }
 };
 
 // Candidate disparities, and where the samples of a reference pixel lie in each view.
@@ -32,7 +31,7 @@ struct Candidates {
     Array<const float, 1> sy, sx;              // (V,) and (U,)
     double reach;
 
-    auto fields() { return std::tie(disparities, row, column, down, fy, across, fx, sy, sx, reach); }
+    bool fields(auto visit) { return visit(disparities, row, column, down, fy, across, fx, sy, sx, reach); }
 };
 
 // Aggregation window: 2 radius + 1 pixels wide, its weights narrow in colour.
@@ -41,7 +40,7 @@ struct Window {
     Index radius;
     float variance;
 
-    auto fields() { return std::tie(guide, radius, variance); }
+    bool fields(auto visit) { return visit(guide, radius, variance); }
 };
 
 // What noise makes of costs.
@@ -50,7 +49,7 @@ struct ExpectedCosts {
     Array<const float, 3> weights;   // (2, H, W)
     Array<const float, 2> anywhere;  // (H, W)
 
-    auto fields() { return std::tie(moments, weights, anywhere); }
+    bool fields(auto visit) { return visit(moments, weights, anywhere); }
 };
 
 // Row above the samples of a row, and how far below it they are.

@@ -25,8 +25,8 @@ struct BaseDetail {
     Array<const std::int16_t, 2> reference_detail;  // (n or 0, W)
     double edge;
 
-    auto fields() {
-        return std::tie(colours, colour_unit, detail, detail_unit, low, present, t0, s0, noise, guide, reference_detail, edge);
+    bool fields(auto visit) {
+        return visit(colours, colour_unit, detail, detail_unit, low, present, t0, s0, noise, guide, reference_detail, edge);
     }
 };
 
@@ -37,7 +37,7 @@ struct Visibility {
     Array<const bool, 2> searched;        // (T, S): the views that compare all candidates; others compare the likely ones
     Array<const std::int32_t, 3> likely;  // (2, H or 0, W): the first of these, and the last
 
-    auto fields() { return std::tie(nearest, occlusion_margin, occluded_view_weight, searched, likely); }
+    bool fields(auto visit) { return visit(nearest, occlusion_margin, occluded_view_weight, searched, likely); }
 };
 
 using Columns = std::vector<std::pair<Index, Index>>;  // stretches of a row: first column, and what follows the last

@@ -21,7 +21,7 @@ struct Drawing {
     Array<const float, 2> texels;                    // (N, 4)
     Array<const std::int64_t, 1> first_texel, side;  // (P)
 
-    auto fields() { return std::tie(edges, first_edge, planes, texels, first_texel, side); }
+    bool fields(auto visit) { return visit(edges, first_edge, planes, texels, first_texel, side); }
 };
 
 // A surface hides a point only if it is nearer by more than rounding: points on the edge between two faces.
