@@ -16,7 +16,7 @@ from sepi.matching.denoising import DenoisingParameters, denoised
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.row_bands import least_band_bytes
 from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, VisibilitySweepParameters
-from sepi.memory import require_memory, take_blas_buffer
+from sepi.memory import require_memory
 from sepi.stage import OcclusionMarginParameters, Parameters
 from sepi.threads import threads_used
 
@@ -42,7 +42,6 @@ def require_memory_of(light_field: LightField, stages: Iterable[Parameters]) -> 
     MemoryError
     """
     _, least = _bytes_taken(light_field, stages)
-    take_blas_buffer()
     require_memory(least - _LIBRARIES - light_field.views.nbytes)
 
 

@@ -26,6 +26,7 @@ from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.denoising import DenoisedLightField, DenoisingParameters, denoised
 from sepi.matching.view_noise import variance_map
 from sepi.matching.view_subsets import spread_views
+from sepi.memory import take_blas_buffer
 from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
 from sepi.regularization.contradiction import contradicted
 from sepi.regularization.lit_planes import LitPlane, lit_planes
@@ -100,6 +101,8 @@ def fill_uniform_regions(
     """
     from sepi.matching.gauss_newton import GaussNewton
 
+    # planes need it, where views have taken what memory there is
+    take_blas_buffer()
     compared = spread_views(light_field, parameters.views)
     field = denoised(light_field, parameters.denoising)
     noisy = isinstance(field, DenoisedLightField)
