@@ -213,10 +213,17 @@ def _planes_of(
     if noisy or not parameters.pockets:
         # in noise a region without a border's plane may have faint texture that knows its depth
         return planes
-    pockets = [n for n, (_, border) in enumerate(found) if border is None and planes[n] is None]
+    pockets = [n for n, (region, border) in enumerate(found) if _tells_little(region, border, planes[n])]
     # no farther than regions grow
     reach = parameters.window_radius + parameters.growth
     return with_pockets(regions, planes, pockets, mean, reach, parameters.colour_tolerance)
+
+
+def _tells_little(region: Region, border: BorderPlane | None, chosen: Chosen | None) -> bool:
+    """Whether a region has no plane, or only that of a border most of which lies elsewhere."""
+    if border is None or chosen is None:
+        return border is None and chosen is None
+    return chosen.source == "border" and not chosen.confirmed and not border.is_one_plane(region.area)
 
 
 def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: UniformPlanesParameters) -> BoolMap:

@@ -123,6 +123,20 @@ def test_a_wall_is_no_pocket_of_a_patch_before_it_nor_of_anything_in_noise() -> 
         assert [plane and plane.source for plane in planes] == expected
 
 
+@pytest.mark.parametrize(("share", "expected"), [(0.3, 0.5), (0.9, 0.7)])
+def test_a_border_most_of_which_lies_elsewhere_tells_less_than_the_wall(share: float, expected: float) -> None:
+    """By a quarter of its border a piece of wall between two things leant out of the wall."""
+    large, small = (Region(np.s_[0:60, 0:60], np.zeros((60, 60), bool)) for _ in range(2))
+    large.pixels[:, :30] = small.pixels[4:12, 32:] = True
+    found = [
+        (region, BorderPlane(np.array([d, 0, 0]), 300, s)) for region, d, s in ((large, 0.5, 0.9), (small, 0.7, share))
+    ]
+    before, grey = np.ones((60, 60), np.float32), np.full((60, 60, 3), 0.5, np.float32)
+    _, plane = _planes_of(found, {}, before, grey, False, PARAMETERS.model_copy(update={"growth": 3}))
+    assert plane is not None
+    assert plane.plane[0] == pytest.approx(expected)
+
+
 def test_small_regions_are_left_alone() -> None:
     light_field, maps = scene(SMALL)
     disparity, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
