@@ -283,6 +283,9 @@ def test_margin_tells_one_minimum_from_two() -> None:
     assert disparity[0, 0] == pytest.approx(0.5, abs=1e-5)
     assert margin[0, 0] == pytest.approx(0.3, abs=1e-4)
     np.testing.assert_allclose(margin[0, 1:], 0, atol=1e-4)
+    # what fills vectors behind the last candidate is no other minimum
+    semi_global.choose(volume, volume, disparities + 20, 3, disparity, margin)
+    np.testing.assert_array_equal(margin, 0)
 
 
 def test_grey_views_give_the_depth_of_equal_colours() -> None:

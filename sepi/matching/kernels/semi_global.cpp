@@ -90,7 +90,7 @@ float margin_of(const std::uint16_t *costs, Index K, const float *disparities, f
     Float8 own = spread(NONE), other = own;
     Int8 before_best = Int8{0, 1, 2, 3, 4, 5, 6, 7} - std::int32_t(best);
     for (Index k = 0; k < K; k += LANES, before_best += LANES) {
-        const Float8 cost = load(costs + k), beyond = load(disparities + k) - found;
+        const Float8 cost = first_lanes(load(costs + k), K - k, NONE), beyond = load(disparities + k) - found;
         const Int8 is_own = (larger(beyond, -beyond) <= same) | (before_best == 0);
         own = smaller(own, is_own ? cost : spread(NONE));
         other = smaller(other, is_own ? spread(NONE) : cost);
@@ -171,8 +171,8 @@ void semi_global(Array<const std::uint16_t, 3> cost, Array<const float, 3> guide
 // the winner belong to its minimum; smoothed and averaged (H, W, K'), disparities (K).
 void choose(Array<const std::uint16_t, 3> smoothed, Array<const std::uint16_t, 3> averaged, Array<const float, 1> disparities, float same,
             Array<float, 2> disparity, Array<float, 2> margin) {
-    const Index K = disparities.shape[0], padded = smoothed.shape[2];
-    const auto of_candidates = zeros<float, 1>(padded);
+    const Index K = disparities.shape[0];
+    const auto of_candidates = zeros<float, 1>(smoothed.shape[2]);
     std::copy_n(disparities.data, K, of_candidates.array().data);
     const double spacing = double(disparities(K - 1) - disparities(0)) / double(K - 1);
     parallel_for_pixels(disparity.shape[0], disparity.shape[1], [&](Index y, Index x) {
@@ -182,7 +182,7 @@ void choose(Array<const std::uint16_t, 3> smoothed, Array<const std::uint16_t, 3
         const double offset = 0 < best && best < K - 1 ? vertex(costs + best, 1e-9) : 0;
         const float found = float(disparities(best) + offset * spacing);
         disparity(y, x) = found;
-        margin(y, x) = margin_of(averaged.at(y, x), padded, of_candidates.array().data, found, best, same);
+        margin(y, x) = margin_of(averaged.at(y, x), K, of_candidates.array().data, found, best, same);
     });
 }
 
