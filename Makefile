@@ -218,7 +218,4 @@ $(READY): .venv/installed CMakeLists.txt $(wildcard sepi/kernels/*.?pp sepi/*/ke
 	touch .venv/placed $@
 
 kernels:
-	mkdir -p build
-	$(BUILD) -G Ninja -S . -B build/kernels -DCMAKE_BUILD_TYPE=Release -DPython_EXECUTABLE="$(CURDIR)/$(BIN)/python" >build/kernels.log
-	$(BUILD) --build build/kernels >>build/kernels.log || { cat build/kernels.log; exit 1; }
-	$(BUILD) --install build/kernels --prefix . >>build/kernels.log
+	$(BIN)/python sepi/kernels/checkout.py build

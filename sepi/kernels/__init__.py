@@ -12,11 +12,13 @@ from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 
+from sepi.kernels import checkout
+
 LEVEL = "SEPI_KERNELS"
 """Environment variable: ``baseline`` for kernels that all processors can run, to compare them with this one's."""
 
-if find_spec(f"{__name__}.baseline") is None:
-    raise ImportError("sepi: its kernels are not built: `make`, or `pip install --editable .`, builds them")
+if not checkout.is_current():
+    checkout.build()
 
 _native = import_module(f"{__name__}.baseline._native")
 if os.environ.get(LEVEL) != "baseline" and _native.has_x86_64_v3() and find_spec(f"{__name__}.x86_64_v3"):

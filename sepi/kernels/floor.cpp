@@ -4,7 +4,7 @@
 #include "lanes.hpp"
 #include "parallel.hpp"
 
-namespace sepi {
+namespace sepi::floor {
 namespace {
 
 // A thread adds what one makes of seven vectors, and of a weight that changes, as it does from candidate to candidate.
@@ -50,4 +50,4 @@ const Submodule submodule("floor", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::floor

@@ -11,7 +11,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::all_views {
 namespace {
 
 constexpr float EMPTY = -1e9f;          // disparity where no surface is seen: nothing is nearer
@@ -264,4 +264,4 @@ const Submodule submodule("all_views", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::all_views

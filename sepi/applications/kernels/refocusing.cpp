@@ -5,7 +5,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::refocusing {
 namespace {
 
 // Pixels of a box at most: views whose pictures of a point are farther apart show it more than once.
@@ -108,4 +108,4 @@ const Submodule submodule("refocusing", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::refocusing

@@ -7,7 +7,7 @@
 #include "kernels/parallel.hpp"
 #include "view_samples.hpp"
 
-namespace sepi {
+namespace sepi::background {
 namespace {
 
 constexpr Index FEWEST_VIEWS = 3;  // that see a piece of background, before its colour counts
@@ -50,36 +50,33 @@ float median(const float *values, Index n) {
 void brightness_of_views(const RimViews &views, const Sides &sides, Array<const bool, 4> missing, Array<double, 1> brightness,
                          Array<double, 1> residual) {
     const Index H = sides.disparity.shape[0], W = sides.disparity.shape[1], stride = std::max<Index>(1, std::min(H, W) / ACROSS);
-    const auto look = [&](auto lines) {
-        const ViewSamples samples_of{views, lines};
-        parallel_for(0, views.number(), [&](Index view) {
-            const auto of_view = missing[views.places(view, 0)][views.places(view, 1)];
-            const auto shows = [&](Index y, Index x) {
-                return of_view.shape[0] == 0 || !(of_view(y, x) || of_view(y, x + 1) || of_view(y + 1, x) || of_view(y + 1, x + 1));
-            };
-            // colours of the pixels that the view shows, there and in the reference view
-            std::vector<std::pair<std::array<float, 3>, std::array<float, 3>>> shown;
-            double own = 1e-9, other = 1e-9, rest = 0;
-            for (Index y = 0; y < H; ++y) {
-                if (std::min(y, H - 1 - y) % stride) continue;
-                for (Index x = 0; x < W; ++x) {
-                    if (std::min(x, W - 1 - x) % stride) continue;
-                    const auto place = samples_of.place_in(view, sides.disparity(y, x), y, x);
-                    if (!sides.clean(y, x) || !place || !shows(place->row, place->column)) continue;
-                    const auto there = samples_of.sample(view, *place);
-                    const auto here = sides.colour(y, x);
-                    for (Index c = 0; c < 3; ++c) other += there[c], own += here[c];
-                    shown.emplace_back(there, here);
-                }
+    const ViewSamples samples_of{views};
+    parallel_for(0, views.number(), [&](Index view) {
+        const auto of_view = missing[views.places(view, 0)][views.places(view, 1)];
+        const auto shows = [&](Index y, Index x) {
+            return of_view.shape[0] == 0 || !(of_view(y, x) || of_view(y, x + 1) || of_view(y + 1, x) || of_view(y + 1, x + 1));
+        };
+        // colours of the pixels that the view shows, there and in the reference view
+        std::vector<std::pair<std::array<float, 3>, std::array<float, 3>>> shown;
+        double own = 1e-9, other = 1e-9, rest = 0;
+        for (Index y = 0; y < H; ++y) {
+            if (std::min(y, H - 1 - y) % stride) continue;
+            for (Index x = 0; x < W; ++x) {
+                if (std::min(x, W - 1 - x) % stride) continue;
+                const auto place = samples_of.place_in(view, sides.disparity(y, x), y, x);
+                if (!sides.clean(y, x) || !place || !shows(place->row, place->column)) continue;
+                const auto there = samples_of.sample(view, *place);
+                const auto here = sides.colour(y, x);
+                for (Index c = 0; c < 3; ++c) other += there[c], own += here[c];
+                shown.emplace_back(there, here);
             }
-            const double ratio = other / own;
-            for (const auto &[there, here] : shown)
-                for (Index c = 0; c < 3; ++c) rest += std::min(std::abs(there[c] / ratio - here[c]), MOST_DIFFERENCE);
-            brightness(view) = ratio;
-            residual(view) = shown.empty() ? std::numeric_limits<double>::quiet_NaN() : rest / double(3 * shown.size() + 1);
-        });
-    };
-    std::visit(look, views.lines);
+        }
+        const double ratio = other / own;
+        for (const auto &[there, here] : shown)
+            for (Index c = 0; c < 3; ++c) rest += std::min(std::abs(there[c] / ratio - here[c]), MOST_DIFFERENCE);
+        brightness(view) = ratio;
+        residual(view) = shown.empty() ? std::numeric_limits<double>::quiet_NaN() : rest / double(3 * shown.size() + 1);
+    });
 }
 
 // Rows begin..end of the more distant surfaces where they are wanted (H, W), medians over the views that see them, and of
@@ -88,45 +85,42 @@ void brightness_of_views(const RimViews &views, const Sides &sides, Array<const 
 void background_of(const RimViews &views, Array<const float, 2> layer, Array<const bool, 2> wanted, Index begin, Index end,
                    Array<float, 3> background) {
     const Index W = layer.shape[1];
-    const auto look = [&](auto lines) {
-        const ViewSamples samples_of{views, lines};
-        parallel_for(begin, end, [&](Index y) {
-            std::vector<Index> columns;
-            for (Index x = 0; x < W; ++x) {
-                background(y, x, 3) = UNSEEN;
-                if (wanted(y, x)) columns.push_back(x);
-            }
-            const auto few = Index(columns.size());
-            const auto scratch = Scratch<float, 3>(few, 3, views.number() + LANES).filled(NONE);
-            const auto samples = scratch.array();
-            std::vector<Index> count(few);
-            // view by view: neighbours are near each other in its memory
-            for (Index view = 0; view < views.number(); ++view) {
-                for (Index i = 0; i < few; ++i) {
-                    const auto place = samples_of.place_seen(view, layer(y, columns[i]), y, columns[i]);
-                    if (!place) continue;
-                    const auto colour = samples_of.sample(view, *place);
-                    for (Index c = 0; c < 3; ++c) samples(i, c, count[i]) = colour[c];
-                    ++count[i];
-                }
-            }
+    const ViewSamples samples_of{views};
+    parallel_for(begin, end, [&](Index y) {
+        std::vector<Index> columns;
+        for (Index x = 0; x < W; ++x) {
+            background(y, x, 3) = UNSEEN;
+            if (wanted(y, x)) columns.push_back(x);
+        }
+        const auto few = Index(columns.size());
+        const auto scratch = Scratch<float, 3>(few, 3, views.number() + LANES).filled(NONE);
+        const auto samples = scratch.array();
+        std::vector<Index> count(few);
+        // view by view: neighbours are near each other in its memory
+        for (Index view = 0; view < views.number(); ++view) {
             for (Index i = 0; i < few; ++i) {
-                const Index n = count[i];
-                if (n < FEWEST_VIEWS) continue;
-                double total = 0;
-                for (Index c = 0; c < 3; ++c) {
-                    const float middle = median(samples.at(i, c), n);
-                    for (Index v = 0; v < n; ++v) {
-                        const float apart = samples(i, c, v) - middle;
-                        total += std::min(double(apart * apart), MOST_DEVIATION2);
-                    }
-                    background(y, columns[i], c) = middle;
-                }
-                background(y, columns[i], 3) = float(total / double(3 * n));
+                const auto place = samples_of.place_seen(view, layer(y, columns[i]), y, columns[i]);
+                if (!place) continue;
+                const auto colour = samples_of.sample(view, *place);
+                for (Index c = 0; c < 3; ++c) samples(i, c, count[i]) = colour[c];
+                ++count[i];
             }
-        });
-    };
-    std::visit(look, views.lines);
+        }
+        for (Index i = 0; i < few; ++i) {
+            const Index n = count[i];
+            if (n < FEWEST_VIEWS) continue;
+            double total = 0;
+            for (Index c = 0; c < 3; ++c) {
+                const float middle = median(samples.at(i, c), n);
+                for (Index v = 0; v < n; ++v) {
+                    const float apart = samples(i, c, v) - middle;
+                    total += std::min(double(apart * apart), MOST_DEVIATION2);
+                }
+                background(y, columns[i], c) = middle;
+            }
+            background(y, columns[i], 3) = float(total / double(3 * n));
+        }
+    });
 }
 
 const Submodule submodule("background", [](nb::module_ &m) {
@@ -137,4 +131,4 @@ const Submodule submodule("background", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::background

@@ -6,7 +6,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::colour_mixture {
 namespace {
 
 // The least and the largest disparity of each pixel and its eight neighbours: the fields of
@@ -78,4 +78,4 @@ const Submodule submodule("colour_mixture", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::colour_mixture

@@ -4,7 +4,7 @@
 #include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
-namespace sepi {
+namespace sepi::edge_lines {
 namespace {
 
 // From one share that has a cost to the next that an edge may leave.
@@ -71,4 +71,4 @@ const Submodule submodule("edge_lines", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::edge_lines

@@ -6,7 +6,7 @@
 
 #include "kernels/arguments.hpp"
 
-namespace sepi {
+namespace sepi::specks {
 namespace {
 
 // Pixels of parts of a map (H, W) that are small: of most_pixels, or of most_of_hole with nothing but nearer pixels
@@ -48,4 +48,4 @@ const Submodule submodule("specks", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::specks

@@ -6,7 +6,7 @@
 #include "kernels/parallel.hpp"
 #include "view_samples.hpp"
 
-namespace sepi {
+namespace sepi::surface_shares {
 namespace {
 
 // The pixels beside a depth step, and the two surfaces that may be theirs; (H, W).
@@ -113,10 +113,9 @@ float sum_over(Index n, Index channels, Turn turn) {
 }
 
 // What the views show of one pixel after the other.
-template <class Colour>
 struct ShownPixel {
     const RimViews &views;
-    const ViewSamples<Colour> samples_of;
+    const ViewSamples samples_of;
     const Rim &rim;
     const Array<const float, 3> background;
     const Sides &sides;
@@ -239,14 +238,11 @@ struct ShownPixel {
 void costs_of_shares(const RimViews &views, const Rim &rim, Array<const float, 3> background, const Sides &sides, double scale2, double contrast2,
                      Array<const std::int64_t, 1> pixels, Array<float, 2> costs, Array<bool, 1> told) {
     const Index W = sides.disparity.shape[1], count = pixels.shape[0];
-    const auto look = [&](auto lines) {
-        parallel_for(0, (count + AT_ONCE - 1) / AT_ONCE, [&](Index task) {
-            ShownPixel shown{views, ViewSamples{views, lines}, rim, background, sides, scale2, contrast2};
-            for (Index i = task * AT_ONCE; i < std::min(count, (task + 1) * AT_ONCE); ++i)
-                if (shown.find(pixels(i) / W, pixels(i) % W, costs.at(i))) told(i) = true;
-        });
-    };
-    std::visit(look, views.lines);
+    parallel_for(0, (count + AT_ONCE - 1) / AT_ONCE, [&](Index task) {
+        ShownPixel shown{views, ViewSamples{views}, rim, background, sides, scale2, contrast2};
+        for (Index i = task * AT_ONCE; i < std::min(count, (task + 1) * AT_ONCE); ++i)
+            if (shown.find(pixels(i) / W, pixels(i) % W, costs.at(i))) told(i) = true;
+    });
 }
 
 const Submodule submodule("surface_shares", [](nb::module_ &m) {
@@ -258,4 +254,4 @@ const Submodule submodule("surface_shares", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::surface_shares

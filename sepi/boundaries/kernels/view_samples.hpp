@@ -36,15 +36,14 @@ struct Sides {
     std::array<float, 3> colour(Index y, Index x) const { return {guide(y, x, 0), guide(y, x, 1), guide(y, x, 2)}; }
 };
 
-template <class Colour>
 struct ViewSamples {
     const RimViews &views;
-    const Array<const Colour, 4> lines;  // those of the views
+    const Index H = std::visit([](const auto &lines) { return lines.shape[2]; }, views.lines);
 
     // Where a pixel of disparity d lies in a view, if that is within it: beside the last row and column, not on them.
     [[gnu::always_inline]] std::optional<Place> place_in(Index view, float d, Index y, Index x) const {
         const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
-        const Index H = lines.shape[2], W = views.nearest.shape[3];
+        const Index W = views.nearest.shape[3];
         if (!place_within(down, across, H, W)) return std::nullopt;
         const Index row = std::min(Index(down), H - 2), column = std::min(Index(across), W - 2);
         return Place{row, column, down - double(row), across - double(column)};
@@ -61,8 +60,16 @@ struct ViewSamples {
     // Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since a bilinear sample takes from
     // the peak of what is two pixels wide.
     std::array<float, 3> sample(Index view, const Place &place) const {
-        const auto picture = lines[views.places(view, 0)][views.places(view, 1)];
-        const Index C = views.channels, H = picture.shape[0], first = place.column - 1;
+        const Index t = views.places(view, 0), s = views.places(view, 1);
+        auto colour = std::visit([&](const auto &lines) { return cubic_sample(lines[t][s], place); }, views.lines);
+        for (auto &channel : colour) channel *= views.units(view);
+        return colour;
+    }
+
+  private:
+    template <class Colour>
+    std::array<float, 3> cubic_sample(Array<const Colour, 2> picture, const Place &place) const {
+        const Index C = views.channels, first = place.column - 1;
         const auto down = cubic_weights(place.fy), across = cubic_weights(place.fx);
         std::array<const Colour *, 4> rows;
         for (Index k = 0; k < 4; ++k) rows[k] = picture.at(clamped(place.row - 1 + k, H));
@@ -85,7 +92,6 @@ struct ViewSamples {
                     for (Index c = 0; c < 3; ++c) colour[c] += across[j] * down[k] * float(rows[k][i + std::min(c, C - 1)]);
             }
         }
-        for (auto &channel : colour) channel *= views.units(view);
         return colour;
     }
 };

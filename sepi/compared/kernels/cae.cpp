@@ -7,7 +7,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::cae {
 namespace {
 
 constexpr Index LEVELS = 256;  // bins of the histograms, over colours in 0..1
@@ -94,4 +94,4 @@ const Submodule submodule("cae", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::cae

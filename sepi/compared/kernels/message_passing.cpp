@@ -6,7 +6,7 @@
 
 #include "kernels/arguments.hpp"
 
-namespace sepi {
+namespace sepi::message_passing {
 namespace {
 
 enum Side { LEFT, ABOVE, RIGHT, BELOW };
@@ -78,4 +78,4 @@ const Submodule submodule("message_passing", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::message_passing

@@ -5,7 +5,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::mishiba {
 namespace {
 
 // Row y of a view, that far down, interpolated, into row (W + 2 margin), which goes on as it ends.
@@ -143,4 +143,4 @@ const Submodule submodule("mishiba", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::mishiba

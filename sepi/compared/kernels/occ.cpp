@@ -2,7 +2,7 @@
 #include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
-namespace sepi {
+namespace sepi::occ {
 namespace {
 
 // What the halves of P patches show of views sheared by a candidate, sheared (N, 3, H, W), counted from the colours of
@@ -40,4 +40,4 @@ const Submodule submodule("occ", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::occ

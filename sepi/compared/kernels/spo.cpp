@@ -6,7 +6,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::spo {
 namespace {
 
 // The lower of the two bins that a colour counts for, those of all channels numbered through, and what counts for the upper.
@@ -94,4 +94,4 @@ const Submodule submodule("spo", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::spo

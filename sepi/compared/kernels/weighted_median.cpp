@@ -6,7 +6,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::weighted_median {
 namespace {
 
 // As sepi.compared.weighted_median; values, weight and out (H, W), guide (H, W, 3).
@@ -35,4 +35,4 @@ const Submodule submodule("weighted_median", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::weighted_median

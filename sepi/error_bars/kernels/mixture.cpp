@@ -5,7 +5,7 @@
 #include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
-namespace sepi {
+namespace sepi::mixture {
 namespace {
 
 // Mean absolute deviation of the other surface's disparity: as part of its distance, and the least, pixels per view step.
@@ -102,4 +102,4 @@ const Submodule submodule("mixture", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::mixture

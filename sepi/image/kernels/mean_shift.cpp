@@ -6,7 +6,7 @@
 #include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
 
-namespace sepi {
+namespace sepi::mean_shift {
 namespace {
 
 constexpr int ITERATIONS = 5;
@@ -105,4 +105,4 @@ const Submodule submodule("mean_shift", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::mean_shift

@@ -5,7 +5,7 @@
 #include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
-namespace sepi {
+namespace sepi::coarse_sweep {
 namespace {
 
 constexpr Index ROWS = 16;  // that one thread holds for all candidates: they stay within a few MB
@@ -123,4 +123,4 @@ const Submodule submodule("coarse_sweep", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::coarse_sweep

@@ -6,7 +6,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::view_order {
 namespace {
 
 constexpr float HALF = 0.25f;  // difference of two patches that counts one half, as part of the patch's own variation
@@ -104,4 +104,4 @@ const Submodule submodule("view_order", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::view_order

@@ -5,7 +5,7 @@
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
-namespace sepi {
+namespace sepi::base_detail {
 namespace {
 
 // Rows that a thread does at a stretch: those of the windows are converted once for all of them.
@@ -133,4 +133,4 @@ const Submodule submodule("base_detail", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::base_detail

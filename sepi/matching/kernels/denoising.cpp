@@ -2,7 +2,7 @@
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
-namespace sepi {
+namespace sepi::denoising {
 namespace {
 
 // Views that are written to, (T, S, H, W, C).
@@ -125,4 +125,4 @@ const Submodule submodule("denoising", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::denoising

@@ -5,7 +5,7 @@
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
-namespace sepi {
+namespace sepi::gaps {
 namespace {
 
 // Of a bilinear sample of a view (H, W, 3), from reference (3,), in units of what noise makes of it: samples between pixels
@@ -100,4 +100,4 @@ const Submodule submodule("gaps", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::gaps

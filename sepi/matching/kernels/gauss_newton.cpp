@@ -7,7 +7,7 @@
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
-namespace sepi {
+namespace sepi::gauss_newton {
 namespace {
 
 // Pixels of a row that are done together: all that is known of them stays in the first cache.
@@ -265,4 +265,4 @@ const Submodule submodule("gauss_newton", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::gauss_newton

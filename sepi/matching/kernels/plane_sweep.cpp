@@ -15,7 +15,7 @@
 #include "pixels.hpp"
 #include "sweep_arrays.hpp"
 
-namespace sepi {
+namespace sepi::plane_sweep {
 namespace {
 
 // Columns of a row whose costs are found, and aggregated, together.
@@ -125,9 +125,7 @@ struct ComparedViews {
 };
 
 // Of tiles of at most so many columns; maps (3, N, H, W) are of the best disparity, its cost, and the mean cost.
-template <class Colour>
 struct TileSweep {
-    const Array<const Colour, 5> all_colours;
     const ViewStack &views;
     const ComparedViews &compared;
     const Candidates &candidates;
@@ -192,7 +190,11 @@ struct TileSweep {
         for (Index g = 0; g < Index(compared.groups.size()); ++g) {
             for (float *each : {costs, counts})
                 if (each) std::fill_n(each, padded * BLOCK_ROW, 0.0f);
-            for (const ComparedView &view : compared.groups[g]) add_view(view, run, costs, counts);
+            std::visit(
+                [&](const auto &colours) {
+                    for (const ComparedView &view : compared.groups[g]) add_view(colours, view, run, costs, counts);
+                },
+                views.colours);
             turn(costs, run, g, cost_ring.array());
             if (count) turn(counts, run, g, count_ring.array());
         }
@@ -253,7 +255,8 @@ struct TileSweep {
     }
 
     // Add the residuals of one view to costs (K', BLOCK_ROW), and where it sees the pixels 1 to counts, unless that is null.
-    void add_view(const ComparedView &view, Run run, float *costs, float *counts) const {
+    template <class Colour>
+    void add_view(Array<const Colour, 5> all_colours, const ComparedView &view, Run run, float *costs, float *counts) const {
         const auto colours = all_colours[view.t][view.s], reference = all_colours[views.t0][views.s0];
         const auto shown = views.shown[view.t][view.s];
         const Float8 scale2 = spread(views.scale2);
@@ -341,14 +344,11 @@ void sweep_plane_rows(const ViewStack &views, const Candidates &candidates, cons
                       Array<const bool, 2> mask, Index begin, Index end, Index height, Index width, Array<float, 4> maps) {
     const Index W = mask.shape[1];
     const ComparedViews compared(views, candidates);
-    const auto sweep_rows = [&]<class Colour>(const Array<const Colour, 5> &colours) {
-        parallel_for(0, (end - begin + height - 1) / height, [&](Index task) {
-            const Index top = begin + task * height;
-            TileSweep<Colour> sweep{colours, views, compared, candidates, window, expected, mask, std::min(W, width), maps};
-            for (Index left = 0; left < W; left += width) sweep.run({top, std::min(end, top + height), left, std::min(W, left + width)});
-        });
-    };
-    std::visit(sweep_rows, views.colours);
+    parallel_for(0, (end - begin + height - 1) / height, [&](Index task) {
+        const Index top = begin + task * height;
+        TileSweep sweep{views, compared, candidates, window, expected, mask, std::min(W, width), maps};
+        for (Index left = 0; left < W; left += width) sweep.run({top, std::min(end, top + height), left, std::min(W, left + width)});
+    });
 }
 
 const Submodule submodule("plane_sweep", [](nb::module_ &m) {
@@ -358,4 +358,4 @@ const Submodule submodule("plane_sweep", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::plane_sweep

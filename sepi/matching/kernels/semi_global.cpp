@@ -3,7 +3,7 @@
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
-namespace sepi {
+namespace sepi::semi_global {
 namespace {
 
 // Paths from row to row that a thread follows together: their costs lie side by side, and fit in its cache.
@@ -197,4 +197,4 @@ const Submodule submodule("semi_global", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::semi_global

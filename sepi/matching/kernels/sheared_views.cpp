@@ -5,7 +5,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::sheared_views {
 namespace {
 
 // Where the samples of a line lie: whole pixels on, and the weights of the pixels at -1, 0, 1 and 2 from there.
@@ -50,4 +50,4 @@ const Submodule submodule("sheared_views", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::sheared_views

@@ -6,7 +6,7 @@
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
-namespace sepi {
+namespace sepi::splines {
 namespace {
 
 // How far the convolution of the views' coefficients reaches; beyond it is a tenth of what rounding to int16 does.
@@ -97,4 +97,4 @@ const Submodule submodule("splines", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::splines

@@ -2,7 +2,7 @@
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
-namespace sepi {
+namespace sepi::surface_windows {
 namespace {
 
 // Rows that a thread does at a stretch.
@@ -59,4 +59,4 @@ const Submodule submodule("surface_windows", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::surface_windows

@@ -4,7 +4,7 @@
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
-namespace sepi {
+namespace sepi::view_noise {
 namespace {
 
 // Width of a block, pixels: a vector of them.
@@ -65,4 +65,4 @@ const Submodule submodule("view_noise", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::view_noise

@@ -5,7 +5,7 @@
 #include "pixels.hpp"
 #include "sweep_arrays.hpp"
 
-namespace sepi {
+namespace sepi::visibility {
 namespace {
 
 constexpr float EMPTY = -1e9f;   // in a z-buffer where no pixel of the reference view falls: nothing is nearer
@@ -227,7 +227,7 @@ struct VisibleRow {
                         seen = found < MISSING ? larger(hidden, smaller(seen, (limit - found) * steepness)) : Float8{};
                         before += LANES;
                     }
-                    if (!searched) seen = (load(reference + 4 * pitch) <= number) & (load(reference + 5 * pitch) >= number) ? seen : Float8{};
+                    if (!searched) seen = ((load(reference + 4 * pitch) <= number) & (load(reference + 5 * pitch) >= number)) ? seen : Float8{};
                     // pixels beyond the last add nothing to what others have added
                     if (rest < LANES) seen = first_lanes(seen, rest, 0);
                     const auto residual = [&](Index channel) {
@@ -308,4 +308,4 @@ const Submodule submodule("visibility", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::visibility

@@ -5,7 +5,7 @@
 #include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
-namespace sepi {
+namespace sepi::planes {
 namespace {
 
 // Weighted least squares of each superpixel's data, in the order of the pixels, added to left (N, 3, 3) and
@@ -58,4 +58,4 @@ const Submodule submodule("planes", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::planes

@@ -9,7 +9,7 @@
 #include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 
-namespace sepi {
+namespace sepi::second_order {
 namespace {
 
 constexpr Index MARGIN = 2;   // how far second differences reach, pixels
@@ -197,4 +197,4 @@ const Submodule submodule("second_order", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::second_order

@@ -6,7 +6,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::reprojection {
 namespace {
 
 // Calls body(other, x, place) where another view shows the point of a pixel of row y. View by view: pixels beside each
@@ -82,4 +82,4 @@ const Submodule submodule("reprojection", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::reprojection

@@ -8,7 +8,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::triangles {
 namespace {
 
 // Rows of rays that a thread looks at together.
@@ -101,4 +101,4 @@ const Submodule submodule("triangles", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::triangles

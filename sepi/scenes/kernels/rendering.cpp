@@ -7,7 +7,7 @@
 #include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
 
-namespace sepi {
+namespace sepi::rendering {
 namespace {
 
 // Texels that follow those of each row of a texture, as it goes on periodically: as many as a sample reaches.
@@ -189,4 +189,4 @@ const Submodule submodule("rendering", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::rendering

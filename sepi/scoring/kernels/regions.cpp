@@ -5,7 +5,7 @@
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
 
-namespace sepi {
+namespace sepi::regions {
 namespace {
 
 constexpr double HALF_PIXEL = 0.501;  // and a little more so that rounding of float32 disparities decides no tie
@@ -47,4 +47,4 @@ const Submodule submodule("regions", [](nb::module_ &m) {
 });
 
 }  // namespace
-}  // namespace sepi
+}  // namespace sepi::regions

@@ -1,0 +1,75 @@
+"""The kernels of a checkout: if their sources are not those that they were built from, they are built when imported.
+
+`python sepi/kernels/checkout.py` prints the digest of the sources; with `build` it builds what changed.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+_ROOT = Path(__file__).parents[2]
+_BUILT_FROM = Path(__file__).with_name("built_from")
+
+
+def source_digest() -> str:
+    """SHA-256 of the sources of all kernels, in hexadecimal digits."""
+    digest = hashlib.sha256()
+    for source in sorted([*_ROOT.glob("sepi/kernels/*.?pp"), *_ROOT.glob("sepi/*/kernels/*.?pp")]):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()
+
+
+def is_current() -> bool:
+    """Whether this is no checkout, or its kernels were built from the sources that it has."""
+    if not (_ROOT / "CMakeLists.txt").is_file():
+        return True
+    return _BUILT_FROM.is_file() and _BUILT_FROM.read_text() == source_digest()
+
+
+def build() -> None:
+    """Build the kernels in place, one process at a time. Raises `ImportError` if that fails, and prints why."""
+    folder = _ROOT / "build" / "kernels"
+    folder.mkdir(parents=True, exist_ok=True)
+    lock = os.open(folder, os.O_RDONLY)
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    configure = [
+        "-G",
+        "Ninja",
+        "-S",
+        _ROOT,
+        "-B",
+        folder,
+        "-DCMAKE_BUILD_TYPE=Release",
+        f"-DPython_EXECUTABLE={sys.executable}",
+    ]
+    environment = os.environ | {
+        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', os.defpath)}"
+    }
+    # CMake would leave one be that is younger than a second
+    _BUILT_FROM.unlink(missing_ok=True)
+    try:
+        for arguments in (configure, ["--build", folder], ["--install", folder, "--prefix", _ROOT]):
+            done = subprocess.run(["cmake", *arguments], env=environment, capture_output=True, text=True, check=False)
+            if done.returncode:
+                print(done.stdout, done.stderr, sep="\n", file=sys.stderr)
+                raise ImportError(
+                    "sepi: the sources of its kernels in this checkout do not build; cmake says why above"
+                )
+    except FileNotFoundError:
+        raise ImportError(
+            "sepi: its kernels are not built from the sources in this checkout; `make` builds them"
+        ) from None
+    finally:
+        os.close(lock)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["build"]:
+        build()
+    else:
+        print(source_digest(), end="")

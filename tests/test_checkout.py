@@ -1,0 +1,51 @@
+"""A checkout's kernels are those of its sources."""
+
+import shutil
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import pytest
+
+import sepi.kernels.checkout
+
+CMAKE = shutil.which("cmake", path=str(Path(sys.executable).parent))
+pytestmark = pytest.mark.skipif(CMAKE is None, reason="needs CMake")
+
+RECIPE = """
+cmake_minimum_required(VERSION 3.22)
+project(kernels NONE)
+add_custom_command(OUTPUT built DEPENDS "${CMAKE_SOURCE_DIR}/sepi/image/kernels/sums.cpp" VERBATIM
+  COMMAND grep -h int "${CMAKE_SOURCE_DIR}/sepi/image/kernels/sums.cpp" > built)
+add_custom_command(OUTPUT built_from DEPENDS built VERBATIM
+  COMMAND "${Python_EXECUTABLE}" "${CMAKE_SOURCE_DIR}/sepi/kernels/checkout.py" > built_from)
+add_custom_target(all_of_it ALL DEPENDS built built_from)
+install(FILES "${CMAKE_BINARY_DIR}/built_from" DESTINATION sepi/kernels)
+"""
+
+
+def test_edited_sources_are_built_again(tmp_path: Path) -> None:
+    source = tmp_path / "sepi/image/kernels/sums.cpp"
+    kernels = tmp_path / "sepi/kernels"
+    for folder in (source.parent, kernels):
+        folder.mkdir(parents=True)
+    module = shutil.copy(sepi.kernels.checkout.__file__, kernels)
+    spec = spec_from_file_location("checkout", module)
+    assert spec is not None
+    assert spec.loader is not None
+    checkout = module_from_spec(spec)
+    spec.loader.exec_module(checkout)
+    assert checkout.is_current(), "an installed package has no sources to follow"
+    (tmp_path / "CMakeLists.txt").write_text(RECIPE)
+
+    for text in ("int one;\n", "int two;\n"):
+        source.write_text(text)
+        assert not checkout.is_current()
+        checkout.build()
+        assert checkout.is_current()
+        assert (tmp_path / "build/kernels/built").read_text() == text
+
+    source.write_text("nothing that builds\n")
+    with pytest.raises(ImportError, match="do not build"):
+        checkout.build()
+    assert not checkout.is_current(), "what is built is still of other sources"
