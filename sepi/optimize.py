@@ -34,7 +34,6 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
 from sepi.matching.view_subsets import spread_views
-from sepi.memory import give_back_memory
 from sepi.regularization.wls import (
     WlsParameters,
     data_weight,
@@ -230,7 +229,6 @@ def second_order(
             del matching, mean
             forget_splines(light_field)
             forget_detail(light_field)
-            give_back_memory()
         else:
             gradient, information = matching.gradient_and_hessian(mean, disparity)
         surfaces = by_depth if smooth else by_colour

@@ -8,6 +8,7 @@ wrong sign.
 
 from __future__ import annotations
 
+import itertools
 import math
 from enum import Enum
 from typing import NamedTuple
@@ -182,8 +183,7 @@ def _add_pairs(
     rise[usable] = np.log((residual[usable] + noise) / (opposite[usable] + noise))
     down, across = np.sign(baseline).astype(int).tolist()
     length, hidden, side = np.abs(baseline).max(), _HIDDEN * noise, _side(disparity.shape)
-    for distance in range(2, farthest + 1):
-        add_pairs(rise, residual, disparity, usable, (down, across), distance, length, hidden, side, total, count)
+    add_pairs(rise, residual, disparity, usable, (down, across), farthest, length, hidden, side, total, count)
 
 
 def add_pairs(
@@ -192,7 +192,7 @@ def add_pairs(
     disparity: FloatMap,
     usable: BoolMap,
     direction: Baseline,
-    distance: int,
+    farthest: int,
     length: np.float32,
     hidden: float,
     side: int,
@@ -201,21 +201,27 @@ def add_pairs(
 ) -> None:
     """Add what pairs of usable pixels that meet in a view say, and their number, to regions of ``side`` pixels.
 
-    The nearer pixel lies ``distance`` steps of ``direction``, each -1, 0 or 1 down and across, from the other. The view
-    is ``length`` view steps away, and a pixel that is hidden in it has a greater residual than ``hidden``.
+    The nearer pixel lies 2 to ``farthest`` steps of ``direction``, each -1, 0 or 1 down and across, from the other. The
+    view is ``length`` view steps away, and a pixel that is hidden in it has a greater residual than ``hidden``.
     """
-    (height, width), (down, across) = disparity.shape, (distance * step for step in direction)
-    if abs(down) >= height or abs(across) >= width:
-        return
-    here = slice(max(0, -down), height - max(0, down)), slice(max(0, -across), width - max(0, across))
-    there = slice(max(0, down), height - max(0, -down)), slice(max(0, across), width - max(0, -across))
-    shift = (disparity[there] - disparity[here]) * length
-    meet = usable[here] & usable[there] & (np.abs(shift - distance) <= _MEETING) & (shift >= _LEAST_SHIFT)
-    meet &= np.maximum(residual[here], residual[there]) > hidden
-    meet &= np.maximum(rise[here], rise[there]) > _LEAST_EVIDENCE
-    regions = tuple((n + part.start) // side for n, part in zip(np.nonzero(meet), here, strict=True))
-    np.add.at(total, regions, np.clip(rise[here] - rise[there], -_MOST_EVIDENCE, _MOST_EVIDENCE)[meet])
-    np.add.at(count, regions, 1)
+    height, width = disparity.shape
+    suspect = usable & (residual > hidden)
+    y, x = np.nonzero(suspect)
+    # few pixels are hidden: each is paired with what may hide it, and what it may hide
+    for distance, towards in itertools.product(range(2, farthest + 1), (1, -1)):
+        i, j = y + towards * distance * direction[0], x + towards * distance * direction[1]
+        inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
+        one, other = (y[inside], x[inside]), (i[inside], j[inside])
+        here, there = (one, other) if towards == 1 else (other, one)
+        shift = (disparity[there] - disparity[here]) * length
+        meet = usable[other] & (np.abs(shift - distance) <= _MEETING) & (shift >= _LEAST_SHIFT)
+        meet &= np.maximum(rise[here], rise[there]) > _LEAST_EVIDENCE
+        if towards == -1:
+            # the pair was found from its other pixel
+            meet &= ~suspect[other]
+        regions = here[0][meet] // side, here[1][meet] // side
+        np.add.at(total, regions, np.clip(rise[here] - rise[there], -_MOST_EVIDENCE, _MOST_EVIDENCE)[meet])
+        np.add.at(count, regions, 1)
 
 
 def _summary(total: npt.NDArray[np.float64], count: npt.NDArray[np.float64]) -> Evidence:

@@ -9,7 +9,7 @@
 namespace sepi {
 
 // exp(x) of a number up to 0, rounded to single precision; 0 below -87. Loops over it vectorise.
-inline float exp_of_negative(double x) {
+[[gnu::always_inline]] inline float exp_of_negative(double x) {
     const double n = std::floor(x * 1.4426950408889634 + 0.5);
     const double f = (x - n * 0.693145751953125) - n * 1.42860682030941723212e-6;
     double p = 1 + f * (1.0 / 8) * (1 + f * (1.0 / 9) * (1 + f * (1.0 / 10)));

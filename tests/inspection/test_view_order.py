@@ -350,8 +350,7 @@ def test_pairs_that_meet_in_a_view_are_counted_in_the_region_of_the_farther(down
     usable = rng.random(disparity.shape) < 0.7
     length, hidden, side, farthest = np.float32(3.5), np.float32(0.4), 8, 12
     total, count = np.zeros((2, 4, 5))
-    for distance in range(2, farthest + 1):
-        add_pairs(rise, residual, disparity, usable, (down, across), distance, length, hidden, side, total, count)
+    add_pairs(rise, residual, disparity, usable, (down, across), farthest, length, hidden, side, total, count)
     expected = np.zeros((2, 4, 5))
     for (y, x), distance in itertools.product(np.argwhere(usable).tolist(), range(2, farthest + 1)):
         i, j = y + down * distance, x + across * distance

@@ -1,8 +1,10 @@
 // Distribution of a pixel's error.
+#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "kernels/arguments.hpp"
+#include "kernels/exponential.hpp"
 #include "kernels/parallel.hpp"
 
 namespace sepi::mixture {
@@ -18,9 +20,10 @@ struct ErrorMixture {
     bool fields(auto visit) { return visit(scale, outlier_scale, outlier, rim, above, below); }
 };
 
-constexpr int EVALUATIONS = 40;
+constexpr int EVALUATIONS = 60;
 constexpr double FARTHEST = 1e12;   // no bound is farther away, pixels
 constexpr double PRECISION = 1e-3;  // of the bounds, relative; of the probability beyond them, too
+constexpr Index AT_ONCE = 32;       // pixels: loops over them vectorise
 
 // A probability, and how fast it falls.
 struct Share {
@@ -28,52 +31,67 @@ struct Share {
 };
 
 // Share of a Laplace distribution about 0 that lies above x.
-Share laplace_above(double x, double width) {
-    const double half = 0.5 * std::exp(-std::abs(x) / width);
+[[gnu::always_inline]] inline Share laplace_above(double x, double width) {
+    const double half = 0.5 * double(exp_of_negative(-std::abs(x) / width));
     return {x > 0 ? half : 1 - half, half / width};
 }
 
-// Error of one pixel in one direction.
-struct PixelError {
-    float scale, outlier_scale, outlier, rim, above, below;
-    double own = 1.0 - outlier - rim;
+using Numbers = std::array<double, AT_ONCE>;
+
+// Errors of pixels side by side, in one direction.
+struct PixelErrors {
+    Numbers scale, outlier_scale, outlier, rim, above, below;
+
+    // The narrow part of the error.
+    double own(Index i) const { return 1 - outlier[i] - rim[i]; }
     // Part of the probability of the other surface that the nearer one has: the farther away, the likelier.
-    double share = (above * above + 1e-6) / (above * above + below * below + 2e-6);
-    double wide = RIM_WIDTH * above + LEAST_RIM, deep = RIM_WIDTH * below + LEAST_RIM;
+    double share(Index i) const { return (above[i] * above[i] + 1e-6) / (above[i] * above[i] + below[i] * below[i] + 2e-6); }
+    static double width(double distance) { return RIM_WIDTH * distance + LEAST_RIM; }
 
     // Probability that the true disparity is more than x >= 0 above the map's.
-    Share beyond(double x) const {
-        const double core = own * 0.5 * std::exp(-x / scale), outliers = outlier * 0.5 * std::exp(-x / outlier_scale);
-        const Share there = laplace_above(x - above, wide), opposite = laplace_above(x + below, deep);
+    [[gnu::always_inline]] Share beyond(Index i, double x) const {
+        const Share core = laplace_above(x, scale[i]), outliers = laplace_above(x, outlier_scale[i]);
+        const Share there = laplace_above(x - above[i], width(above[i])), opposite = laplace_above(x + below[i], width(below[i]));
+        const double nearer = rim[i] * share(i), farther = rim[i] - nearer;
         return {
-            core + outliers + rim * (share * there.beyond + (1 - share) * opposite.beyond),
-            core / scale + outliers / outlier_scale + rim * (share * there.density + (1 - share) * opposite.density),
+            own(i) * core.beyond + outlier[i] * outliers.beyond + nearer * there.beyond + farther * opposite.beyond,
+            own(i) * core.density + outlier[i] * outliers.density + nearer * there.density + farther * opposite.density,
         };
     }
 
-    // Distance above the map beyond which the truth lies with probability tail: Newton's method for the logarithm, nearly
-    // a line, from where the heavier part alone would have its bound; halving what is left where it leads astray.
-    double bound(double tail) const {
-        if (beyond(0).beyond <= tail) return 0;
-        double x = scale * std::log(std::max(own * 0.5 / tail, 1.1));
-        x = std::max(x, outlier_scale * std::log(std::max(outlier * 0.5 / tail, 1e-9)));
-        double low = 0, high = FARTHEST;
-        for (int i = 0; i < EVALUATIONS; ++i) {
-            const Share here = beyond(x);
-            const double f = std::log(here.beyond / tail);
-            if (std::abs(f) < PRECISION) break;
-            (f > 0 ? low : high) = x;
-            if (high - low <= PRECISION * high) break;
-            x += f * here.beyond / here.density;
-            if (!(low < x && x < high)) x = high == FARTHEST ? 2 * low : 0.5 * (low + high);
+    // Distances above the map beyond which the truth lies with probability tail: Newton's method for the logarithm of the
+    // probability, nearly a line, from where the heavier of the narrow parts alone would have its bound; halving what is left
+    // where it leads astray.
+    Numbers bounds(double tail) const {
+        Numbers found, low{}, high;
+        high.fill(FARTHEST);
+        for (Index i = 0; i < AT_ONCE; ++i) {
+            const double outer = outlier_scale[i] * std::log(std::max(outlier[i] * 0.5 / tail, 1e-9));
+            found[i] = beyond(i, 0).beyond > tail ? std::max(scale[i] * std::log(std::max(own(i) * 0.5 / tail, 1.1)), outer) : 0;
         }
-        return x;
+        Index open = AT_ONCE;
+        for (int evaluation = 0; open > 0 && evaluation < EVALUATIONS; ++evaluation) {
+            open = 0;
+            for (Index i = 0; i < AT_ONCE; ++i) {
+                const double x = found[i];
+                const Share here = beyond(i, x);
+                // the logarithm of the ratio to tail, where it is near 1
+                const double f = 2 * (here.beyond - tail) / (here.beyond + tail), next = x + f * here.beyond / here.density;
+                const double least = f > 0 ? x : low[i], most = f > 0 ? high[i] : x, half = most == FARTHEST ? 2 * least : 0.5 * (least + most);
+                const double better = least < next && next < most ? next : half;
+                const Index more = x > 0 && std::abs(f) >= PRECISION && most - least > PRECISION * most;
+                low[i] = least, high[i] = most, found[i] = more ? better : x;
+                open += more;
+            }
+        }
+        return found;
     }
 
     // Expected absolute error.
-    double expected() const {
-        const double other = share * (above + wide * std::exp(-above / wide)) + (1 - share) * (below + deep * std::exp(-below / deep));
-        return own * scale + outlier * outlier_scale + rim * other;
+    double expected(Index i) const {
+        const auto distance = [](double apart) { return apart + width(apart) * double(exp_of_negative(-apart / width(apart))); };
+        const double other = share(i) * distance(above[i]) + (1 - share(i)) * distance(below[i]);
+        return own(i) * scale[i] + outlier[i] * outlier_scale[i] + rim[i] * other;
     }
 };
 
@@ -82,16 +100,29 @@ struct PixelError {
 void describe(const ErrorMixture &mixture, double tail, double close, Array<float, 3> out) {
     // standard deviation of a normal distribution, over its mean absolute value
     const double normal = std::sqrt(std::numbers::pi / 2);
-    parallel_for_pixels(out.shape[1], out.shape[2], [&](Index y, Index x) {
-        const auto with_other = [&](float above, float below) {
-            return PixelError{mixture.scale(y, x), mixture.outlier_scale(y, x), mixture.outlier(y, x), mixture.rim(y, x), above, below};
-        };
-        const float above = mixture.above(y, x), below = mixture.below(y, x);
-        const PixelError upwards = with_other(above, below), downwards = with_other(below, above);
-        out(0, y, x) = float(normal * upwards.expected());
-        out(1, y, x) = float(downwards.bound(tail));
-        out(2, y, x) = float(upwards.bound(tail));
-        out(3, y, x) = float(std::max(0.0, 1 - upwards.beyond(close).beyond - downwards.beyond(close).beyond));
+    const Index H = out.shape[1], W = out.shape[2];
+    parallel_for(0, H, [&](Index y) {
+        for (Index first = 0; first < W; first += AT_ONCE) {
+            const Index number = std::min(AT_ONCE, W - first);
+            const auto side_by_side = [&](Array<const float, 2> values) {
+                Numbers numbers;
+                numbers.fill(double(values(y, W - 1)));
+                std::copy_n(values.at(y, first), number, numbers.begin());
+                return numbers;
+            };
+            const PixelErrors upwards{side_by_side(mixture.scale), side_by_side(mixture.outlier_scale), side_by_side(mixture.outlier),
+                                      side_by_side(mixture.rim), side_by_side(mixture.above), side_by_side(mixture.below)};
+            PixelErrors downwards = upwards;
+            std::swap(downwards.above, downwards.below);
+            const Numbers down = downwards.bounds(tail), up = upwards.bounds(tail);
+            Numbers sigma, probability;
+            for (Index i = 0; i < AT_ONCE; ++i) {
+                sigma[i] = normal * upwards.expected(i);
+                probability[i] = std::max(0.0, 1 - upwards.beyond(i, close).beyond - downwards.beyond(i, close).beyond);
+            }
+            Index n = 0;
+            for (const Numbers &of : {sigma, down, up, probability}) std::copy_n(of.begin(), number, out.at(n++, y, first));
+        }
     });
 }
 

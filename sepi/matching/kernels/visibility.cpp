@@ -72,30 +72,31 @@ struct NearestInView {
         }
     }
 
-    // Add a row of the reference view. Pixels of a smooth surface lie side by side in the view, too: eight at once.
+    // Add a row of the reference view, eight pixels at a time; those of a smooth surface lie side by side in the view, too.
     void add_row(const float *row, Index y) {
-        // how far beyond where the first begins, of 0..1 if they lie side by side
-        const auto between = [](Float8 beyond) { return least_of(smaller(beyond, 1.0f - beyond)) > ROUNDING; };
+        constexpr Int8 RISING{0, 1, 2, 3, 4, 5, 6, 7};
         for (Index begin = 0; begin < W; begin += LANES) {
-            const Index top = Index(std::floor(double(y) - row[begin] * down)) + 1, left = Index(std::floor(double(begin) - row[begin] * across)) + 1;
-            if (begin + LANES <= W && 0 <= top && top <= H && 0 <= left && left + LANES <= W + 1) {
-                const Float8 d = load(row + begin), dy = float(y + 1 - top) - d * float(down), dx = float(begin + 1 - left) - d * float(across);
-                if ((down == 0 || between(dy)) && (across == 0 || between(dx))) {
-                    float *place = squares.array().at(top, left);
-                    store(place, larger(load(place), d));
-                    continue;
-                }
-            }
-            for (Index x = begin; x < std::min(W, begin + LANES); ++x) {
-                // most fall on no position
-                const double i = double(y) - row[x] * down, j = double(x) - row[x] * across;
-                const Index here = Index(std::floor(i)) + 1, beside = Index(std::floor(j)) + 1;
-                if ((down != 0 && i == double(here - 1)) || (across != 0 && j == double(beside - 1))) {
-                    add(row, y, x, false, false);
-                } else if (0 <= here && here <= H && 0 <= beside && beside <= W) {
-                    float &nearest_so_far = squares.array()(here, beside);
-                    nearest_so_far = std::max(nearest_so_far, row[x]);
-                }
+            bool exactly = begin + LANES > W;
+            // of how far the first of them moves, whole pixels, and whether the rest is none in any
+            const auto moved = [&](double step) {
+                const Float8 by = step == 0 ? Float8{} : load(row + begin) * float(-step);
+                const Int8 whole_pixels = rounded(step == 0 ? by : by - 0.5f);
+                const Float8 rest = by - __builtin_convertvector(whole_pixels, Float8);
+                exactly |= step != 0 && least_of(smaller(rest, 1.0f - rest)) <= ROUNDING;
+                return whole_pixels;
+            };
+            const Int8 top = exactly ? RISING : moved(down) + std::int32_t(y + 1), left = exactly ? RISING : moved(across) + std::int32_t(begin + 1) + RISING;
+            if (exactly) {
+                for (Index x = begin; x < std::min(W, begin + LANES); ++x) add(row, y, x, false, false);
+            } else if (0 <= top[0] && top[0] <= H && 0 <= left[0] && left[0] + LANES <= W + 1 && !any((top != top[0]) | (left - RISING != left[0]))) {
+                float *place = squares.array().at(top[0], left[0]);
+                store(place, larger(load(place), load(row + begin)));
+            } else {
+                for (Index n = 0; n < LANES; ++n)
+                    if (0 <= top[n] && top[n] <= H && 0 <= left[n] && left[n] <= W) {
+                        float &nearest_so_far = squares.array()(top[n], left[n]);
+                        nearest_so_far = std::max(nearest_so_far, row[begin + n]);
+                    }
             }
         }
         add(row, y, 0, true, false);
