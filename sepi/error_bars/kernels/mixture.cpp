@@ -1,5 +1,4 @@
 // Distribution of a pixel's error.
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -36,14 +35,13 @@ struct Share {
     return {x > 0 ? half : 1 - half, half / width};
 }
 
-using Numbers = std::array<double, AT_ONCE>;
-
-// Errors of pixels side by side, in one direction.
+// Errors of at most AT_ONCE pixels side by side, in one direction.
 struct PixelErrors {
-    Numbers scale, outlier_scale, outlier, rim, above, below;
+    const Index number;
+    const float *scale, *outlier_scale, *outlier, *rim, *above, *below;
 
     // The narrow part of the error.
-    double own(Index i) const { return 1 - outlier[i] - rim[i]; }
+    double own(Index i) const { return 1.0 - outlier[i] - rim[i]; }
     // Part of the probability of the other surface that the nearer one has: the farther away, the likelier.
     double share(Index i) const { return (above[i] * above[i] + 1e-6) / (above[i] * above[i] + below[i] * below[i] + 2e-6); }
     static double width(double distance) { return RIM_WIDTH * distance + LEAST_RIM; }
@@ -62,17 +60,17 @@ struct PixelErrors {
     // Distances above the map beyond which the truth lies with probability tail: Newton's method for the logarithm of the
     // probability, nearly a line, from where the heavier of the narrow parts alone would have its bound; halving what is left
     // where it leads astray.
-    Numbers bounds(double tail) const {
-        Numbers found, low{}, high;
-        high.fill(FARTHEST);
-        for (Index i = 0; i < AT_ONCE; ++i) {
+    void bounds(double tail, float *out) const {
+        double found[AT_ONCE], low[AT_ONCE] = {}, high[AT_ONCE];
+        for (Index i = 0; i < number; ++i) {
             const double outer = outlier_scale[i] * std::log(std::max(outlier[i] * 0.5 / tail, 1e-9));
             found[i] = beyond(i, 0).beyond > tail ? std::max(scale[i] * std::log(std::max(own(i) * 0.5 / tail, 1.1)), outer) : 0;
+            high[i] = FARTHEST;
         }
-        Index open = AT_ONCE;
+        Index open = number;
         for (int evaluation = 0; open > 0 && evaluation < EVALUATIONS; ++evaluation) {
             open = 0;
-            for (Index i = 0; i < AT_ONCE; ++i) {
+            for (Index i = 0; i < number; ++i) {
                 const double x = found[i];
                 const Share here = beyond(i, x);
                 // the logarithm of the ratio to tail, where it is near 1
@@ -84,7 +82,7 @@ struct PixelErrors {
                 open += more;
             }
         }
-        return found;
+        std::copy_n(found, number, out);
     }
 
     // Expected absolute error.
@@ -104,24 +102,18 @@ void describe(const ErrorMixture &mixture, double tail, double close, Array<floa
     parallel_for(0, H, [&](Index y) {
         for (Index first = 0; first < W; first += AT_ONCE) {
             const Index number = std::min(AT_ONCE, W - first);
-            const auto side_by_side = [&](Array<const float, 2> values) {
-                Numbers numbers;
-                numbers.fill(double(values(y, W - 1)));
-                std::copy_n(values.at(y, first), number, numbers.begin());
-                return numbers;
+            const auto [scale, outlier_scale, outlier, rim, above, below] = mixture;
+            const auto with_other = [&](Array<const float, 2> ahead, Array<const float, 2> behind) {
+                return PixelErrors{number, scale.at(y, first), outlier_scale.at(y, first), outlier.at(y, first), rim.at(y, first), ahead.at(y, first), behind.at(y, first)};
             };
-            const PixelErrors upwards{side_by_side(mixture.scale), side_by_side(mixture.outlier_scale), side_by_side(mixture.outlier),
-                                      side_by_side(mixture.rim), side_by_side(mixture.above), side_by_side(mixture.below)};
-            PixelErrors downwards = upwards;
-            std::swap(downwards.above, downwards.below);
-            const Numbers down = downwards.bounds(tail), up = upwards.bounds(tail);
-            Numbers sigma, probability;
-            for (Index i = 0; i < AT_ONCE; ++i) {
-                sigma[i] = normal * upwards.expected(i);
-                probability[i] = std::max(0.0, 1 - upwards.beyond(i, close).beyond - downwards.beyond(i, close).beyond);
+            const PixelErrors upwards = with_other(above, below), downwards = with_other(below, above);
+            downwards.bounds(tail, out.at(1, y, first));
+            upwards.bounds(tail, out.at(2, y, first));
+            float *__restrict sigma = out.at(0, y, first), *__restrict probability = out.at(3, y, first);
+            for (Index i = 0; i < number; ++i) {
+                sigma[i] = float(normal * upwards.expected(i));
+                probability[i] = float(std::max(0.0, 1 - upwards.beyond(i, close).beyond - downwards.beyond(i, close).beyond));
             }
-            Index n = 0;
-            for (const Numbers &of : {sigma, down, up, probability}) std::copy_n(of.begin(), number, out.at(n++, y, first));
         }
     });
 }

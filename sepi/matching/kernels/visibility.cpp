@@ -93,10 +93,7 @@ struct NearestInView {
                 store(place, larger(load(place), load(row + begin)));
             } else {
                 for (Index n = 0; n < LANES; ++n)
-                    if (0 <= top[n] && top[n] <= H && 0 <= left[n] && left[n] <= W) {
-                        float &nearest_so_far = squares.array()(top[n], left[n]);
-                        nearest_so_far = std::max(nearest_so_far, row[begin + n]);
-                    }
+                    if (0 <= top[n] && top[n] <= H) raise(squares.array().at(top[n]), left[n], std::min<Index>(W, left[n]), row[begin + n]);
             }
         }
         add(row, y, 0, true, false);

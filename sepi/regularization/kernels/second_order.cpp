@@ -113,15 +113,14 @@ void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = out.shape[1];
     constexpr Number SHARES[] = {FAR, NEAR, NEAR, FAR};
     // with zeros round the picture, as wide as the hats reach
-    const Scratch<Number, 1> lines(2 * w + 2);
-    Number *line = lines.array().data;
-    for (Index i = 0; i < out.shape[0]; ++i) {
-        std::fill_n(line, 2 * w + 2, Number(0));
+    parallel_for(0, out.shape[0], [&](Index i) {
+        const auto lines = zeros<Number, 1>(2 * w + 2);
+        Number *line = lines.array().data;
         for (Index n = 0; n < 4; ++n)
             if (const Index y = 2 * i + n - 2; 0 <= y && y < H) add(line + 2, SHARES[n], vector.at(y + MARGIN, MARGIN), W);
         Number *__restrict target = out.at(i);
         for (Index j = 0; j < w; ++j) target[j] = FAR * (line[2 * j] + line[2 * j + 3]) + NEAR * (line[2 * j + 1] + line[2 * j + 2]);
-    }
+    });
 }
 
 // out becomes inverse * vector, plus the finest hats; returns the inner product of vector and out.
@@ -129,10 +128,10 @@ template <class Number>
 double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2> vector, Array<const Number, 2> fine, Array<Number,
                            2> out) {
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = fine.shape[1];
-    const Scratch<Number, 1> lines(w), all_hats(2 * w);
-    Number *__restrict line = lines.array().data, *__restrict hats = all_hats.array().data;
-    double total = 0;
-    for (Index y = 0; y < H; ++y) {
+    const Scratch<Number, 1> along(H);
+    parallel_for(0, H, [&](Index y) {
+        const Scratch<Number, 1> lines(w), all_hats(2 * w);
+        Number *__restrict line = lines.array().data, *__restrict hats = all_hats.array().data;
         const Number first = y % 2 ? FAR : NEAR, second = y % 2 ? NEAR : FAR;
         const Number *above = fine.at(y / 2), *below = fine.at(y / 2 + 1);
         for (Index j = 0; j < w; ++j) line[j] = first * above[j] + second * below[j];
@@ -143,9 +142,9 @@ double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2
         const Number *row = vector.at(y + MARGIN, MARGIN), *own = inverse.at(y + MARGIN, MARGIN);
         Number *__restrict target = out.at(y + MARGIN, MARGIN);
         for (Index x = 0; x < W; ++x) target[x] = own[x] * row[x] + hats[x];
-        total += double(dot<Number>(row, target, W));
-    }
-    return total;
+        along.array()(y) = dot<Number>(row, target, W);
+    });
+    return in_order(along);
 }
 
 // What the matrix has on its diagonal as hats spacing pixels apart see it, out (h, w).
