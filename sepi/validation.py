@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.renamed import new_name
 
 
 def value_of(text: str) -> Any:
@@ -39,14 +38,11 @@ def settings_of(texts: Iterable[str], example: str) -> dict[str, Any]:
 
 
 def require_known(where: str, names: Iterable[str], known: Iterable[str]) -> None:
-    """Raise for the first of ``names`` that is not ``known``: with its new name, or the nearest and all of them."""
+    """Raise for the first of ``names`` that is not ``known``: with the nearest and all of them."""
     allowed = list(known)
     unknown = next((str(name) for name in names if name not in allowed), None)
     if unknown is None:
         return
-    new = new_name(unknown, allowed)
-    if new is not None:
-        raise SepiError(f"{where}: unknown '{unknown}'; it is now {new}")
     near = difflib.get_close_matches(unknown, allowed, n=1, cutoff=0.5)
     hint = f"did you mean '{near[0]}'? " if near else ""
     raise SepiError(f"{where}: unknown '{unknown}'; {hint}known: {', '.join(allowed) or 'nothing can be set here'}")

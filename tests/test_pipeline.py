@@ -89,7 +89,6 @@ def test_a_variant_overrides_and_the_caller_overrides_it() -> None:
     ("overrides", "complaint"),
     [
         ({"optimise": {}}, "variant, overrides: unknown 'optimise'; did you mean 'optimize'"),
-        ({"initial": {"candidates": 5}}, "initial.sepi: unknown 'candidates'; it is now num_disparities"),
         ({"initial": {"scale": 5}}, "initial.sepi.scale: input should be less than or equal to 2, got 5"),
     ],
 )

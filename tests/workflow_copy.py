@@ -26,8 +26,9 @@ SIZE = 64
 TINY = {
     "builtin": {"scenes": ["dots"], "size": SIZE},
     "stages": {
-        "shared": {"plane_sweep": {"num_disparities": 21}, "base_detail_sweep": {"num_disparities": 21}},
-        "occlusion": {"visibility": {"passes": 1}},
+        "initial": {choice: {"num_disparities": 21} for choice in ("sepi", "semi_global")},
+        "occlusion": {choice: {"num_disparities": 21} for choice in ("half_sepi", "wang")}
+        | {"visibility": {"num_disparities": 21, "passes": 1}},
     },
 }
 

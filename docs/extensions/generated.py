@@ -15,7 +15,6 @@ from sphinx.application import Sphinx
 from sepi.io.files import atomic_path
 from sepi.variants import STAGES
 from sepi.workflow.config import Config
-from sepi.workflow.parameters import GROUPS, SHARED, choices_with, fields_of, shared_by
 
 NAMES = "reference/api_names.txt"
 
@@ -95,19 +94,11 @@ def parameter_tables() -> str:
 
 def _stages() -> list[str]:
     lines = []
-    for group, model in GROUPS.items():
-        lines += [f"### `{SHARED}.{group}`", "", f"Of {_listed(choices_with(group))}.", ""]
-        lines += [*_table(model, fields_of(group)), ""]
     for stage, choices in STAGES.items():
         for name, choice in choices.items():
-            shared = shared_by(choice.parameters)
-            own = [key for key in choice.parameters.model_fields if key not in shared]
-            if not own and not shared:
-                continue
-            lines += [f"### `{stage}.{name}`", ""]
-            if shared:
-                lines += [f"Also has {_listed(f'{SHARED}.{group}' for group in dict.fromkeys(shared.values()))}.", ""]
-            lines += [*(_table(choice.parameters, own) if own else []), ""]
+            own = list(choice.parameters.model_fields)
+            if own:
+                lines += [f"### `{stage}.{name}`", "", *_table(choice.parameters, own), ""]
     return lines
 
 
@@ -141,10 +132,6 @@ def _plain(value: Any) -> str:
     if isinstance(value, BaseModel):
         value = value.model_dump()
     return json.dumps(value, default=str).replace('"', "").replace("|", "\\|")
-
-
-def _listed(names: Any) -> str:
-    return ", ".join(f"`{name}`" for name in names)
 
 
 def write_pages(source: Path) -> None:

@@ -24,7 +24,7 @@ from sepi.scenes import SCENES
 from sepi.validation import require_known
 from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.workflow.datasets import LONGEST_NAME, Scene, own_scene, require_plain_path, scenes_in
-from sepi.workflow.parameters import default_values, stage_settings
+from sepi.workflow.parameters import stage_settings
 from sepi.workflow.rendered_dataset import Rendered
 from sepi.workflow.settings import Report, Settings
 
@@ -145,9 +145,7 @@ class Config(CheckedModel):
         "them.",
     )
     stages: dict[str, dict[str, dict[str, Any] | None] | None] = Field(
-        default_factory=default_values,
-        description="Parameters of each stage, by choice. Those below shared hold for every choice that has them, but "
-        "for one that has its own value below its stage.",
+        {}, description="Parameters of each stage, by choice. What several choices have is explained at the first."
     )
 
 

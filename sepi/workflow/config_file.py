@@ -20,7 +20,6 @@ from pydantic.fields import FieldInfo
 
 from sepi.variants import STAGES
 from sepi.workflow.config import Config
-from sepi.workflow.parameters import GROUPS, SHARED, choices_with, default_values, shared_by
 
 
 def default_yaml() -> str:
@@ -55,18 +54,16 @@ def _without_effect(lines: Iterable[str]) -> list[str]:
 
 
 def _stage_lines() -> list[str]:
-    lines = []
-    for stage, entries in default_values().items():
+    lines: list[str] = []
+    for stage, choices in STAGES.items():
         lines.append(f"  {stage}:")
-        for name, values in entries.items():
-            if stage == SHARED:
-                model, where = GROUPS[name], f"of {', '.join(choices_with(name))}"
-            else:
-                model = STAGES[stage][name].parameters
-                where = ", ".join(f"{SHARED}.{group}" for group in dict.fromkeys(shared_by(model).values()))
-            lines += [f"    # {where}"] if where else []
+        for name, choice in choices.items():
+            values = choice.parameters().model_dump()
             lines.append(f"    {name}:" if values else f"    {name}: {{}}")
-            lines += _fields(model, "      ", values)
+            for field, value in values.items():
+                comment = _comment(choice.parameters.model_fields[field], "      ")
+                # what several choices have is explained at the first
+                lines += [*(comment if comment[0] not in lines else []), f"      {field}: {_flow(value)}"]
     return lines
 
 

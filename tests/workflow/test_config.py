@@ -1,9 +1,7 @@
 """The workflow's configuration: a typing error must be named, not ignored, and config.yaml must tell the truth."""
 
-import inspect
 import json
 import re
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +14,10 @@ from sepi.errors import SepiError
 from sepi.io.disparity_maps import TruthFile
 from sepi.io.exported import write_exported
 from sepi.io.images import write_png
-from sepi.io.readers.formats import FORMATS
-from sepi.renamed import RENAMED
 from sepi.scenes import SCENES, render
-from sepi.stage import Parameters
 from sepi.variants import STAGES, VARIANTS
-from sepi.workflow.config import Config, load_settings
+from sepi.workflow.config import load_settings
 from sepi.workflow.config_file import default_yaml
-from sepi.workflow.parameters import GROUPS
 from sepi.workflow.result_paths import key_of
 from sepi.workflow.settings import Settings
 
@@ -140,16 +134,16 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
         ({"variants": {"complete": {"base": "wang"}}}, "config.variants.complete: a variant's name must be letters"),
         ({"variants": {"a/b": {"base": "wang"}}}, "config.variants.a/b: a variant's name must be letters"),
         (
-            {"stages": {"shared": {"plane_sweeps": {}}}},
-            "config.stages.shared: unknown 'plane_sweeps'; did you mean 'plane_sweep'?",
+            {"stages": {"initial": {"seppi": {}}}},
+            "config.stages.initial: unknown 'seppi'; did you mean 'sepi'?",
         ),
         (
-            {"stages": {"shared": {"plane_sweep": {"canny_low": 0.1}}}},
-            "config.stages.shared.plane_sweep: unknown 'canny_low'; known: num_disparities, scale",
+            {"stages": {"initial": {"sepi": {"canny_low": 0.1}}}},
+            "config.stages.initial.sepi: unknown 'canny_low'; known: num_disparities, scale",
         ),
         (
-            {"stages": {"shared": {"plane_sweep": {"num_disparities": 2}}}},
-            "config.stages.shared.plane_sweep.num_disparities: input should be greater than or equal to 3, got 2",
+            {"stages": {"initial": {"sepi": {"num_disparities": 2}}}},
+            "config.stages.initial.sepi.num_disparities: input should be greater than or equal to 3, got 2",
         ),
         (
             {"disparity_range": {"builtin/dotz": [0, 1]}},
@@ -186,7 +180,7 @@ def test_numbers_left_as_text_are_numbers() -> None:
 
 def test_a_key_with_nothing_below_keeps_its_defaults() -> None:
     """``half_sepi:`` with nothing below it is null in YAML."""
-    stages = {"shared": None, "initial": None, "occlusion": {"half_sepi": None}}
+    stages = {"initial": None, "occlusion": {"half_sepi": None}}
     assert load_settings({"builtin": None, "report": None, "stages": stages}) == load_settings({})
 
 
@@ -206,72 +200,6 @@ def test_own_variants_come_beside_the_builtin_ones() -> None:
         "passes": 2,
         "use_mixture": False,
     }
-
-
-class TestParameters:
-    def test_a_shared_one_is_set_once_for_all_that_have_it(self) -> None:
-        shared = {"plane_sweep": {"num_disparities": 21}, "base_detail": {"colour_scale": 0.1, "detail_scale": 0.2}}
-        values = {"shared": shared, "occlusion": {"wang": {"num_disparities": 31}}}
-        found = load_settings({"stages": values}).parameters
-        sweeps = [("initial", "sepi"), ("occlusion", "half_sepi"), ("occlusion", "wang")]
-        assert [found[stage][word].num_disparities for stage, word in sweeps] == [21, 21, 31]
-        # a choice with another default, and a variant that overrides it, keep their own
-        unlike = [("initial", "semi_global"), ("optimize", "second_order+colour_scale=0.0164+use_detail=False")]
-        alike = [("occlusion", "visibility"), ("optimize", "second_order")]
-        assert [found[stage][word].colour_scale for stage, word in unlike + alike] == [0.0077, 0.0164, 0.1, 0.1]
-        assert {found[stage][word].detail_scale for stage, word in unlike + alike} == {0.2}
-
-    def test_every_one_that_choices_share_is_in_a_group(self) -> None:
-        """Else it would be stated twice."""
-        models = [choice.parameters for choices in STAGES.values() for choice in choices.values()]
-        counts = Counter(base for model in models for base in model.__mro__ if issubclass(base, Parameters))
-        declared = {model for model, count in counts.items() if count > 1 and inspect.get_annotations(model)}
-        assert declared - {Parameters} == set(GROUPS.values())
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [
-        ({"hci_old_root": "/data"}, "config: unknown 'hci_old_root'; it is now hci_2013_root"),
-        (
-            {"stages": {"initial": {"sepi": {"candidates": 21}}}},
-            "sepi: unknown 'candidates'; it is now num_disparities",
-        ),
-        ({"stages": {"shared": {"occluders": {"cover": 1}}}}, "occluders: unknown 'cover'; it is now occlusion_margin"),
-        ({"stages": {"optimize": {"second_order": {"bend": 1}}}}, "'bend'; it is now second_difference_threshold"),
-        (
-            {"stages": {"optimize": {"wls": {"accuracy": 1}}}},
-            "wls: unknown 'accuracy'; it is now rtol",
-        ),
-        (
-            {"stages": {"occlusion": {"visibility_unmixed": {}}}},
-            "config.stages.occlusion: unknown 'visibility_unmixed'; it is now visibility with use_mixture: false",
-        ),
-        (
-            {"variants": {"mine": {"base": "best", "optimize": "gauss_newton"}}},
-            "mine.optimize: unknown 'gauss_newton'; it is now second_order with refinements: 3, solves: 0",
-        ),
-        (
-            {"variants": {"mine": {"base": "best", "textureless": {"trials": 5}}}},
-            "config.variants.mine.textureless: unknown 'trials'; it is now ransac_iterations",
-        ),
-        (
-            {"light_fields": {"a": {"path": "/", "format": "hci-old"}}},
-            "config.light_fields.a.format: unknown 'hci-old'; it is now hci-2013",
-        ),
-    ],
-)
-def test_an_old_name_says_the_new_one(values: dict[str, Any], expected: str) -> None:
-    assert expected in message_of(values)
-
-
-def test_every_new_name_exists() -> None:
-    """A table of names that led to others which were renamed again would help no one."""
-    fields = {name for choices in STAGES.values() for c in choices.values() for name in c.parameters.model_fields}
-    words = {word for choices in STAGES.values() for word in choices}
-    known = fields | words | set(Config.model_fields) | {"hci_2013"} | set(FORMATS)
-    assert not RENAMED.keys() & known
-    assert {new.split()[0] for new in RENAMED.values()} <= known
 
 
 class TestFolderOfScenes:

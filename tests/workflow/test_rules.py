@@ -196,7 +196,7 @@ def test_many_candidates_ask_for_memory_and_time(tmp_path: Path) -> None:
     """Those of a wide range; a cluster would end the job."""
     asked = []
     for number in (91, 911):
-        values = {"shared": {"base_detail_sweep": {"num_disparities": number}}}
+        values = {"initial": {"semi_global": {"num_disparities": number}}}
         found = of_size(512, tmp_path, stages=values)
         memory, minutes = found["stage_memory_for"]("initial", 13, 1300), found["stage_minutes_for"]("initial", 0.2)
         asked.append((memory(scene(), attempt=1), minutes(scene(), attempt=1)))

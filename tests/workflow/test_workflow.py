@@ -44,7 +44,6 @@ from sepi.io.scores import Evaluation, read_scores, write_scores
 from sepi.reading import read_light_field
 from sepi.scenes import render, write_hci
 from sepi.variants import STAGES, VARIANTS
-from sepi.workflow.parameters import GROUPS, SHARED
 
 pytestmark = pytest.mark.workflow
 
@@ -155,8 +154,8 @@ class TestAll:
 
 
 def other_parameters(stage: str, choice: str) -> dict[str, Any]:
-    """One parameter of a choice, or of a group, with a value that is not its default."""
-    model = GROUPS[choice] if stage == SHARED else STAGES[stage][choice].parameters
+    """One parameter of a choice with a value that is not its default."""
+    model = STAGES[stage][choice].parameters
     defaults = model()
     for name in model.model_fields:
         value = getattr(defaults, name)
@@ -184,7 +183,6 @@ RERUNS = {
     ("occlusion", "visibility"): {"occlusion": 4, "textureless": 4, "optimize": 4},
     ("textureless", "uniform_planes"): {"textureless": 4, "optimize": 4},
     ("optimize", "second_order"): {"optimize": 4},
-    ("shared", "plane_sweep"): {"initial": 2, "occlusion": 6, "textureless": 8, "optimize": 12},
 }
 # changed at once: no variant has two of these, so their jobs add up
 CHANGED = [
@@ -193,7 +191,6 @@ CHANGED = [
     [("occlusion", "half_sepi"), ("textureless", "uniform_planes")],
     [("textureless", "lti"), ("optimize", "second_order")],
     [("optimize", "wls")],
-    [("shared", "plane_sweep")],
 ]
 
 
