@@ -6,14 +6,15 @@ from pathlib import Path
 
 import h5py
 
-# where HDF5 itself begins in our files
-BLOCK = 512
+from sepi.io.integrity import digest_block
 
 
 @contextmanager
 def changed(path: Path) -> Iterator[h5py.File]:
-    """The file to change; without its digest afterwards, so that what is in it has to be looked at."""
+    """The file to change; with its digest afterwards, so that what is in it has to be looked at."""
     with h5py.File(path, "r+") as file:
         yield file
     with path.open("r+b") as raw:
-        raw.write(bytes(BLOCK))
+        block = digest_block(raw)
+        raw.seek(0)
+        raw.write(block)

@@ -23,17 +23,7 @@ from sepi.errors import SepiError, printable
 from sepi.interrupts import no_interrupt_lost
 from sepi.io import apart
 from sepi.io.files import PatientFile, atomic_path, reading
-from sepi.io.integrity import (
-    BLOCK,
-    digest_block,
-    fixed_text,
-    has_digest,
-    members,
-    own_attributes,
-    record,
-    require_held,
-    require_sound,
-)
+from sepi.io.integrity import BLOCK, digest_block, fixed_text, is_own, members, require_held, require_sound
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
 from sepi.rig import Rig
 from sepi.stage import ERROR_BARS, CostVolume, StageMaps
@@ -98,7 +88,7 @@ def read_stage(path: Path) -> StageMaps:
 def read_attributes(path: Path, check: bool = True) -> dict[str, Any]:
     """Attributes of an HDF5 file; unchecked, without reading the whole file for its digest."""
     with open_hdf5(path, check=check) as file:
-        return {name: attribute(file, name) for name in own_attributes(file)}
+        return {name: attribute(file, name) for name in file.attrs}
 
 
 def write_light_field(path: str | Path, light_field: LightField) -> None:
@@ -249,8 +239,8 @@ def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
     SepiError
         If HDF5 hangs on it, or crashes, as it does on text of variable length in damaged files.
     """
-    # those of our own were looked at when the file was opened
-    doubtful = holder.attrs.get_id(key).dtype.hasobject and not (has_digest(holder) and key in own_attributes(holder))
+    # our own files were looked at when they were opened
+    doubtful = holder.attrs.get_id(key).dtype.hasobject and not is_own(holder)
     if doubtful and apart.outcome(lambda: holder.attrs[key], _PATIENCE) is None:
         raise SepiError(f"damaged HDF5 file: its attribute '{printable(key)}' cannot be read")
     value = holder.attrs[key]
@@ -295,10 +285,6 @@ def create_hdf5(path: Path) -> Iterator[h5py.File]:
         with no_interrupt_lost(), PatientFile(temporary, "w+") as disk:
             with h5py.File(disk, "w", userblock_size=BLOCK) as file:
                 yield file
-                # what cannot be written cannot be read for its digest either
-                file.flush()
-                if disk.failure is None:
-                    record(file, {})
             if disk.failure is not None:
                 raise disk.failure
         with temporary.open("r+b") as written:

@@ -1,16 +1,13 @@
-"""Whether an HDF5 file holds what was written: digests of its bytes, and of its groups and datasets.
+"""Whether an HDF5 file holds what was written: it begins with a digest of all bytes that follow.
 
-HDF5 may read other numbers from a damaged file, crash, or hang, so damage is told before anything is made of a file. It
-begins with a digest of all that follows it (in what HDF5 calls the user block, which other programs skip). Where that
-does not fit, another process looks whether all that was written is there yet, by digests of groups and datasets: then
-another program only added attributes.
+HDF5 may read other numbers from a damaged file, crash, or hang, so a file is checked before anything is made of it. The
+digest lies in what HDF5 calls the user block, which other programs skip.
 """
 
 from __future__ import annotations
 
 import hashlib
 import io
-import json
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,20 +17,12 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError, printable
-from sepi.io import apart
 from sepi.io.files import DEFLATE_RATIO
 
 BLOCK = 512
 """Bytes of the user block; HDF5 wants a power of two, 512 at least."""
 
 _MARK = b"sepi sha256 "
-# attribute of a group or dataset: digest of it and of what is below it, and its other attributes that are ours
-_OWN = "sepi_sha256"
-# seconds of processor that a file may take but for what its size adds
-_PATIENCE = 1
-_BYTES_A_SECOND = 10_000_000
-# bytes of a dataset that are read at once for its digest
-_PART = 16_000_000
 # a file's time tells a later change when it is so many seconds old, as disks keep times no finer
 _SETTLED = 2
 
@@ -48,13 +37,6 @@ def members(group: h5py.Group | Mapping[str, Any]) -> list[tuple[str, Any]]:
     as anyone keeps that error. Another thread that needs HDF5, be it to forget a file, would wait for ever.
     """
     return list(group.items())
-
-
-def own_attributes(holder: h5py.Group | h5py.Dataset) -> list[str]:
-    """Names of the attributes; in a file of this package, of those that it was written with."""
-    if has_digest(holder) and _OWN in holder.attrs:
-        return list(json.loads(holder.attrs[_OWN].partition(b" ")[2]))
-    return [name for name in holder.attrs if name != _OWN]
 
 
 def require_held(path: Path, dataset: Any) -> None:
@@ -79,7 +61,7 @@ def require_sound(path: Path) -> None:
     now = (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
     sound = _sound.get(now)
     if sound is None:
-        sound = _is_as_written(path) or _was_added_to(path)
+        sound = _is_as_written(path)
         if status.st_mtime < time.time() - _SETTLED:
             _sound[now] = sound
     if not sound:
@@ -93,56 +75,12 @@ def _is_as_written(path: Path) -> bool:
         return not block.startswith(_MARK) or block == digest_block(file)
 
 
-def _was_added_to(path: Path) -> bool:
-    """Whether a file has attributes beside those that were written, and all else is what was written."""
-
-    def found() -> bool:
-        with h5py.File(path, "r") as file:
-            known: dict[Any, bytes] = {}
-            whole = file.attrs[_OWN] == record(file, known, path)
-            return whole and any(len(entry.attrs) > len(own_attributes(entry)) + 1 for entry in known)
-
-    return apart.CAN_TRY and apart.outcome(found, _PATIENCE + path.stat().st_size / _BYTES_A_SECOND) is True
-
-
-def record(entry: h5py.Group | h5py.Dataset, known: dict[Any, bytes], path: Path | None = None) -> bytes:
-    """What tells a group or dataset from a changed one: in the file at ``path``, or for a file that is being written.
-
-    ``known`` are those of entries before: they may have several names.
-    """
-    if entry in known:
-        return known[entry]
-    names = sorted(entry.attrs) if path is None else own_attributes(entry)
-    total = hashlib.sha256()
-    for name in names:
-        value = np.asarray(entry.attrs[name])
-        total.update(repr((name, value.dtype.str, value.tolist())).encode())
-    if isinstance(entry, h5py.Group):
-        for name, member in members(entry):
-            total.update(repr((name, record(member, known, path))).encode())
-    else:
-        if path is not None:
-            require_held(path, entry)
-        total.update(repr((entry.dtype.str, entry.shape)).encode())
-        # a part of what is packed would be unpacked with all that is packed with it
-        rows = max(1, len(entry) if entry.chunks else _PART * len(entry) // max(1, entry.nbytes))
-        for start in range(0, len(entry), rows):
-            total.update(entry[start : start + rows])
-    known[entry] = fixed_text(f"{total.hexdigest()} {json.dumps(names)}")
-    if path is None:
-        entry.attrs[_OWN] = known[entry]
-    return known[entry]
-
-
-def has_digest(holder: h5py.Group | h5py.Dataset) -> bool:
-    """Whether the file, which was opened, begins with a digest, which was looked at then."""
-    with Path(holder.file.filename).open("rb") as file:
-        return file.read(len(_MARK)) == _MARK
-
-
 def is_own(entry: h5py.Group | h5py.Dataset | None) -> bool:
-    """Whether a group or dataset is in a file of this package: others may call theirs so, too."""
-    return entry is not None and _OWN in entry.file.attrs
+    """Whether a group or dataset is in a file that this package wrote: others may call theirs so, too."""
+    if entry is None:
+        return False
+    with Path(entry.file.filename).open("rb") as file:
+        return file.read(len(_MARK)) == _MARK
 
 
 def digest_block(file: io.BufferedReader | io.BufferedRandom) -> bytes:

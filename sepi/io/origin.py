@@ -15,7 +15,6 @@ from pydantic import TypeAdapter, ValidationError
 from sepi.camera import numbers_of
 from sepi.errors import SepiError
 from sepi.io.hdf5 import RIG, Attribute, attribute, open_hdf5, read_dataset
-from sepi.io.integrity import own_attributes
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
@@ -136,7 +135,7 @@ def read_origin(path: Path) -> Origin | None:
     if path.suffix not in (".h5", ".hdf5") or not path.is_file():
         return None
     with open_hdf5(path, "result of 'sepi depth'") as file:
-        known = {name: attribute(file, name) for name in own_attributes(file)}
+        known = {name: attribute(file, name) for name in file.attrs}
         if not {"view_position", "grid"} <= set(known):
             return None
         (t, s), (rows, columns) = (map(int, known[name]) for name in ("view_position", "grid"))
