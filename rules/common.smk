@@ -6,6 +6,7 @@ import json
 import os
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from sepi.command import WORKFLOW_PROCESS
@@ -66,10 +67,27 @@ except OSError as error:
 
 VARIANT_LABELS = {name: variant.labels for name, variant in SETTINGS.variants.items()}
 SCENES_BY_DATASET = {name: SETTINGS.scenes_of(name) for name in SETTINGS.datasets}
+
+
+def placed(path):
+    """Where a file or folder that the rules name is: the prefix of a module is put before it."""
+    return MODIFIER.path_modifier.replace_prefix(f"{path}/").rstrip("/")
+
+
 PLAN = Plan(RESULTS, SCENES_BY_DATASET, VARIANT_LABELS, list(SETTINGS.external), bad_thresholds=SETTINGS.bad_thresholds)
+
+
+def as_far_as_computed(plan):
+    """The plan of a report without the scenes that are not computed, where the user asks for that."""
+    of_scenes = {pair: replace(plan, scenes={pair[0]: [pair[1]]}) for pair in plan.pairs if SETTINGS.report.partial}
+    return plan.without(
+        [pair for pair, one in of_scenes.items() if not all(map(os.path.exists, map(placed, one.number_inputs())))]
+    )
+
+
 # report to its scenes and variants; the main one has no name, the others' files lie in folders of their names
 REPORTS = {
-    plan.report: plan
+    plan.report: as_far_as_computed(plan)
     for plan in (
         PLAN,
         PLAN.comparison(),
@@ -80,11 +98,6 @@ REPORTS = {
         ),
     )
 }
-
-
-def placed(path):
-    """Where a file or folder that the rules name is: the prefix of a module is put before it."""
-    return MODIFIER.path_modifier.replace_prefix(f"{path}/").rstrip("/")
 
 
 def own_file(path):
@@ -110,6 +123,9 @@ SCENE = scene_files("{dataset}", "{scene}")
 # ... and what commands are told that find files by themselves
 PLACED_SCENE = scene_files("{dataset}", "{scene}", Path(placed(RESULTS)))
 LABELS = {stage: f"{{{stage}}}" for stage in STAGES}
+
+if not REPORTS[""].pairs:
+    sys.exit("sepi: config.report.partial: no scene is computed yet")
 
 
 # a file that says that everything of a scene is made
@@ -173,7 +189,7 @@ def final_file(wildcards):
     return PLAN.stage_file(wildcards.dataset, wildcards.scene, wildcards.variant, PLAN.stages[-1])
 
 
-def result_files(variants, scenes=SETTINGS.scenes):
+def result_files(variants, scenes=REPORTS[""].pairs):
     """The final maps of scenes for these variants."""
     return [
         str(PLAN.files(dataset, scene).variant(variant) / name)

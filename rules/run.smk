@@ -1,10 +1,7 @@
 # What a run as a whole does beside its jobs: it takes its folder over from one that was killed, shows how far it is, and says
 # at its end what it wrote.
 
-import subprocess
-import tempfile
 import time
-from shlex import quote
 
 from sepi.workflow.job_server import start_job_server
 from sepi.workflow.run_folder import note_run, put_away, say_if_full, say_so, take_over
@@ -78,57 +75,15 @@ def run_ended_well():
     print_warnings()
     if SETTINGS.report.page is None and not SETTINGS.has_page:
         print(f"sepi: no page of {len(SETTINGS.scenes)} scenes; report.page: true asks for one", flush=True)
+    if REPORTS[""].missing:
+        print(f"sepi: the tables are without {', '.join(REPORTS[''].missing)}, not computed yet", flush=True)
     print_all_written()
 
 
 def run_failed():
-    """Put away what a job left: it may have been killed, the clock set back, the disk be full. Report what there is."""
+    """Put away what a job left: it may have been killed, the clock set back, the disk be full."""
     put_away(MADE)
     say_if_full(Path())
-    # a run that was stopped has more to do
-    scheduler = workflow.scheduler
-    if scheduler.keepgoing and not (scheduler.open_jobs or scheduler.running):
-        report_the_rest()
-
-
-def report_the_rest():
-    """After --keep-going: make the numbers that wait for scenes, and what is made of them, of the other scenes."""
-    dag = workflow.dag
-    unfinished = set(dag.needrun_jobs())
-    waiting = [job for job in unfinished if "sepi.report.numbers" in (job.rule.shellcmd or "")]
-    after, missing = {}, {}
-    for job in sorted(waiting, key=lambda job: job.output[0]):
-        needed = dag.bfs(dag.dependencies, job, stop=lambda before: before not in unfinished)
-        found = {(before.wildcards_dict.get("dataset"), before.wildcards_dict.get("scene")) for before in needed}
-        plan = plan_of(job.wildcards.which)[0].without(found)
-        if plan.scenes and plan.missing and has_made_numbers(job, plan):
-            missing |= dict.fromkeys(plan.missing)
-            after |= {follower: None for follower in dag.depending[job] if follower.rule.shellcmd}
-    for job in after:
-        run_apart(job, job.shellcmd)
-    if missing:
-        print(f"sepi: the tables are without {', '.join(missing)}: a job failed", flush=True)
-        print_all_written()
-
-
-def has_made_numbers(job, plan):
-    """Make a job's numbers of another plan; whether it did."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "plan.json")
-        path.write_text(plan.to_json())
-        if not run_apart(job, job.shellcmd.replace(quote(job.input.plan), quote(str(path)), 1)):
-            return False
-    # older than all that they should be made of: the next run makes them anew, whatever changes
-    oldest = min(os.stat(file).st_mtime for file in job.input if os.path.exists(file))
-    os.utime(job.output[0], (oldest - 1, oldest - 1))
-    return True
-
-
-def run_apart(job, command):
-    """Run a job's command beside Snakemake's books; whether it did its work."""
-    for file in (*job.output, *job.log):
-        Path(file).parent.mkdir(parents=True, exist_ok=True)
-    return subprocess.run(command, shell=True, executable="bash", check=False).returncode == 0
 
 
 # where all that is made is

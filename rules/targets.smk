@@ -1,6 +1,5 @@
 # What the pages, the tables and the pictures consist of, and what they are made of.
 
-from dataclasses import replace
 from importlib.util import find_spec
 
 from sepi.report.plan import COMPARISON, PARTS_TABLES, TEMPLATES

@@ -48,7 +48,7 @@ def table(name: str, runs: Runs) -> Report:
     """One of the tables; its caption says which scenes are left out."""
     report = BUILDERS[name](runs)
     missing = ", ".join(f"`{scene}`" for scene in runs.plan.missing)
-    return replace(report, caption=f"{report.caption} Without {missing}: a job failed.") if missing else report
+    return replace(report, caption=f"{report.caption} Without {missing}, not computed yet.") if missing else report
 
 
 @click.command(name="python -m sepi.report.tables", cls=SepiCommand)

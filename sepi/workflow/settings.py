@@ -44,6 +44,11 @@ class Report(CheckedModel):
         None,
         description=f"whether there is a page; null: for up to {MOST_ON_PAGE} scenes, each of which adds up to 2 MB",
     )
+    partial: bool = Field(
+        False,
+        description="whether the tables are of the scenes alone that are computed, and name the others: after a run in "
+        "which some failed",
+    )
     parts_of_best: bool = Field(
         False,
         description="whether the page also shows the ablation of 'best'; its variants are then run by 'all', too",
