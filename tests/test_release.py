@@ -93,7 +93,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 # of kernels, and what the type checker knows of them
-BUILT = (".so", ".pyi")
+BUILT = (".so", ".pyi", "built_from")
 
 
 def build(tree: Path, kind: str) -> Path:

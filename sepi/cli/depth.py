@@ -73,7 +73,7 @@ def depth(
     colour, how far it may be wrong, confidence, masks and a point cloud; depth in metres where the camera is known.
     With --all-views a map for every view, too, made from those of a few: docs/depth/all_views.md.
 
-    Variants: best (the most accurate), fast (half its time), paper (the method as published), no_sepi, no_occlusion,
+    Variants: best (the most accurate), fast (less accurate), paper (the method as published), no_sepi, no_occlusion,
     no_textureless, no_occlusion_no_textureless, no_noise_correction (parts of it switched off), wang (another treatment
     of occlusion); best_no_detail and others that docs/method/best.md lists (parts of best switched off); acc, cae,
     mishiba, oavc, occ, pobr, spo (other authors' methods), onnx (a network of yours), which docs/reproduce/compared.md

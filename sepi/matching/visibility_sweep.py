@@ -70,7 +70,7 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
     rule: ClassVar[CandidateRule] = CANDIDATES
     needs: ClassVar[Needs] = Needs(bytes_per_candidate=BYTES_PER_CANDIDATE)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/method/best.md")
+    num_disparities: int | None = number_field(CANDIDATES, "docs/method/best_initial.md")
     first_views: int = Field(
         25, ge=2, description="views that all maps but the last compare, at least; spread evenly over the grid"
     )
