@@ -80,6 +80,18 @@ def test_bright_floats_stay_in_their_range() -> None:
     assert float(note.split("up to ")[1].split(" %")[0]) == pytest.approx(100, abs=5)
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_what_is_nearly_white_in_a_darker_view_becomes_white(dtype: npt.DTypeLike) -> None:
+    """A lamp of 252 in a view 8 % too dark would become 16: whole numbers begin anew."""
+    light_field = render("pyramids", size=64, views=3)
+    white = np.iinfo(np.dtype(dtype)).max
+    views = np.rint(light_field.views * (white / 255)).astype(dtype)
+    views[0, 0] = np.rint(0.92 * views[0, 0])
+    views[0, 0, :4, :4] = round(0.99 * white)
+    made = equally_bright(replace(light_field, views=views))
+    assert (made.views[0, 0, :4, :4] == white).all()
+
+
 @pytest.mark.parametrize("variant", ["fast", "paper"])
 def test_unlike_exposures_cost_hardly_any_accuracy(variant: str) -> None:
     """Left as they are, a twentieth more or less light from view to view makes a third of the paper's map wrong."""

@@ -285,6 +285,22 @@ def test_rectified_cameras_are_written_in_the_world_that_they_were_calibrated_in
         np.testing.assert_allclose(np.sort(model.points, axis=0), np.sort(written, axis=0), atol=1e-9)
 
 
+def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path: Path) -> None:
+    """Their lengths would be those of the calibrated one, beside metres of the other."""
+    from sepi.applications.posed_views import posed_views
+    from sepi.io.nerfstudio import write_nerfstudio
+
+    light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)
+    assert light_field.ground_truth is not None
+    write_nerfstudio(tmp_path / "rig", posed_views(light_field, light_field.ground_truth))
+    flags = ("--focal-length", "35", "--baseline", "2", "--focus-distance", "3", "--sensor-size", "24")
+    for name, more in (("as calibrated", ()), ("another", flags)):
+        words = ["depth", str(tmp_path / "rig"), "-o", str(tmp_path / name), "--variant", "fast", *more]
+        assert CliRunner().invoke(main, words, catch_exceptions=False).exit_code == 0
+        assert (tmp_path / name / "depth.pfm").exists()
+        assert any((tmp_path / name).glob("original_*")) == (not more)
+
+
 def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> None:
     """A hand before the lens, or the gantry itself, becomes part of the scene."""
     from sepi.applications.posed_views import posed_views
@@ -497,6 +513,15 @@ def test_tables_of_spreadsheets_and_numbers_as_text_are_taken(tmp_path: Path, se
     for one, two in zip(plain.shots, again.shots, strict=True):
         assert one.lens == two.lens
         assert one.centre.tolist() == two.centre.tolist()
+
+
+def test_an_angle_of_view_is_that_of_the_pictures_width(tmp_path: Path) -> None:
+    """Pictures are rarely square: depth would be wrong by the ratio of their sides."""
+    file = _told_at(tmp_path, "transforms.json", (128, 96)) / "transforms.json"
+    told = json.loads(file.read_text())
+    del told["fl_x"], told["fl_y"]
+    file.write_text(json.dumps(told | {"camera_angle_x": 2 * np.arctan(LENS.width / 2 / LENS.focal[0])}))
+    assert [shot.lens.focal for shot in read_model(file).shots] == [pytest.approx((LENS.focal[0],) * 2)] * 3
 
 
 def test_pictures_are_found_that_moved_with_their_file(tmp_path: Path) -> None:

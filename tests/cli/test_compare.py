@@ -1,5 +1,6 @@
 """`sepi compare`: two maps beside each other on a page, in a real browser; what is wrong with a map, in a line."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -114,6 +115,14 @@ def test_which_map_is_nearer_to_the_truth(page: Any) -> None:
     assert (shown[nearer > 0.1][:, 0] > shown[nearer > 0.1][:, 2]).all()
     assert (shown[nearer < -0.04][:, 0] < shown[nearer < -0.04][:, 2]).all()
     assert (shown[np.isnan(nearer)][:, :3] == (255, 0, 255)).all()
+    # ... and its legend says so of A
+    choose(page, a="change", b="change")
+    legend = page.locator('[data-part="legends"] .legend').first
+    colours = re.findall(r"rgb\((\d+), \d+, (\d+)\)", legend.locator(".bar").get_attribute("style"))
+    (low_red, low_blue), (high_red, high_blue) = (map(int, colours[end]) for end in (0, -1))
+    assert low_red < low_blue
+    assert high_red > high_blue
+    assert re.match(r"less accurate -.* more accurate$", legend.text_content())
 
 
 def test_a_point_cloud_without_a_picture(page: Any) -> None:

@@ -1,5 +1,7 @@
 """Rows of views that are another distance apart than columns: found, measured, and not invented."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,8 +13,9 @@ from sepi.inspection.row_spacing import estimate_row_spacing, settle_row_spacing
 from sepi.inspection.view_layouts import Views
 from sepi.inspection.view_order import check_order
 from sepi.io.readers.options import ORDERS
-from sepi.lightfield import LightField
-from sepi.scenes import SCENES, render
+from sepi.lightfield import DisparityRange, LightField
+from sepi.reading import read_light_field
+from sepi.scenes import SCENES, render, write_hci
 
 
 def every_other(name: str, rows: int, columns: int, views: int = 9) -> LightField:
@@ -70,6 +73,16 @@ def test_the_order_is_found_beside_the_spacing(order: str) -> None:
     found = check_order(read, views=looked_at)
     assert found.clear
     assert found.best == order
+
+
+def test_one_baseline_in_a_benchmark_folder_is_that_of_rows_and_columns(tmp_path: Path) -> None:
+    """Whoever says how far cameras stood apart is not told otherwise by the views."""
+    light_field = replace(every_other("curved_occluders", 2, 1), disparity_range=DisparityRange(-2, 2, "given"))
+    write_hci(light_field, tmp_path / "scene")
+    assert read_light_field(tmp_path / "scene").row_spacing == 1
+    parameters = tmp_path / "scene/parameters.cfg"
+    parameters.write_text(re.sub("baseline_mm.*", "", parameters.read_text()))
+    assert read_light_field(tmp_path / "scene").row_spacing == pytest.approx(2, rel=0.03)
 
 
 def test_what_is_known_is_not_estimated() -> None:

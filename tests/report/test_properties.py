@@ -3,14 +3,19 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from report_results import GLOSSY, VARIANTS, cells_of, csv_rows, numbers_of, only, report_of, with_results
 
 from sepi import variants as built_in
+from sepi.evaluate import evaluations_of
+from sepi.io.scores import write_scores
+from sepi.lightfield import LightField
 from sepi.report import numbers, page
 from sepi.report.page import page_of
 from sepi.report.plan import RENDERED_TABLES, Plan
+from sepi.report.pooled import pooled_q25
 
 
 @pytest.fixture(scope="session")
@@ -40,6 +45,21 @@ def test_pixels_of_all_scenes_count_alike(found: dict[str, Any]) -> None:
     assert "glossy 31.2 %" in found["tables"]["properties_mse"]["caption"]
     # no pixel is of a mirror, none beside a depth step
     assert {"mirror", "discontinuities"}.isdisjoint(report_of(found, "properties_mse").heads)
+
+
+def test_pixels_without_a_depth_are_the_worst_of_those_that_are_pooled(tmp_path: Path) -> None:
+    """Of one scene's map, what is pooled is what the scorer says; a method would else gain by leaving pixels out."""
+    plan = Plan(tmp_path, {"hci": ["cotton"]}, VARIANTS).rendered(["sticks"], [], ["paper"])
+    truth = np.zeros((40, 40), np.float32)
+    map_of_a_third = np.linspace(0, 1, truth.size, dtype=np.float32).reshape(truth.shape)
+    map_of_a_third[13:] = np.nan
+    scene = LightField(np.zeros((2, 2, 40, 40, 3), np.uint8), "sticks", ground_truth=truth)
+    key = plan.stage_key("paper", "optimize")
+    scored = evaluations_of(scene, {key: map_of_a_third})
+    write_scores(plan.scores_file("rendered", "sticks"), scored, {"scene": "sticks"})
+    expected = scored[key].scores["paper"]["all"]["q25"]
+    assert 24 < expected < 26
+    assert pooled_q25(plan)["paper"]["off 1"]["all"] == pytest.approx(expected)
 
 
 def test_intervals_are_told_by_noise_and_property(found: dict[str, Any]) -> None:

@@ -596,6 +596,17 @@ def test_own_light_fields_of_any_format_get_maps(workflow: Workflow, tmp_path: P
     assert again.stage_plan(*targets)["ingest"] == 1
 
 
+def test_truth_of_another_view_is_told_at_the_end(workflow: Workflow, tmp_path: Path) -> None:
+    """Else the tables have no scores of a scene that brought its truth, and nobody knows why."""
+    scene = render("dots", size=SIZE, views=4)
+    write_hci(replace(scene, views=scene.views[::-1, ::-1].copy()), tmp_path / "even")
+    entries = {"even": {"path": str(tmp_path / "even"), "order": "flip-both"}}
+    own = replace(workflow, folder=tmp_path / "run").with_config(hci_root=None, light_fields=entries)
+    result = own.run("results/own/even/truth.h5")
+    assert result.returncode == 0, result.stdout
+    assert re.search(r"^sepi: warning: .*even: its ground truth is of view 1,1", result.stdout, re.MULTILINE)
+
+
 def test_a_failed_job_shows_the_one_clear_line(workflow: Workflow, tmp_path: Path) -> None:
     """A user must not have to look for the log."""
     scene = tmp_path / "scenes" / "broken"

@@ -218,6 +218,13 @@ NAMED: dict[str, tuple[list[str], ReadOptions, list[list[int]], str]] = {
     ),
     # --- signs
     "signs": (by_place("v_{:+d}_{:+d}.png", (-1, 0, 1), (-2, -1, 0)), ReadOptions(), grid_of(3, 3), "columns from -2"),
+    # a minus before each row's number is a sign where columns have signs
+    "signs of one kind in the rows": (
+        by_place("v_{:+d}_{:+d}.png", (-1, -2, -3), (-1, 0, 1)),
+        ReadOptions(),
+        [[6, 7, 8], [3, 4, 5], [0, 1, 2]],
+        "rows from -3",
+    ),
     "signs without separators": (by_place("v{:+03d}{:+03d}.png", (-1, 0, 1), (0, 1)), ReadOptions(), grid_of(3, 2), ""),
     "minus after a letter": (by_place("r{}c{}.png", (-1, 0, 1), (-1, 0)), ReadOptions(), grid_of(3, 2), "rows from -1"),
     "minus after a hyphen": (
