@@ -34,38 +34,24 @@ def is_current() -> bool:
 def build() -> None:
     """Build the kernels in place, one process at a time. Raises `ImportError` if that fails, and prints why."""
     folder = _ROOT / "build" / "kernels"
-    folder.mkdir(parents=True, exist_ok=True)
-    lock = os.open(folder, os.O_RDONLY)
-    fcntl.flock(lock, fcntl.LOCK_EX)
-    configure = [
-        "-G",
-        "Ninja",
-        "-S",
-        _ROOT,
-        "-B",
-        folder,
-        "-DCMAKE_BUILD_TYPE=Release",
-        f"-DPython_EXECUTABLE={sys.executable}",
-    ]
-    environment = os.environ | {
-        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', os.defpath)}"
-    }
-    # CMake would leave one be that is younger than a second
-    _BUILT_FROM.unlink(missing_ok=True)
+    search = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
+    settings = ["-DCMAKE_BUILD_TYPE=Release", f"-DPython_EXECUTABLE={sys.executable}"]
+    configure = ["-G", "Ninja", "-S", _ROOT, "-B", folder, *settings]
     try:
-        for arguments in (configure, ["--build", folder], ["--install", folder, "--prefix", _ROOT]):
-            done = subprocess.run(["cmake", *arguments], env=environment, capture_output=True, text=True, check=False)
-            if done.returncode:
-                print(done.stdout, done.stderr, sep="\n", file=sys.stderr)
-                raise ImportError(
-                    "sepi: the sources of its kernels in this checkout do not build; cmake says why above"
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / "lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            # CMake would leave one be that is younger than a second
+            _BUILT_FROM.unlink(missing_ok=True)
+            for words in (configure, ["--build", folder], ["--install", folder, "--prefix", _ROOT]):
+                done = subprocess.run(
+                    ["cmake", *words], env=os.environ | {"PATH": search}, capture_output=True, text=True, check=False
                 )
-    except FileNotFoundError:
-        raise ImportError(
-            "sepi: its kernels are not built from the sources in this checkout; `make` builds them"
-        ) from None
-    finally:
-        os.close(lock)
+                if done.returncode:
+                    print(done.stdout, done.stderr, sep="\n", file=sys.stderr)
+                    raise ImportError("sepi: the sources of its kernels do not build; cmake says why above")
+    except OSError:
+        raise ImportError("sepi: its kernels are not those of the sources here; `make` builds them") from None
 
 
 if __name__ == "__main__":

@@ -52,7 +52,8 @@ def copy_to(tree: Path) -> None:
     """Copy what git knows or would, and the built kernels."""
     words = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     names = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, check=True).stdout.decode().split("\0")[:-1]
-    kernels = [str(path.relative_to(ROOT)) for path in ROOT.glob("sepi/kernels/*/*.so")]
+    built = [*ROOT.glob("sepi/kernels/*/*.so"), ROOT / "sepi/kernels/built_from"]
+    kernels = [str(path.relative_to(ROOT)) for path in built]
     for name in filter(lambda name: (ROOT / name).is_file(), names + kernels):
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(ROOT / name, tree / name)
@@ -60,11 +61,7 @@ def copy_to(tree: Path) -> None:
 
 def build(tree: Path) -> None:
     """Build the kernels of a tree from its own sources: seconds, after the first time."""
-    cmake = [f"{Path(sys.executable).parent}/cmake"]
-    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
-    settings = ["-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", f"-DPython_EXECUTABLE={sys.executable}"]
-    for words in (["-S", ".", "-B", "build", *settings], ["--build", "build"], ["--install", "build", "--prefix", "."]):
-        subprocess.run(cmake + words, cwd=tree, env=environment, stdout=subprocess.DEVNULL, check=True)
+    subprocess.run([sys.executable, "sepi/kernels/checkout.py", "build"], cwd=tree, check=True)
 
 
 def failing(tree: Path, tests: tuple[str, ...]) -> bool:
