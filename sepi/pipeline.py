@@ -118,8 +118,8 @@ def _after_all_stages(
 
         maps = STAGES[stage][choice].run(light_field, maps, settings[stage], of_all)
         of_all(1.0)
-        if stage == "occlusion":
-            # it looks at most views at once; to clear pages again after each stage takes longer than it is worth
+        if stage in ("initial", "occlusion"):
+            # what they take is the most; later stages would only have to clear the pages again
             give_back_memory()
     assert maps is not None  # there are stages
     return maps
