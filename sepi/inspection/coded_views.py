@@ -1,0 +1,41 @@
+"""Whether views went through a coder that lost some of them, such as JPEG's.
+
+It changes each block of 8x8 pixels by itself, so pixels differ more across the borders of blocks than within them. What
+it loses stands at the same pixels in every view: it matches at disparity 0, and so do surfaces with little texture.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sepi.lightfield import LightField
+
+_BLOCK = 8
+_FEWEST_BLOCKS = 6
+# by how much neighbours differ more across a border than at the other seven places: as a part of that, and in standard
+# deviations
+_MORE, _ERRORS = 0.12, 6.0
+
+
+def coded_views(light_field: LightField) -> str | None:
+    """What to say of views in which the blocks of a coder show; None where none do, or the pictures are too small.
+
+    Parameters
+    ----------
+    light_field : LightField
+        Its reference view is looked at.
+    """
+    grey = light_field.reference_view.mean(axis=2)
+    for axis in (0, 1):
+        steps = np.abs(np.diff(grey, axis=axis)).mean(axis=1 - axis)
+        blocks = len(steps) // _BLOCK
+        if blocks < _FEWEST_BLOCKS:
+            return None
+        of_place = steps[: blocks * _BLOCK].reshape(blocks, _BLOCK).mean(axis=0)
+        others = np.delete(of_place, of_place.argmax())
+        if of_place.max() - others.mean() < max(_MORE * others.mean(), _ERRORS * others.std()):
+            return None
+    return (
+        "the views were compressed with loss (blocks of 8x8 pixels show, as those of JPEG): what was lost stands still "
+        "in all views, and draws what has little texture to disparity 0; take less compressed ones, if there are any"
+    )
