@@ -17,7 +17,7 @@ cmake_minimum_required(VERSION 3.22)
 project(kernels NONE)
 add_custom_command(OUTPUT built DEPENDS "${CMAKE_SOURCE_DIR}/sepi/image/kernels/sums.cpp" VERBATIM
   COMMAND grep -h int "${CMAKE_SOURCE_DIR}/sepi/image/kernels/sums.cpp" > built)
-add_custom_command(OUTPUT built_from DEPENDS built VERBATIM
+add_custom_command(OUTPUT built_from DEPENDS built "${CMAKE_SOURCE_DIR}/CMakeLists.txt" VERBATIM
   COMMAND "${Python_EXECUTABLE}" "${CMAKE_SOURCE_DIR}/sepi/kernels/checkout.py" > built_from)
 add_custom_target(all_of_it ALL DEPENDS built built_from)
 install(FILES "${CMAKE_BINARY_DIR}/built_from" DESTINATION sepi/kernels)
@@ -44,6 +44,11 @@ def test_edited_sources_are_built_again(tmp_path: Path) -> None:
         checkout.build()
         assert checkout.is_current()
         assert (tmp_path / "build/kernels/built").read_text() == text
+
+    (tmp_path / "CMakeLists.txt").write_text(f"{RECIPE}# with other flags\n")
+    assert not checkout.is_current()
+    checkout.build(only_if_changed=True)
+    assert checkout.is_current()
 
     source.write_text("nothing that builds\n")
     with pytest.raises(ImportError, match="do not build"):

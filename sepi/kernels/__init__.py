@@ -18,7 +18,7 @@ LEVEL = "SEPI_KERNELS"
 """Environment variable: ``baseline`` for kernels that all processors can run, to compare them with this one's."""
 
 if not checkout.is_current():
-    checkout.build()
+    checkout.build(only_if_changed=True)
 
 _native = import_module(f"{__name__}.baseline._native")
 if os.environ.get(LEVEL) != "baseline" and _native.has_x86_64_v3() and find_spec(f"{__name__}.x86_64_v3"):

@@ -13,12 +13,13 @@ import sys
 from pathlib import Path
 
 _ROOT = Path(__file__).parents[2]
+_RECIPE = _ROOT / "CMakeLists.txt"
 _BUILT_FROM = Path(__file__).with_name("built_from")
 
 
 def source_digest() -> str:
-    """SHA-256 of the sources of all kernels, in hexadecimal digits."""
-    digest = hashlib.sha256()
+    """SHA-256 of the sources of all kernels and of CMakeLists.txt, in hexadecimal digits."""
+    digest = hashlib.sha256(_RECIPE.read_bytes())
     for source in sorted([*_ROOT.glob("sepi/kernels/*.?pp"), *_ROOT.glob("sepi/*/kernels/*.?pp")]):
         digest.update(source.read_bytes())
     return digest.hexdigest()
@@ -26,12 +27,12 @@ def source_digest() -> str:
 
 def is_current() -> bool:
     """Whether this is no checkout, or its kernels were built from the sources that it has."""
-    if not (_ROOT / "CMakeLists.txt").is_file():
+    if not _RECIPE.is_file():
         return True
     return _BUILT_FROM.is_file() and _BUILT_FROM.read_text() == source_digest()
 
 
-def build() -> None:
+def build(*, only_if_changed: bool = False) -> None:
     """Build the kernels in place, one process at a time. Raises `ImportError` if that fails, and prints why."""
     folder = _ROOT / "build" / "kernels"
     search = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
@@ -41,6 +42,9 @@ def build() -> None:
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / "lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
+            if only_if_changed and is_current():
+                # another process built them meanwhile
+                return
             # CMake would leave one be that is younger than a second
             _BUILT_FROM.unlink(missing_ok=True)
             for words in (configure, ["--build", folder], ["--install", folder, "--prefix", _ROOT]):

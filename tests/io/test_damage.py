@@ -151,7 +151,10 @@ def test_what_another_program_changes_is_told(tmp_path: Path, kind: str) -> None
     def add(file: h5py.File) -> None:
         file["more"] = VALUES
 
-    for change in (change_value, change_attribute, swap, add):
+    def add_note(file: h5py.File) -> None:
+        file.attrs["note"] = "looked at"
+
+    for change in (change_value, change_attribute, swap, add, add_note):
         path.write_bytes(content)
         earlier(path)
         read(path)
