@@ -15,10 +15,10 @@ from sepi.inspection.disparity_range import estimate_range
 from sepi.inspection.view_order import check_order
 from sepi.io.disparity_maps import read_disparity
 from sepi.io.hdf5 import write_light_field
+from sepi.io.map_pictures import colour_code
 from sepi.io.pfm import read_pfm, write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
-from sepi.io.result_folder import colour_code
 from sepi.matching.sheared_views import ShearedViews
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.unknown import unknown_pixels

@@ -62,14 +62,15 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
     from sepi.io.all_views import read_result_at
     from sepi.io.float_pictures import EXR, TIFF, write_exr, write_tiff
     from sepi.io.images import write_png
+    from sepi.io.map_pictures import colour_and_depth
     from sepi.io.pfm import write_pfm
-    from sepi.io.result_folder import colour_and_depth
 
     suffix = output.suffix.lower()
     if kind is not None:
         if suffix != ".png" or name is not None:
             raise SepiError(f"{output}: --to rgbd is a PNG of view and disparity: expected NAME.png, and no --map")
-        write_png(output, colour_and_depth(read_result_at(result_path, seen["view"])))
+        result = read_result_at(result_path, seen["view"])
+        write_png(output, colour_and_depth(result.picture, result.disparity, result.unknown))
         click.echo(f"written: {output} (the view, and its disparity from far, black, to near, white)")
         return
     if suffix not in (*EXR, *TIFF, _PFM):

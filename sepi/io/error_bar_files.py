@@ -12,24 +12,18 @@ from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.io.files import atomic_path
 from sepi.io.images import write_png
+from sepi.io.map_pictures import BEYOND, Picture, in_colours
 from sepi.io.pfm import write_pfm
 from sepi.io.result_files import DEPTH_SIGMA, INTERVAL, SIGMA_PFM, SIGMA_PNG
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.stage import StageMaps
 
-Picture = npt.NDArray[np.uint8]
-
-# part of the pixels beyond each end of the colour scale
-_BEYOND = 0.005
 # a scale of less than a decade would make differences of a map that has none
 _LEAST_SPAN = 10.0
-# neutral grey is none of the colours of the scale; black is a value that is not finite
-_GREY = 128
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 # pixels, of a picture of this height; letters grow with the root of a greater one
 _LEAST_HEIGHT, _BAR, _GAP, _LETTERS = 160, 14, 8, 0.4
@@ -119,24 +113,15 @@ def sigma_picture(sigma: FloatMap, unknown: BoolMap | None = None) -> Picture:
     low, high = _span(sigma[counted])
     with np.errstate(divide="ignore", invalid="ignore"):
         unit = np.log(sigma / np.float32(low)) / np.float32(math.log(high / low))
-    colours = _coloured(np.where(finite, unit, 0))
-    if unknown is not None:
-        colours[unknown] = _GREY
-    colours[~finite] = 0
+    colours = in_colours(np.where(finite, np.clip(unit, 0, 1), np.nan), unknown)
     return _beside_scale(colours, low, high)
 
 
 def _span(values: FloatMap) -> tuple[float, float]:
     """Ends of the scale."""
-    low, high = np.quantile(values.astype(np.float64), (_BEYOND, 1 - _BEYOND)) if values.size else (0.01, 0.01)
+    low, high = np.quantile(values.astype(np.float64), (BEYOND, 1 - BEYOND)) if values.size else (0.01, 0.01)
     wider = math.sqrt(max(1.0, _LEAST_SPAN / float(high / low)))
     return float(low) / wider, float(high) * wider
-
-
-def _coloured(unit: FloatMap) -> Picture:
-    """Colours of 0..1, and of what lies beyond those of the ends."""
-    levels = np.asarray(np.rint(255 * np.clip(unit, 0, 1)), np.uint8)
-    return np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS), np.uint8)[:, :, ::-1].copy()
 
 
 def _beside_scale(colours: Picture, low: float, high: float) -> Picture:
@@ -151,7 +136,7 @@ def _beside_scale(colours: Picture, low: float, high: float) -> Picture:
     left, top, bottom = width + 2 * gap, 2 * gap + line, total - 2 * gap
     rows = bottom - top
     ramp = np.linspace(1, 0, rows, dtype=np.float32)[:, None]
-    picture[top:bottom, left : left + bar] = np.broadcast_to(_coloured(ramp), (rows, bar, 3))
+    picture[top:bottom, left : left + bar] = np.broadcast_to(in_colours(ramp), (rows, bar, 3))
 
     def write(text: str, x: int, y: int) -> None:
         cv2.putText(picture, text, (x, y), _FONT, letters, (0, 0, 0), thick, cv2.LINE_AA)

@@ -12,7 +12,6 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -31,6 +30,7 @@ from sepi.io.hdf5 import (
     read_rig,
 )
 from sepi.io.images import write_png
+from sepi.io.map_pictures import colour_code, levels, write_16bit
 from sepi.io.origin import DIGEST, RESULT
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
@@ -38,17 +38,11 @@ from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import result_attributes
 from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, names_as_taken, remove_files, require_own
 from sepi.io.sound_maps import UNKNOWN, sound_maps
-from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
+from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.rig import Rig
 from sepi.stage import ERROR_BARS, StageMaps
 from sepi.threads import available_cores
-from sepi.validation import described, is_finite, require_map, require_path, require_type
-
-# neutral grey is none of the colours of the scale
-_GREY = 128
-
-# part of the pixels beyond each end of the colour scale, so that a few wrong pixels do not use it up
-_BEYOND = 0.005
+from sepi.validation import described, is_finite, require_path, require_type
 
 _MASK_TEXT = {"Software": "sepi", "Description": "mask: 255 inside, 0 outside"}
 
@@ -263,57 +257,6 @@ def read_result(path: str | Path) -> Result:
     )
 
 
-def colour_code(values: FloatMap, unknown: BoolMap | None = None) -> npt.NDArray[np.uint8]:
-    """A map in perceptually uniform colours, from dark blue (least) to yellow (greatest).
-
-    Parameters
-    ----------
-    values : ndarray, shape (H, W), float32
-        Disparity, or anything else. The colours span its values but for half a percent at either end.
-    unknown : ndarray, shape (H, W), bool, optional
-        Pixels to be shown grey, which take no part of the colour scale.
-
-    Returns
-    -------
-    ndarray, shape (H, W, 3), uint8
-        RGB; black where a value is not finite.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from sepi.io.result_folder import colour_code
-    >>> picture = colour_code(np.array([[0, 1, np.nan, 9]], np.float32), np.array([[False, False, False, True]]))
-    >>> picture[0, 0].tolist(), picture[0, 1].tolist()  # dark blue, yellow
-    ([68, 1, 84], [253, 231, 37])
-    >>> picture[0, 2].tolist(), picture[0, 3].tolist()
-    ([0, 0, 0], [128, 128, 128])
-    """
-    require_map("map to colour", values)
-    finite = np.isfinite(values)
-    # what is unknown takes no part of the scale
-    counted = finite if unknown is None else finite & ~unknown
-    levels = _spread(np.where(finite, values, 0), counted)
-    colours = np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS), np.uint8)[:, :, ::-1].copy()
-    if unknown is not None:
-        colours[unknown] = _GREY
-    colours[~finite] = 0
-    return colours
-
-
-def colour_and_depth(result: Result) -> npt.NDArray[np.uint8]:
-    """The view and, beside it, its disparity from far, black, to near, white: RGB (H, 2 W, 3), as displays take it."""
-    colours = np.broadcast_to(_levels(as_unit_float(result.picture)), (*result.disparity.shape, 3))
-    depth = _spread(result.disparity, ~result.unknown & np.isfinite(result.disparity))
-    return np.hstack([colours, np.repeat(depth[:, :, None], 3, axis=2)])
-
-
-def _spread(values: FloatMap, counted: BoolMap) -> npt.NDArray[np.uint8]:
-    """A map as levels that span what is counted of it, but for a few pixels."""
-    low, high = np.quantile(values[counted], (_BEYOND, 1 - _BEYOND)) if counted.any() else (0.0, 0.0)
-    # a constant map gets the middle one
-    return _levels((values - low) / (high - low) if high > low else np.full(values.shape, 0.5))
-
-
 def _write_files(
     folder: Path,
     light_field: LightField,
@@ -339,7 +282,7 @@ def _write_files(
         # a digest of all views is among them unless it is known, which takes longest, but not Python's lock
         told = pool.submit(result_attributes, light_field, maps, None if digest is None else str(digest))
         written = [
-            pool.submit(_write_16bit, folder / "disparity_16bit.png", maps.disparity),
+            pool.submit(write_16bit, folder / "disparity_16bit.png", maps.disparity),
             pool.submit(write_error_bars, folder, maps, metres, unknown),
             pool.submit(_write_pictures, folder, maps, masks, unknown),
             pool.submit(_write_numbers, folder, light_field, maps, more.get("depth"), seconds),
@@ -356,7 +299,7 @@ def _write_files(
 
 def _write_pictures(folder: Path, maps: StageMaps, masks: Mapping[str, BoolMap], unknown: BoolMap) -> None:
     write_png(folder / "disparity.png", colour_code(maps.disparity, unknown))
-    write_png(folder / "confidence.png", _levels(maps.confidence))
+    write_png(folder / "confidence.png", levels(maps.confidence))
     for name, mask in masks.items():
         write_png(folder / name, mask, _MASK_TEXT)
 
@@ -415,29 +358,3 @@ def write_as_taken(
     for name, values in zip(names_as_taken(position, with_sigma=sigma is not None), maps, strict=True):
         write_pfm(folder / name, values)
     return True
-
-
-def _write_16bit(path: Path, disparity: FloatMap) -> None:
-    """Write disparity as 16-bit grey levels: 0 where it is not finite, 1 to 65535 from its least to its greatest."""
-    finite = np.isfinite(disparity)
-    values = disparity[finite].astype(np.float64)
-    low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
-    scale = (high - low) / 65534 if high > low else 1.0
-    levels = np.zeros(disparity.shape, np.uint16)
-    levels[finite] = np.rint((values - low) / scale) + 1
-    write_png(
-        path,
-        levels,
-        {
-            "Description": "disparity = (value - 1) * scale + offset; value 0: unknown",
-            "scale": repr(scale),
-            "offset": repr(low),
-            "units": "pixels per view step",
-        },
-    )
-
-
-def _levels(unit: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.uint8]:
-    """0..1 as 0..255; not finite as 0."""
-    known = np.nan_to_num(unit, posinf=0, neginf=0)
-    return np.asarray(np.rint(255 * np.clip(known, 0, 1)), np.uint8)

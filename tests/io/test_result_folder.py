@@ -12,8 +12,9 @@ from PIL import Image
 
 from sepi.camera import Camera
 from sepi.errors import SepiError, SepiWarning
+from sepi.io.map_pictures import colour_code
 from sepi.io.result_files import RESULT_FILES
-from sepi.io.result_folder import colour_code, read_result, write_result
+from sepi.io.result_folder import read_result, write_result
 from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.scenes import render
 from sepi.stage import StageMaps
