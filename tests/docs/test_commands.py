@@ -211,6 +211,8 @@ def provide(given: dict[str, Any], made: Path) -> None:
             rows, columns = given["grid"]
             for number, view in enumerate(field.views[:rows, :columns].reshape(-1, 64, 64, 3)):
                 cv2.imwrite(str(path / given["pattern"].format(number=f"{number:03d}")), view)
+        elif given.get("central"):
+            write_hci(render("pyramids", size=64, views=given["central"]), path)
         elif given.get("images"):
             shutil.copytree(made / "rig/sparse/0", path)
             shutil.copytree(made / "rig/images", given["images"])
