@@ -191,7 +191,7 @@ def run(words: list[str]) -> None:
     assert done.exit_code == 0, f"sepi {shlex.join(words)}: {done.output}{done.exception!r}"
 
 
-def provide(given: dict[str, Any], made: Path) -> None:
+def provide(given: dict[str, Any], made: Path, views: int) -> None:
     """Put what a command of ``sepi`` reads where it names it, if nothing is there; the flags tell the kind."""
     for name in ("light_field_path", "ground_truth", "result_path", "estimate", "a", "b", "truth"):
         path = given.get(name)
@@ -211,13 +211,13 @@ def provide(given: dict[str, Any], made: Path) -> None:
             rows, columns = given["grid"]
             for number, view in enumerate(field.views[:rows, :columns].reshape(-1, 64, 64, 3)):
                 cv2.imwrite(str(path / given["pattern"].format(number=f"{number:03d}")), view)
-        elif given.get("central"):
-            write_hci(render("pyramids", size=64, views=given["central"]), path)
         elif given.get("images"):
             shutil.copytree(made / "rig/sparse/0", path)
             shutil.copytree(made / "rig/images", given["images"])
+        elif name in ("light_field_path", "ground_truth"):
+            write_hci(render("pyramids", size=64, views=views), path)
         else:
-            shutil.copytree(made / ("field" if name in ("light_field_path", "ground_truth") else "maps"), path)
+            shutil.copytree(made / "maps", path)
     for setting in given.get("settings", ()):
         if setting.endswith(".onnx"):
             convolution(Path(setting.partition("=")[2]), np.full((1, 9, 1, 1), 0.01))
@@ -229,11 +229,13 @@ def test_commands_run(page: str, made: Path, tmp_path: Path, monkeypatch: pytest
     """A user who pastes one after the other gets an error; so does one who pastes the Python that follows them."""
     monkeypatch.chdir(tmp_path)
     found = blocks(FILES[page].read_text(encoding="utf-8"))
-    for words in (words for _, block in found if is_shell(block) for words in commands(block, tmp_path)):
-        if words[0] == "sepi" and not NOT_RUN & {*words}:
-            command, rest = resolved(words) or (main, [])
-            provide(command.make_context("sepi", rest).params, made)
-            run([*words[1:], *(SMALL if words[1] == "scenes" else ())])
+    said = [words for _, block in found if is_shell(block) for words in commands(block, tmp_path)]
+    called = [words for words in said if words[0] == "sepi" and not NOT_RUN & {*words}]
+    given = [command.make_context("sepi", rest).params for command, rest in filter(None, map(resolved, called))]
+    views = max((params.get("central") or 3 for params in given), default=3)
+    for words, params in zip(called, given, strict=True):
+        provide(params, made, views)
+        run([*words[1:], *(SMALL if words[1] == "scenes" else ())])
     for language, text in found:
         # a Snakefile is highlighted as Python, too
         if language == "python" and not text.startswith("configfile:"):
