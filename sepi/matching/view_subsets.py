@@ -94,10 +94,12 @@ def half_planes(light_field: LightField, directions: int) -> ViewSubsets:
 
 
 def spread_views(light_field: LightField, at_least: int | None) -> BoolMap:
-    """Few views that are spread evenly over the grid and reach as far as all, or nearly so.
+    """Few views that are spread over the grid, reach as far as all or nearly so, and leave out few rows and columns.
 
-    Every second, fourth, ... row and column from the reference view, or of these every other view as on a chess board;
-    the fewest that are ``at_least`` so many, and all views where there are not more.
+    Views on every second row and column repeat the aliases of a texture twice as often as all. So there are also a
+    half of the views, as on a chess board, and a third of them, with ``s + t`` divisible by three; then the same of
+    every second, fourth, ... row and column from the reference view. The fewest of these that are ``at_least`` so
+    many, and all views where there are not more.
 
     Parameters
     ----------
@@ -115,16 +117,14 @@ def spread_views(light_field: LightField, at_least: int | None) -> BoolMap:
     t0, s0 = light_field.reference_position
     down, across = np.indices(light_field.grid) - np.array([t0, s0])[:, None, None]
     chosen = light_field.present
-    step = 1
-    while True:
-        rows_and_columns = (down % step == 0) & (across % step == 0)
-        chess_board = rows_and_columns & ((down + across) // step % 2 == 0)
-        for part in (rows_and_columns, chess_board):
-            fewer = light_field.present & part
+    for step in 2 ** np.arange(max(light_field.grid).bit_length()):
+        rows_and_columns = light_field.present & (down % step == 0) & (across % step == 0)
+        for part in (1, 2, 3):
+            fewer = rows_and_columns & ((down + across) // step % part == 0)
             if fewer.sum() < at_least:
                 return chosen
             chosen = fewer
-        step *= 2
+    return chosen
 
 
 def grid_steps(light_field: LightField) -> npt.NDArray[np.float64]:
