@@ -48,7 +48,7 @@ _TOGETHER = {
 }
 
 # files whose tests of one variant or light field, the last word of their names, share what takes long to make
-_BY_LAST_WORD = ("test_missing_views", "test_real_sets")
+_BY_LAST_WORD = ("test_missing_views", "test_real_sets", "test_relations")
 
 
 def pytest_configure(config: pytest.Config) -> None:
