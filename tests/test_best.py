@@ -24,21 +24,13 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
-    ("name", "mean_error"), [("fronto_parallel", 1e-3), ("slanted_plane", 4e-3), ("pyramids", 1e-2)]
+    ("name", "size", "mean_error"),
+    [("fronto_parallel", 96, 1e-3), ("slanted_plane", 96, 4e-3), ("pyramids", 128, 1e-2)],
 )
-def test_mean_error_on_exact_truth(name: str, mean_error: float) -> None:
-    scene = render(name, size=128)
+def test_mean_error_on_exact_truth(name: str, size: int, mean_error: float) -> None:
+    scene = render(name, size=size)
     found = estimate_depth(replace(scene, ground_truth=None), "best").disparity
     assert np.abs(found - scene.ground_truth)[4:-4, 4:-4].mean() <= mean_error
-
-
-@pytest.mark.parametrize("name", ["fine_structures", "dots", "stripes", "wall"])
-def test_best_is_better_than_the_paper_below_a_pixel(name: str) -> None:
-    """The most accurate variant has to be that on thin things, under noise, and without texture."""
-    scene = render(name, size=128)
-    best, paper = (score(estimate_depth(scene, v).disparity, scene.ground_truth) for v in ("best", "paper"))
-    for measure, part in (("mse100", 0.6), ("q25", 0.6), ("badpix007", 0.3)):
-        assert best[measure] < part * paper[measure], measure
 
 
 def glossy(scene: LightField) -> LightField:
@@ -64,19 +56,25 @@ def test_gloss_does_not_move_faint_texture() -> None:
 
 # 100 x MSE and BadPix 0.07 (%) of variant best on scenes that are edges for the most part
 EDGE_BOUNDS = {
-    "fine_structures": (2.8, 1.25), "stripes": (0.65, 0.6), "curved_occluders": (1.8, 0.3), "dots": (0.75, 0.65),
-    "rack": (11.0, 2.1), "pencils": (3.3, 1.4),
+    "fine_structures": (4.1, 1.9), "stripes": (2.3, 1.18), "curved_occluders": (2.65, 0.29), "dots": (1.64, 1.36),
+    "rack": (16.5, 3.7), "pencils": (7.45, 2.7),
 }  # fmt: skip
+# on thin things, under noise, and without texture
+BETTER_THAN_THE_PAPER = ("fine_structures", "dots", "stripes", "wall")
 
 
-@pytest.mark.parametrize("name", EDGE_BOUNDS)
+@pytest.mark.parametrize("name", [*EDGE_BOUNDS, "wall"])
 def test_edges_are_sharp_and_texture_is_no_edge(name: str) -> None:
     """Surfaces a pixel too wide, or gaps closed, double the error; texture taken for edges leaves bad spots."""
-    scene = render(name, size=192)
-    found = score(estimate_depth(scene, "best").disparity, scene.ground_truth)
-    most, bad = EDGE_BOUNDS[name]
-    assert found["mse100"] <= most
-    assert found["badpix007"] <= bad
+    scene = render(name, size=128)
+    best = score(estimate_depth(scene, "best").disparity, scene.ground_truth)
+    most, bad = EDGE_BOUNDS.get(name, (np.inf, np.inf))
+    assert best["mse100"] <= most
+    assert best["badpix007"] <= bad
+    if name in BETTER_THAN_THE_PAPER:
+        paper = score(estimate_depth(scene, "paper").disparity, scene.ground_truth)
+        for measure, part in (("mse100", 0.6), ("q25", 0.6), ("badpix007", 0.3)):
+            assert best[measure] < part * paper[measure], measure
 
 
 def test_detail_leaves_out_shading_and_edges() -> None:
@@ -127,11 +125,12 @@ def test_parts_of_best_differ_from_it_in_one_thing() -> None:
         assert len(different) == {"best": 0, "best_no_detail": 3, "best_no_denoising": 4}.get(name, 1)
 
 
-@pytest.mark.parametrize("name", ["best_no_mean", "best_no_refinements", "best_no_surfaces"])
-def test_parts_that_noise_needs_change_maps_in_noise(name: str) -> None:
+def test_parts_that_noise_needs_change_maps_in_noise() -> None:
     """A part that a row of the ablation does not switch off would pass for worth nothing."""
-    maps = [estimate_depth(render("dots", size=64, views=7), variant).disparity for variant in ("best", name)]
-    assert np.mean(np.abs(maps[1] - maps[0]) > 1e-3) > 0.05
+    scene = render("dots", size=64, views=7)
+    best = estimate_depth(scene, "best").disparity
+    for name in ("best_no_mean", "best_no_refinements", "best_no_surfaces"):
+        assert np.mean(np.abs(estimate_depth(scene, name).disparity - best) > 1e-3) > 0.05, name
 
 
 def test_sparsification_is_what_its_name_says() -> None:

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,8 +17,8 @@ NAMES = ("curved_occluders", "pyramids", "stripes", "fine_structures")
 
 
 @cache
-def noisy(name: str, sigma: float, **given: Any) -> LightField:
-    return with_noise(render(name, size=96, views=7, **given), sigma)
+def noisy(name: str, sigma: float) -> LightField:
+    return with_noise(render(name, size=96, views=7), sigma)
 
 
 @cache

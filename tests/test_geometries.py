@@ -18,7 +18,7 @@ from sepi.stage import no_progress
 
 pytestmark = pytest.mark.slow
 
-SCENE, SIZE, VIEWS = "curved_occluders", 96, 5
+SCENE, SIZE, VIEWS = "curved_occluders", 64, 5
 
 
 @cache

@@ -32,8 +32,10 @@ SHAPES = {
 
 
 @cache
-def scene(size: int = 64) -> LightField:
-    return render("pyramids", size=size, views=VIEWS)
+def scene() -> LightField:
+    whole = render("pyramids", size=64, views=VIEWS)
+    views, truth = whole.views[:, :, 8:56, 8:56].copy(), whole.ground_truth[8:56, 8:56].copy()
+    return replace(whole, views=views, ground_truth=truth, masks={})
 
 
 def without(light_field: LightField, present: np.ndarray, filling: int = 0) -> LightField:
@@ -57,9 +59,12 @@ def disparity_without(shape: str, variant: str) -> np.ndarray:
     return disparity_of(without(scene(), SHAPES[shape]), variant)
 
 
-@pytest.mark.parametrize("variant", DIFFERENT)
-@pytest.mark.parametrize("shape", SHAPES)
-def test_every_variant_does_without_some_views(variant: str, shape: str) -> None:
+# compared methods are slow, and look at all views, or at those of a row and a column
+@pytest.mark.parametrize(
+    ("shape", "variant"),
+    [(s, v) for s in SHAPES for v in DIFFERENT if v not in METHODS or s in ("star", "row", "upper left")],
+)
+def test_every_variant_does_without_some_views(shape: str, variant: str) -> None:
     """A stage that counts on the full grid would fail here, or give a map that is far worse."""
     disparity = disparity_without(shape, variant)
     assert np.isfinite(disparity).all()
@@ -75,7 +80,7 @@ def test_what_missing_views_hold_is_never_used(variant: str) -> None:
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_range_is_estimated_without_some_views(shape: str) -> None:
-    whole = scene(96)
+    whole = render("pyramids", size=96, views=VIEWS)
     known = estimate_range(without(whole, SHAPES[shape]))
     assert known.minimum <= whole.ground_truth.min() + 0.05
     assert known.maximum >= whole.ground_truth.max() - 0.05

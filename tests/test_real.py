@@ -35,12 +35,17 @@ def test_paper_variant_reaches_the_published_figures(hci: Path, name: str) -> No
     assert result["non_finite"] == 0
 
 
+def small_part(folder: Path) -> LightField:
+    """For the paper's parts, each of which is worth something there."""
+    return part(folder, 144)
+
+
 @pytest.mark.parametrize("name", BOUNDS)
 @pytest.mark.parametrize("variant", ["no_sepi", "no_occlusion", "no_textureless", "no_occlusion_no_textureless"])
 def test_every_part_is_worth_its_place(hci: Path, name: str, variant: str) -> None:
     """Table 4: with a part missing the depth is worse."""
     # bare surfaces are large
-    read = scene if variant == "no_textureless" else part
+    read = scene if variant == "no_textureless" else small_part
     assert final_scores(hci / name, variant, read)["mse100"] > final_scores(hci / name, "paper", read)["mse100"]
 
 
@@ -57,8 +62,8 @@ def test_each_stage_lowers_the_error(hci: Path, name: str) -> None:
 
 def test_half_sepi_beats_the_split_angular_patch(hci: Path) -> None:
     """The paper's text: Wang's occlusion model in place of the half-SEPI is worse on average."""
-    averages = {v: np.mean([final_scores(hci / name, v, part)["mse100"] for name in BOUNDS]) for v in ("paper", "wang")}
-    assert averages["paper"] < averages["wang"]
+    paper, wang = (np.mean([final_scores(hci / n, v, small_part)["mse100"] for n in BOUNDS]) for v in ("paper", "wang"))
+    assert paper < wang
 
 
 def test_range_is_found_without_truth_or_parameters(hci: Path) -> None:
@@ -180,11 +185,11 @@ def test_views_match_better_where_their_cameras_really_stood(real_data: Path) ->
     folder = real_data / "real" / "gantry-jellybeans"
     if not folder.is_dir():
         pytest.skip(f"no real light field at {folder}")
-    whole = read_light_field(folder, options=ReadOptions(order="flip-rows"), check_order=False)
+    whole = read_light_field(folder, options=ReadOptions(order="flip-rows", central=9), check_order=False)
     assert whole.positions is not None
     views = np.ascontiguousarray(whole.views[:, :, 130:230, 280:430])
     known = DisparityRange(-4.5, 2, "given")
-    textured = np.hypot(*np.gradient(as_unit_float(views[8, 8]).mean(axis=2))) > 0.02
+    textured = np.hypot(*np.gradient(as_unit_float(views[4, 4]).mean(axis=2))) > 0.02
 
     def cost(**standing: Any) -> float:
         parameters = SweepParameters(num_disparities=66, window_radius=1)
