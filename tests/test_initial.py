@@ -58,13 +58,6 @@ def test_confidence_is_low_where_there_is_no_texture():
     assert maps.confidence.max() <= 1
 
 
-def test_grey_views_give_depth_too():
-    light_field = render("slanted_plane", size=64, views=5)
-    grey = light_field.views.mean(axis=4, keepdims=True).round().astype(np.uint8)
-    maps = depth(LightField(grey, "grey", disparity_range=light_field.disparity_range), num_disparities=61)
-    assert np.abs(maps.disparity - light_field.ground_truth).mean() < 0.05
-
-
 def test_structure_tensor_follows_the_slope():
     """The ablation is honest only if its stand-in works as far as the method goes."""
     light_field = render("slanted_plane", size=96)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from sepi.compared.methods import METHODS
-from sepi.errors import SepiError
 from sepi.inspection.disparity_range import estimate_range
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
@@ -85,9 +84,3 @@ def test_range_is_estimated_without_some_views(shape: str) -> None:
     assert known.minimum <= whole.ground_truth.min() + 0.05
     assert known.maximum >= whole.ground_truth.max() - 0.05
     assert known.maximum - known.minimum < 3 * (whole.ground_truth.max() - whole.ground_truth.min())
-
-
-def test_structure_tensor_says_what_it_needs() -> None:
-    """It looks at one row and one column of views; without them a map of one value would look like a result."""
-    with pytest.raises(SepiError, match="a second view in the row or the column of view 3,3"):
-        disparity_of(without(scene(), T == S), "no_sepi")

@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from geometries import GEOMETRIES, standing
-from several_threads import SEVERAL, threads
 
 from sepi.boundaries import decision
 from sepi.boundaries.arrays import RimViews, Sides
@@ -149,8 +148,8 @@ def test_dark_views_and_other_exposures_do_no_harm(factor: float) -> None:
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)
-def test_grey_bands_and_threads_change_nothing(geometry: str) -> None:
-    """The same bytes, however much memory and however many processors there are, and for grey as three colours."""
+def test_grey_and_bands_change_nothing(geometry: str) -> None:
+    """The same bytes, however much memory there is, and for grey as three colours."""
     scene = render("dots", size=96)
     assert scene.ground_truth is not None
     wide = cv2.dilate(scene.ground_truth, AROUND)
@@ -162,9 +161,6 @@ def test_grey_bands_and_threads_change_nothing(geometry: str) -> None:
     np.testing.assert_array_equal(assigned_to_surfaces(threefold, wide, USUAL), expected)
     in_bands = replace(field, workspace=Workspace(1))
     np.testing.assert_array_equal(assigned_to_surfaces(in_bands, wide, USUAL), expected)
-    for count in (1, SEVERAL):
-        with threads(count):
-            np.testing.assert_array_equal(assigned_to_surfaces(field, wide, USUAL), expected)
 
 
 def cubic(picture: npt.NDArray[Any], y: float, x: float) -> npt.NDArray[np.float64]:

@@ -1,12 +1,10 @@
 """The compared method of phase-shifted views: its shifts, costs and refinement, and what its publication claims."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
-from several_threads import SEVERAL, threads
 
 from sepi.compared import acc
 from sepi.compared.acc import (
@@ -21,7 +19,6 @@ from sepi.compared.acc_phase_shift import PhaseShift
 from sepi.compared.cost_volumes import disparity_of, least_costs
 from sepi.compared.guided_filter import GuidedFilter
 from sepi.lightfield import DisparityRange, LightField
-from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.stage import CostVolume, no_progress
 
@@ -252,37 +249,6 @@ def test_pictures_without_features_match_nothing() -> None:
         assert len(mutual_matches(none.descriptors, none.descriptors)[0]) == 0
 
 
-def bad_cases() -> Iterator[tuple[str, LightField]]:
-    scene = render("pyramids", size=64, views=5)
-    known = scene.disparity_range
-    present = np.ones((5, 5), bool)
-    present[0], present[3, 3] = False, False
-    yield "row", LightField(scene.views[2:3], "row", disparity_range=known)
-    yield "column", LightField(scene.views[:, 2:3], "column", disparity_range=known)
-    yield "two views", LightField(scene.views[2:3, 1:3], "two", disparity_range=known)
-    yield "missing", replace(scene, present=present)
-    yield "grey", LightField(scene.views[..., :1], "grey", disparity_range=known)
-    yield "tiny", LightField(scene.views[:, :, :24, :24], "tiny", disparity_range=known)
-    yield "two pixels", LightField(scene.views[:, :, :2, :3], "two pixels", disparity_range=known)
-    yield "flat", LightField(np.full_like(scene.views, 90), "flat", disparity_range=known)
-    yield "far", scene.with_range(DisparityRange(-30, 30, "given"))
-
-
-CASES = dict(bad_cases())
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_bad_cases_give_finite_maps(case: str) -> None:
-    """Users have rigs of one row, dark views and small pictures; each pixel gets a depth within the range."""
-    scene = CASES[case]
-    maps = estimate_depth(scene, "acc", FEW)
-    low, high = scene_range(scene)
-    assert maps.disparity.shape == maps.confidence.shape == scene.shape
-    assert maps.disparity.dtype == maps.confidence.dtype == np.float32
-    assert low <= maps.disparity.min() <= maps.disparity.max() <= high
-    assert 0 <= maps.confidence.min() <= maps.confidence.max() <= 1
-
-
 @pytest.mark.parametrize("geometry", GEOMETRIES)
 def test_views_stand_where_their_baselines_say(geometry: str) -> None:
     """Hand-held arrays and rigs with closer rows get the depth that a grid gets."""
@@ -303,14 +269,3 @@ def test_a_plane_gets_its_disparity(stage: str) -> None:
     else:
         found = confident_labels(scene, first, ConfidentLabelsParameters(), no_progress).disparity
         assert np.abs(found - 0.137)[4:-4, 4:-4].max() < 0.5 * step
-
-
-def test_threads_do_not_change_the_bytes() -> None:
-    """Results must not depend on the machine."""
-    scene = render("curved_occluders", size=64, views=3)
-    with threads(SEVERAL):
-        several = estimate_depth(scene, "acc", FEW)
-    with threads(1):
-        one = estimate_depth(scene, "acc", FEW)
-    np.testing.assert_array_equal(one.disparity, several.disparity)
-    np.testing.assert_array_equal(one.confidence, several.confidence)

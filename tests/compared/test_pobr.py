@@ -1,14 +1,11 @@
 """POBR: its labels, the boundary regions, what is shrunk and reinforced there, and light fields of other kinds."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.ndimage import gaussian_filter
 
 from sepi.compared.pobr import (
-    CHOICES,
     PobrCostParameters,
     PobrRegionParameters,
     PobrSmoothingParameters,
@@ -183,53 +180,8 @@ def test_fronto_parallel_plane_has_its_disparity():
     assert np.abs(result.disparity - light_field.ground_truth)[4:-4, 4:-4].max() < 0.01
 
 
-def one_row(light_field):
-    return replace(light_field, views=light_field.views[2:3], present=light_field.present[2:3])
-
-
-def one_column(light_field):
-    return replace(light_field, views=light_field.views[:, 2:3], present=light_field.present[:, 2:3])
-
-
-def two_views(light_field):
-    return replace(light_field, views=light_field.views[2:3, 1:3], present=light_field.present[2:3, 1:3])
-
-
-def with_missing(light_field):
-    present = light_field.present.copy()
-    present[0], present[3, 1] = False, False
-    return replace(light_field, present=present)
-
-
-def grey(light_field):
-    return replace(light_field, views=light_field.views[..., :1])
-
-
-@pytest.mark.parametrize("changed", [one_row, one_column, two_views, with_missing, grey])
-def test_light_fields_of_other_kinds(changed):
-    """Users have light fields that are no square grids of colour views; tiny pictures too."""
-    whole = render("dots", size=64, views=5)
-    light_field = changed(replace(whole, views=whole.views[:, :, 8:32, 8:32], ground_truth=None, masks={}))
-    result = estimate_depth(light_field, "pobr", {"initial": {"num_disparities": 9}})
-    assert result.disparity.shape == (24, 24)
-    assert np.isfinite(result.disparity).all()
-    assert (result.confidence >= 0).all()
-    assert (result.confidence <= 1).all()
-    assert result.disparity.min() >= light_field.disparity_range.minimum - 0.1
-    assert result.disparity.max() <= light_field.disparity_range.maximum + 0.1
-
-
 def test_views_sheared_at_the_true_disparity_cost_least(disc):
     """The data cost of an unoccluded pixel is zero at its disparity."""
     views = ShearedViews(disc)
     out = photo_consistency(views.at(2.0), views.reference, 0.1)
     assert out[28:36, 28:36].max() < 1e-5
-
-
-def test_choices_are_those_of_three_stages():
-    """The variant names them."""
-    assert {stage: list(choices) for stage, choices in CHOICES.items()} == {
-        "initial": ["pobr"],
-        "occlusion": ["pobr"],
-        "optimize": ["pobr"],
-    }

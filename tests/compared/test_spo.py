@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from geometries import GEOMETRIES, standing
-from several_threads import SEVERAL, threads
 
 from sepi.compared.guided_costs import GuidedCostsParameters, guided_costs
 from sepi.compared.spo import SpoParameters, column_weights, peak_weight, side_distances, spo, views_of_directions
@@ -186,74 +185,3 @@ def test_distances_equal_a_plain_twin(scale: float, bins: int, width: int) -> No
     found = np.full((4, width), np.nan, np.float32)
     kernels.half_distances(lines, weights / np.float32(5), bins, found)
     assert np.allclose(found, twin_of_half_distances(lines, weights, bins), atol=1e-6)
-
-
-def test_distances_are_the_same_for_any_number_of_threads() -> None:
-    """If this fails, two runs on the same scene differ."""
-    lines = np.random.default_rng(5).random((5, 3, 16, 20), np.float32)
-    found = np.empty((2, 16, 20), np.float32)
-    for count, distances in zip((1, SEVERAL), found, strict=True):
-        with threads(count):
-            kernels.half_distances(lines, column_weights(0.8) / np.float32(5), 64, distances)
-    assert np.array_equal(*found)
-
-
-def grid_of(rows: int, columns: int, *, channels: int = 3, flat: bool = False) -> LightField:
-    """Small random views of one plane of disparity 0."""
-    picture = np.full((24, 24, channels), 0.5) if flat else np.random.default_rng(6).random((24, 24, channels))
-    views = np.broadcast_to(picture, (rows, columns, 24, 24, channels)).astype(np.float32)
-    return LightField(views, "small", disparity_range=DisparityRange(-1, 1, "given"))
-
-
-def without_cross(light_field: LightField) -> LightField:
-    """The light field without the other views of the reference view's row and column."""
-    present = np.ones(light_field.grid, bool)
-    t, s = light_field.reference_position
-    present[t], present[:, s] = False, False
-    present[t, s] = True
-    return replace(light_field, present=present)
-
-
-AWKWARD = {
-    "one row": grid_of(1, 5),
-    "one column": grid_of(5, 1),
-    "two views": grid_of(1, 2),
-    "grey": grid_of(3, 3, channels=1),
-    "corners only": without_cross(grid_of(3, 3)),
-    "one colour": grid_of(3, 3, flat=True),
-}
-
-
-@pytest.mark.parametrize("case", AWKWARD)
-def test_awkward_light_fields_give_finite_maps(case: str) -> None:
-    """If this fails, a light field that other methods can do ends in an error or in holes."""
-    light_field = AWKWARD[case]
-    maps = estimate_depth(light_field, "spo", {"initial": {"num_disparities": 11}})
-    for values in (maps.disparity, maps.confidence):
-        assert values.shape == light_field.shape
-        assert np.isfinite(values).all()
-    assert maps.confidence.min() >= 0 <= maps.confidence.max() <= 1
-    if case != "one colour":
-        assert np.median(np.abs(maps.disparity)) < WRONG
-
-
-def test_grey_views_give_what_equal_channels_give() -> None:
-    """If this fails, a grey light field has another depth than the same one saved in colour."""
-    grey = grid_of(3, 3, channels=1)
-    parameters = SpoParameters(num_disparities=11)
-    coloured = replace(grey, views=np.repeat(grey.views, 3, axis=4))
-    first, second = (spo(one, None, parameters, no_progress) for one in (grey, coloured))
-    assert np.array_equal(first.disparity, second.disparity)
-
-
-def test_missing_views_are_not_looked_at() -> None:
-    """If this fails, what a missing view's pixels hold by chance changes the depth."""
-    light_field = render("fronto_parallel", size=64, views=5)
-    present = light_field.present.copy()
-    present[2, 0] = present[1, 2] = False
-    views = light_field.views.copy()
-    parameters = SpoParameters(num_disparities=21)
-    first = spo(replace(light_field, present=present), None, parameters, no_progress)
-    views[~present] = 0
-    second = spo(replace(light_field, views=views, present=present), None, parameters, no_progress)
-    assert np.array_equal(first.disparity, second.disparity)

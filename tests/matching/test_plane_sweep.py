@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
 from scipy.ndimage import map_coordinates
-from several_threads import SEVERAL, threads
 
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, residual_variance
@@ -193,23 +192,6 @@ def test_true_slope_is_a_straight_line_in_the_stitched_epi():
 def test_stitched_epi_refuses_a_row_outside():
     with pytest.raises(SepiError, match="row 99 lies outside"):
         stitched_epi(random_light_field(), 99, 0.0)
-
-
-def test_equal_bytes_for_any_number_of_threads():
-    """A rerun on another machine must give the same file."""
-    light_field = render("curved_occluders", size=96, views=5)
-    parameters = SweepParameters(num_disparities=31)
-    views = halves_and_quarters(light_field)
-    scattered = np.random.default_rng(0).random(light_field.shape) < 0.01
-    for subsets, mask in ((None, None), (views.subsets, scattered)):
-        results = []
-        # the number of threads decides how the rows are shared out
-        for number in (1, SEVERAL):
-            with threads(number):
-                groups = None if subsets is None else views.groups
-                results.append(sweep(light_field, parameters, groups=groups, subsets=subsets, mask=mask))
-        for name in ("disparity", "cost", "mean"):
-            np.testing.assert_array_equal(getattr(results[0], name), getattr(results[1], name))
 
 
 def test_dense_candidates_equal_the_numpy_twin():

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from several_threads import SEVERAL, threads
 
 from sepi.kernels import sheared_views
 from sepi.lightfield import LightField, as_unit_float
@@ -87,14 +86,6 @@ def test_cubic_keeps_more_detail_than_bilinear() -> None:
         np.abs(sheared(views, np.array([[0, 0.5]]), cubic)[inner] - expected[4:-4]).max() for cubic in (True, False)
     ]
     assert error[0] < 0.5 * error[1]
-
-
-def test_threads_do_not_change_the_bytes(random_views: np.ndarray) -> None:
-    """Results must not depend on the machine."""
-    with threads(SEVERAL):
-        several = sheared(random_views, OFFSETS)
-    with threads(1):
-        np.testing.assert_array_equal(sheared(random_views, OFFSETS), several)
 
 
 @pytest.fixture(scope="module")

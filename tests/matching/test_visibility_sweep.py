@@ -5,7 +5,6 @@ import itertools
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
-from several_threads import SEVERAL, threads
 
 from sepi.kernels import semi_global, visibility
 from sepi.lightfield import DisparityRange, LightField
@@ -287,30 +286,6 @@ def test_margin_tells_one_minimum_from_two() -> None:
     # what fills vectors behind the last candidate is no other minimum
     semi_global.choose(volume, volume, disparities + 20, 3, disparity, margin)
     np.testing.assert_array_equal(margin, 0)
-
-
-def test_grey_views_give_the_depth_of_equal_colours() -> None:
-    """A grey light field is not worse off than the same one stored as RGB."""
-    scene = render("pyramids", size=64)
-    grey = scene.views[..., 1:2]
-    fields = [
-        LightField(views, "s", disparity_range=scene.disparity_range) for views in (grey, np.repeat(grey, 3, axis=4))
-    ]
-    one, three = (first_depth(f, FirstDepthParameters(num_disparities=21), lambda _: None) for f in fields)
-    np.testing.assert_allclose(one.disparity, three.disparity, atol=1e-3)
-
-
-def test_depth_is_the_same_on_any_number_of_threads() -> None:
-    scene = render("fine_structures", size=64)
-    found = []
-    for number in (1, SEVERAL):
-        with threads(number):
-            first = first_depth(scene, FirstDepthParameters(num_disparities=21), lambda _: None)
-            result = depth_from_visible_views(
-                scene, first.disparity, VisibleViewsParameters(num_disparities=21, passes=1), lambda _: None
-            )
-            found.append((result.disparity.tobytes(), result.confidence.tobytes()))
-    assert found[0] == found[1]
 
 
 def test_progress_ends_at_one() -> None:
