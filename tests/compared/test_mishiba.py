@@ -301,14 +301,3 @@ def test_a_plane_gets_its_disparity(views: int) -> None:
     assert np.percentile(error, 99) * scene.reach < 0.2
     flat = replace(scene, views=np.full_like(scene.views, 90))
     assert estimate_depth(flat, "mishiba").confidence.max() <= 0.01
-
-
-def test_all_views_take_part_where_row_and_column_are_missing() -> None:
-    """Views of another row and column still know the depth."""
-    scene = render("slanted_plane", size=64, views=5)
-    present = np.ones((5, 5), bool)
-    present[2], present[:, 2] = False, False
-    present[2, 2] = True
-    lacking = replace(scene, present=present)
-    np.testing.assert_array_equal(selected_views(lacking), present)
-    assert mean_error(estimate_depth(lacking, "mishiba"), scene) < 0.05
