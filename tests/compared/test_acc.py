@@ -148,15 +148,6 @@ def test_phase_shift_beats_interpolation_on_fine_texture(monkeypatch: pytest.Mon
         assert np.median(errors(scene, 0.137)) > 8 * phase
 
 
-def test_phase_shift_beats_interpolation_on_a_rendered_slope(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where pictures are rendered and rounded to eight bits, with less to gain."""
-    scene = render("slanted_plane", size=64, views=5)
-    phase = np.median(errors(scene, scene.ground_truth))
-    for shifts, part in ((Interpolated, 0.87), (Bilinear, 0.75)):
-        monkeypatch.setattr(acc, "PhaseShift", shifts)
-        assert phase < part * np.median(errors(scene, scene.ground_truth))
-
-
 def test_gradients_along_the_movement_count_at_edges(monkeypatch: pytest.MonkeyPatch) -> None:
     """The publication's second claim: at an edge, a view that moves across it says most by the gradient across.
 

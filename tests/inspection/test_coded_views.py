@@ -24,10 +24,9 @@ def test_blocks_are_told_wherever_they_begin(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("deviation", [0, 3])
-def test_scenes_that_no_coder_saw_have_no_blocks(name: str, deviation: float) -> None:
+def test_scenes_that_no_coder_saw_have_no_blocks(name: str) -> None:
     """Of textures that repeat, too, and in noise."""
     views = render(name, size=192, views=2).views
-    noise = np.random.default_rng(0).normal(0, deviation, views.shape)
+    noise = np.random.default_rng(0).normal(0, 3, views.shape)
     noisy = np.clip(np.rint(views + noise), 0, 255).astype(np.uint8)
-    assert coded_views(LightField(noisy, name)) is None
+    assert coded_views(LightField(views, name)) is coded_views(LightField(noisy, name)) is None

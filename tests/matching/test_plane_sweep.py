@@ -143,21 +143,6 @@ def test_tiles_of_a_wide_picture_fit_together():
     np.testing.assert_allclose(result.mean[0], mean, atol=2e-5)
 
 
-def test_missing_views_are_left_out():
-    """A dark or absent view must not pull the depth of the others."""
-    whole = random_light_field()
-    present = np.ones(whole.grid, bool)
-    present[0, 1] = present[3, 3] = False
-    broken = whole.views.copy()
-    broken[~present] = 0
-    parameters = SweepParameters(num_disparities=7, scale=0.3, window_radius=1, window_sigma=0.5)
-    results = []
-    for views in (whole.views, broken):
-        light_field = LightField(views, "partial", present=present, disparity_range=whole.disparity_range)
-        results.append(sweep(light_field, parameters))
-    np.testing.assert_array_equal(results[0].disparity, results[1].disparity)
-
-
 @pytest.mark.parametrize("geometry", GEOMETRIES)
 @pytest.mark.parametrize("disparity", [-0.75, 0.0, 0.4])
 def test_sweep_visits_the_samples_of_the_stitched_epi(disparity, geometry):
@@ -236,11 +221,6 @@ def test_subset_without_views_matches_nothing():
     assert (result.cost[empty] == 1).all()
     assert (result.mean[empty] == 1).all()
     assert np.isfinite(result.disparity).all()
-
-
-def test_unknown_range_is_an_error_that_says_what_to_give():
-    with pytest.raises(SepiError, match="disparity range unknown"):
-        sweep(LightField(random_light_field().views, "scene"), SweepParameters())
 
 
 def test_noise_level_is_the_noise_put_in():

@@ -157,14 +157,6 @@ def test_evidence_is_what_single_views_add_up_to() -> None:
     assert np.median(evidence.misfit / evidence.agreement) < 1e-4
 
 
-def test_margin_of_the_splines_is_mirrored() -> None:
-    scene = render("dots", size=64)
-    parameters = BaseDetailParameters()
-    splines = spline_views(scene, parameters, Rows(0, scene.shape[0]), scene.present).splines[0, 0, ..., 0]
-    inner = splines[MARGIN:-MARGIN, MARGIN:-MARGIN]
-    np.testing.assert_array_equal(splines, np.pad(inner, MARGIN, mode="reflect"))
-
-
 def test_splines_that_are_kept_are_those_made_anew() -> None:
     """A stage that finds splines of the one before, of other views or without detail, computes with theirs."""
     scene = render("dots", size=64, views=5)
@@ -227,23 +219,6 @@ def weights_of(disparity, reliability=1.0):
     return smoothness_weights(
         disparity, colour_changes(guide), np.full(disparity.shape, reliability, np.float32), 0.1, 0.01
     )
-
-
-def test_planes_cost_nothing() -> None:
-    """The smoothing may not flatten slanted surfaces: with hardly any data a plane stays what it is."""
-    data = plane()
-    matrix = 10 * second_difference_stencil(weights_of(data), data.shape)
-    solution = solve_smooth(matrix, np.full(data.shape, 1e-6, np.float32), data, data, 1e-10, 500)
-    np.testing.assert_allclose(solution, data, atol=1e-5)
-
-
-def test_a_hole_is_filled_by_the_plane_round_it() -> None:
-    data, weight = plane(), np.ones((20, 24), np.float32)
-    data[6:14, 8:16] += 0.05
-    weight[6:14, 8:16] = 0
-    matrix = second_difference_stencil(weights_of(plane()), data.shape)
-    solution = solve_smooth(matrix, weight, data, data, 1e-10, 1000)
-    np.testing.assert_allclose(solution, plane(), atol=2e-4)
 
 
 def second_differences(shape):
