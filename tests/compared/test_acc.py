@@ -118,36 +118,6 @@ def errors(light_field: LightField, true: np.ndarray | float, **parameters: floa
     return np.abs(disparity_of(volume, least_costs(volume)) - true)[8:-8, 8:-8]
 
 
-class Interpolated:
-    """Shifts by interpolation, in the place of the phase shift."""
-
-    cubic = True
-
-    def __init__(self, pictures: np.ndarray, farthest: float) -> None:
-        self.pictures = pictures
-
-    def by(self, offsets: np.ndarray) -> np.ndarray:
-        from sepi.kernels import sheared_views
-
-        out = np.empty((len(offsets), *self.pictures.shape), np.float32)
-        sheared_views.shear(np.broadcast_to(self.pictures, out.shape).copy(), offsets, self.cubic, out)
-        return out
-
-
-class Bilinear(Interpolated):
-    cubic = False
-
-
-def test_phase_shift_beats_interpolation_on_fine_texture(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the publication claims first: sub-pixel depth without the blur of interpolation."""
-    scene = textured(0.137, 0)
-    phase = np.median(errors(scene, 0.137))
-    assert phase < 0.002
-    for shifts in (Interpolated, Bilinear):
-        monkeypatch.setattr(acc, "PhaseShift", shifts)
-        assert np.median(errors(scene, 0.137)) > 8 * phase
-
-
 def test_gradients_along_the_movement_count_at_edges(monkeypatch: pytest.MonkeyPatch) -> None:
     """The publication's second claim: at an edge, a view that moves across it says most by the gradient across.
 

@@ -31,16 +31,6 @@ def scene(name: str, views: int = 5) -> LightField:
     return render(name, size=64, views=views)
 
 
-def with_outliers(light_field: LightField) -> LightField:
-    """Every seventh pixel of all views but the reference view black or white."""
-    random = np.random.default_rng(0)
-    views = light_field.views.copy()
-    hit = random.random(views.shape[:4]) < 0.15
-    hit[light_field.reference_position] = False
-    views[hit] = 255 * random.integers(0, 2, (hit.sum(), 1))
-    return replace(light_field, views=views)
-
-
 def with_noise(light_field: LightField, sigma: float) -> LightField:
     noise = 255 * np.random.default_rng(1).normal(0, sigma, light_field.views.shape)
     return replace(light_field, views=np.clip(np.round(light_field.views + noise), 0, 255).astype(np.uint8))
@@ -69,15 +59,6 @@ def test_entropy_withstands_occluders_and_variance_does_not(name: str) -> None:
     occluded = field.masks["occluded"]
     by_entropy, by_variance = (mean_error(field, costs(field), occluded) for costs in (entropy_costs, variance_costs))
     assert by_entropy < 0.5 * by_variance
-
-
-def test_the_constraint_withstands_outliers() -> None:
-    """Views of a wrong colour would decide: weights by colour leave them out, and the plain entropy counts them."""
-    field = with_outliers(scene("curved_occluders", views=7))
-    occluded = field.masks["occluded"]
-    constrained, plain = (mean_error(field, entropy_costs(field, sigma), occluded) for sigma in (0.1, np.inf))
-    assert constrained < 0.85 * plain
-    assert constrained < 0.4 * mean_error(field, variance_costs(field), occluded)
 
 
 def test_constrained_sub_patches_withstand_occluders() -> None:

@@ -6,21 +6,15 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 import pytest
-from scipy.optimize import linprog
 
 from sepi.compared.guided_filter import GuidedFilter
 from sepi.compared.mishiba import (
-    FULL_WEIGHT,
     LatticeFit,
     MedianDescentParameters,
     MishibaParameters,
     details,
-    lattice_costs,
-    least_interpolated,
     median_descent,
     mishiba,
-    neighbour_weights,
-    refined,
     selected_views,
 )
 from sepi.kernels import mishiba as kernels
@@ -47,15 +41,6 @@ def mean_error(maps: StageMaps, light_field: LightField, region: npt.NDArray[np.
     """Mean absolute error, pixels per view step."""
     error = np.abs(maps.disparity - light_field.ground_truth)
     return float(error[region].mean() if region is not None else error.mean())
-
-
-def error_of_costs(costs: npt.NDArray[np.floating], scene: LightField) -> float:
-    """Mean absolute error of other costs of the candidates of every pixel, treated like the method's own."""
-    dense = MishibaParameters(lattice_step=1, radius=6)
-    costs = costs.astype(np.float32)
-    disparities = PARAMETERS.candidates(scene)
-    maps = refined(disparities, *least_interpolated(scene.reference_view, costs, dense, no_progress))
-    return mean_error(StageMaps(*maps), scene)
 
 
 @pytest.mark.parametrize("step", [1, 2, 3])
@@ -159,68 +144,6 @@ def test_bisection_finds_the_weighted_median(radius: int, gap: int) -> None:
     np.testing.assert_array_equal(found, plain_median_pass(*arguments))
 
 
-def pairs_of(guide: npt.NDArray[np.float32], parameters: MedianDescentParameters) -> list[tuple[int, int, float]]:
-    """The neighbours of the energy and their weights."""
-    table, per_entry = neighbour_weights(parameters, 0.0)
-    height, width = guide.shape[:2]
-    found = []
-    reach = parameters.radius * parameters.gap
-    for y, x in np.ndindex(height, width):
-        for v in range(y, min(y + reach + 1, height), parameters.gap):
-            for u in range(x % parameters.gap, width, parameters.gap):
-                entry = int(((guide[v, u] - guide[y, x]) ** 2).sum() / per_entry)
-                if abs(u - x) <= reach and (v, u) > (y, x) and entry < len(table):
-                    found.append((y * width + x, v * width + u, float(table[entry] / FULL_WEIGHT)))
-    return found
-
-
-def test_passes_come_near_the_least_energy_that_there_is() -> None:
-    """The publication's claim: weighted medians solve approximately what it would take graph cuts to solve."""
-    generator = np.random.default_rng(4)
-    # a dark and a bright surface, with noise and outliers in the data
-    truth = np.where(np.arange(9)[None] + np.arange(9)[:, None] < 8, 0.2, 0.8)
-    guide = np.repeat(truth[..., None], 3, axis=2).astype(np.float32)
-    data = truth + generator.normal(0, 0.03, truth.shape)
-    data[generator.random(truth.shape) < 0.2] = 0.5
-    confidence = generator.uniform(0.2, 1, truth.shape).astype(np.float32)
-    parameters = MedianDescentParameters(radius=1, gap=1)
-    scene = replace(render("fronto_parallel", size=64, views=3), ground_truth=None, masks={})
-    views = np.broadcast_to((guide * 255).round().astype(np.uint8), (3, 3, 9, 9, 3)).copy()
-    light_field = replace(scene, views=views)
-    pairs = pairs_of(light_field.reference_view, parameters)
-
-    def energy(disparity: npt.NDArray[np.floating]) -> float:
-        flat = disparity.ravel().astype(float)
-        fidelity = float((confidence.ravel() * np.abs(flat - data.ravel())).sum())
-        return fidelity + sum(w * abs(flat[p] - flat[q]) for p, q, w in pairs)
-
-    # the energy is a linear programme: bounds above absolute differences are what is minimised
-    n, m = truth.size, len(pairs)
-    rows, right = [], []
-    for index, (p, q, offset) in enumerate(
-        [(i, None, float(data.ravel()[i])) for i in range(n)] + [(p, q, 0.0) for p, q, _ in pairs]
-    ):
-        for sign in (1, -1):
-            row = np.zeros(n + n + m)
-            row[p], row[n + index] = sign, -1
-            if q is not None:
-                row[q] = -sign
-            rows.append(row)
-            right.append(sign * offset)
-    price = np.concatenate([np.zeros(n), confidence.ravel(), [w for *_, w in pairs]])
-    least = linprog(price, np.array(rows), right, bounds=[(None, None)] * n + [(0, None)] * (n + m)).fun
-
-    first = StageMaps(data.astype(np.float32), confidence)
-    after = [
-        energy(median_descent(light_field, first, parameters.model_copy(update={"passes": k}), no_progress).disparity)
-        for k in (1, 8)
-    ]
-    start = energy(data)
-    assert after[0] < 0.9 * start
-    assert after[1] <= after[0] + 1e-6
-    assert least - 1e-3 <= after[1] < 1.02 * least
-
-
 def test_one_bit_features_do_not_see_brightness() -> None:
     """Views of another exposure, or darker towards the grid's corners, must not change the depth."""
     scene = render("fronto_parallel", size=96, views=5)
@@ -228,33 +151,6 @@ def test_one_bit_features_do_not_see_brightness() -> None:
     changed = replace(scene, views=(gain * scene.views / 255 + 0.4 * offset).astype(np.float32))
     before, after = (mean_error(mishiba(one, None, PARAMETERS, no_progress), scene) for one in (scene, changed))
     assert after < 1.1 * before
-
-    # the same views and windows with the variance of the colours instead
-    views, disparities = selected_views(changed), PARAMETERS.candidates(changed)
-    maps = np.array([changed.views[t, s].transpose(2, 0, 1) for t, s in np.argwhere(views)])
-    sheared, costs = np.empty_like(maps), []
-    for disparity in disparities.tolist():
-        sheared_views.shear(maps, -disparity * changed.baselines[views], True, sheared)
-        costs.append(sheared.var(axis=0).sum(axis=0))
-    plain = error_of_costs(np.array(costs), changed)
-    assert plain > 8 * after
-
-
-def test_all_pairs_see_more_through_noise_than_pairs_with_the_reference_view() -> None:
-    """Why all combinations of views are summed: the reference view's own noise spoils all of its pairs."""
-    scene = render("slanted_plane", size=96, views=5)
-    noise = np.random.default_rng(6).normal(0, 0.1, scene.views.shape)
-    noisy = replace(scene, views=(scene.views / 255 + noise).clip(0, 1).astype(np.float32))
-    views, disparities = selected_views(noisy), PARAMETERS.candidates(noisy)
-    reference = int(np.flatnonzero((np.argwhere(views) == noisy.reference_position).all(axis=1))[0])
-    every, own = [], []
-    for disparity in disparities.tolist():
-        of_view = bits(noisy, views, disparity)
-        ones = of_view.sum(axis=0)
-        every.append(ones * (len(of_view) - ones))
-        own.append((of_view != of_view[reference]).sum(axis=0))
-    errors = [error_of_costs(np.array(costs), noisy) for costs in (every, own)]
-    assert errors[0] < 0.75 * errors[1]
 
 
 def test_few_views_and_a_lattice_lose_little() -> None:
@@ -267,28 +163,18 @@ def test_few_views_and_a_lattice_lose_little() -> None:
     assert usual < 1.1 * every_pixel
 
 
-def test_views_of_row_and_column_see_past_an_occluder_as_well_as_all() -> None:
-    """Views chosen before a scene is seen must not be those that an occluder blinds."""
-    scene = render("fine_structures", size=96, views=9)
-    disparities = PARAMETERS.candidates(scene)
-    costs = {"cross": lattice_costs(scene, disparities, PARAMETERS)}
-    every = np.empty_like(costs["cross"])
-    offsets = -disparities[:, None, None].astype(float) * scene.baselines[scene.present]
-    kernels.pair_costs(details(scene, scene.present, 1.0), offsets, 2, every)
-    costs["all"] = every
-    errors = {}
-    for name, one in costs.items():
-        found = least_interpolated(scene.reference_view, one, PARAMETERS, no_progress)
-        errors[name] = mean_error(StageMaps(*refined(disparities, *found)), scene)
-    assert errors["cross"] < 0.85 * errors["all"]
-
-
 def test_medians_take_out_what_bulges_over_edges() -> None:
     """Costs of a window fatten what is in front; the refinement is there to undo that."""
     scene = render("curved_occluders", size=96, views=5)
     first = mishiba(scene, None, PARAMETERS, no_progress)
     after = median_descent(scene, first, MedianDescentParameters(), no_progress)
     assert mean_error(after, scene) < mean_error(first, scene)
+    # what small windows leave, more passes of them take out
+    once, again = (
+        median_descent(scene, first, MedianDescentParameters(radius=1, gap=1, passes=passes), no_progress)
+        for passes in (1, 4)
+    )
+    assert mean_error(again, scene) < mean_error(once, scene)
 
 
 @pytest.mark.parametrize("views", [5, 9])

@@ -13,7 +13,7 @@ from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.matching.sheared_views import ShearedViews
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
-from sepi.stage import CostVolume, StageMaps, no_progress
+from sepi.stage import CostVolume, no_progress
 
 pytestmark = pytest.mark.slow
 
@@ -63,15 +63,6 @@ def errors(light_field: LightField, volume: CostVolume) -> FloatMap:
     return np.asarray(np.abs(volume.disparities[least_costs(volume)] - light_field.ground_truth))
 
 
-def filtered_errors(light_field: LightField, volume: CostVolume) -> FloatMap:
-    """The same of the final map."""
-    nothing = np.zeros(light_field.shape, np.float32)
-    before = StageMaps(nothing, nothing, cost_volume=volume)
-    assert light_field.ground_truth is not None
-    maps = oavc.guided_median(light_field, before, FILTER, no_progress)
-    return np.asarray(np.abs(maps.disparity - light_field.ground_truth))
-
-
 def sheared_example() -> FloatMap:
     """Five views of 6x9 pixels of which some agree; the third is the reference view."""
     random = np.random.default_rng(2)
@@ -91,15 +82,6 @@ def test_votes_find_occluded_pixels_that_the_mean_does_not(name: str, part: floa
     occluded = light_field.masks["occluded"]
     bad = (errors(light_field, voted(name)) > 0.1)[occluded].mean()
     assert bad < part * (errors(light_field, mean_costs(name)) > 0.1)[occluded].mean()
-
-
-@pytest.mark.parametrize(("name", "part"), [("curved_occluders", 0.1), ("fine_structures", 0.5)])
-def test_filtered_votes_are_better_at_occlusions_than_filtered_means(name: str, part: float) -> None:
-    """The filter must not take back at edges what the votes gain."""
-    light_field = scene(name)
-    occluded = light_field.masks["occluded"]
-    bad = (filtered_errors(light_field, voted(name)) > 0.1)[occluded].mean()
-    assert bad < part * (filtered_errors(light_field, mean_costs(name)) > 0.1)[occluded].mean()
 
 
 @pytest.mark.parametrize(("noise", "wrong"), [(0.0, 0.03), (0.02, 0.004), (0.02, 0.01), (0.05, 0.004), (0.05, 0.01)])

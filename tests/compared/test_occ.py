@@ -14,7 +14,6 @@ from sepi.compared.occ import (
     occ,
     occ_field,
     occ_split,
-    predicted_occlusion,
     smoothness_weights,
     split_patch_costs,
     whole_patch_costs,
@@ -91,26 +90,6 @@ def test_split_patches_see_past_an_occluder(slope: float) -> None:
     near = beside_bar(light_field)
     before, after = (score(maps.disparity, truth_of(light_field), region=near)["mse100"] for maps in (whole, split))
     assert after < 0.3 * before
-
-
-def test_patches_split_across_the_edge_see_no_more_than_whole_ones(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The method's claim: the dividing line of the patch runs as the edge does in the picture.
-
-    If this fails, the gain beside occluders comes from something else than the edge's orientation.
-    """
-
-    def turned(view: FloatMap, parameters: OccSplitParameters, reach: float) -> Edges:
-        edges = edges_to_split(view, parameters, reach)
-        places = edges.places.copy()
-        places[:, 2] = (places[:, 2] + ORIENTATIONS // 2) % ORIENTATIONS
-        return edges._replace(places=places)
-
-    monkeypatch.setattr("sepi.compared.occ.edges_to_split", turned)
-    light_field = bar(slope=0.6)
-    whole, split, _ = stages(light_field)
-    near = beside_bar(light_field)
-    before, after = (score(maps.disparity, truth_of(light_field), region=near)["mse100"] for maps in (whole, split))
-    assert after > 0.7 * before
 
 
 def test_stages_improve_on_each_other_at_occlusions() -> None:
@@ -238,9 +217,3 @@ def test_smoothness_is_less_across_edges_and_predicted_occlusions() -> None:
     assert np.all(across[:, [1, 3]] < 0.2 * across[:, [0]])
     np.testing.assert_array_equal(across[:, 5], 0)
     np.testing.assert_array_equal(down[3], 0)
-
-
-def test_no_edges_no_predictions() -> None:
-    """If this fails, light fields without any edge end in warnings or errors."""
-    assert predicted_occlusion(np.empty(0, np.float32), np.empty((0, 3), np.float32)).shape == (0,)
-    np.testing.assert_array_equal(predicted_occlusion(np.ones(4, np.float32), np.ones((4, 3), np.float32)), 0)

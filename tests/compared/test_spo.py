@@ -74,7 +74,6 @@ def test_a_line_beside_an_occluder_keeps_its_depth(scene: str, size: int) -> Non
     near = near_occluders(light_field)
     ours = wrong(light_field, filtered(light_field, spo(light_field, None, parameters, no_progress)), near)
     plain = wrong(light_field, filtered(light_field, varying(light_field, parameters)), near)
-    print(ours, plain)
     assert ours < 0.08
     assert ours < 0.3 * plain
 
@@ -89,7 +88,6 @@ def test_noise_changes_both_sides_alike() -> None:
     everywhere = np.ones(light_field.shape, bool)
     ours = wrong(light_field, filtered(light_field, spo(light_field, None, parameters, no_progress)), everywhere)
     plain = wrong(light_field, filtered(light_field, varying(light_field, parameters)), everywhere)
-    print(ours, plain)
     assert ours < 0.7 * plain
 
 
@@ -152,7 +150,6 @@ def test_a_plane_parallel_to_the_views_gets_its_disparity(geometry: str) -> None
     light_field = render("fronto_parallel", size=64, views=5, **standing(geometry, (5, 5)))
     maps = estimate_depth(light_field, "spo", {"initial": {"num_disparities": 40}})
     error = np.abs(maps.disparity - truth_of(light_field))[6:-6, 6:-6]
-    print(np.median(error), np.percentile(error, 99))
     assert np.median(error) < 0.01
     assert np.percentile(error, 99) < 0.05
 

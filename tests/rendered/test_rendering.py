@@ -23,7 +23,7 @@ from sepi.rendered.exposure import exposed
 from sepi.rendered.masks import MASKS, mask, seen_bits
 from sepi.rendered.options import NOISE, Exposure
 from sepi.rendered.render_file import Render, read_render
-from sepi.rendered.rendering import made_by, render_scene, render_world
+from sepi.rendered.rendering import made_by, render_world
 from sepi.rendered.rig import rig_of
 from sepi.rendered.sampling import gloss_samples, pictured, planned
 from sepi.rendered.tracing import Tracer
@@ -439,11 +439,6 @@ def test_every_ray_of_a_scene_meets_something(name: str) -> None:
             assert apart[1] < bound * apart[0], samples
 
 
-def test_half_of_the_scenes_are_held_out() -> None:
-    assert len(RENDERED) == 12
-    assert sum(entry.for_choosing for entry in RENDERED.values()) == 6
-
-
 @pytest.mark.system
 def test_a_scene_as_a_user_renders_it(tmp_path: Path) -> None:
     """One command writes folders at two noise levels from one render; the most accurate variant reads the clean one."""
@@ -493,8 +488,3 @@ def test_a_light_field_needs_no_albedo_that_it_does_not_share(tmp_path: Path, mo
     """Through a lens no point is sharp, and no view has another's."""
     monkeypatch.delattr(Tracer, "albedo")
     assert rendered(tmp_path, room(), size=32, samples=1, lens=0.5).views.any()
-
-
-def test_render_scene_knows_its_scenes(tmp_path: Path) -> None:
-    with pytest.raises(SepiError, match="did you mean 'glass'"):
-        render_scene("glas", taking(), tmp_path / "glas.h5")
