@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 
 from sepi.built_in_variants import PARTS_OF_BEST
-from sepi.lightfield import DisparityRange, LightField
-from sepi.matching.base_detail import (
-    DETAIL_UNIT,
-    BaseDetailParameters,
-    base_detail_decomposition,
-)
+from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
 from sepi.regularization.border_planes import BorderPlaneParameters, ransac_plane
 from sepi.regularization.uniform_regions import UniformPlanesParameters, plain_pixels
@@ -77,20 +72,6 @@ def test_edges_are_sharp_and_texture_is_no_edge(name: str) -> None:
             assert best[measure] < part * paper[measure], measure
 
 
-def test_detail_leaves_out_shading_and_edges() -> None:
-    """Smooth brightness and strong edges stay in the base, faint texture is the detail."""
-    y, x = np.mgrid[:40, :40]
-    shading = 0.3 + 0.002 * x
-    texture = 0.01 * np.sin(2.5 * x) * np.sin(2.2 * y)
-    step = np.where(x >= 20, 0.4, 0)
-    view = np.repeat((shading + texture + step)[..., None], 3, axis=2).astype(np.float32)
-    field = LightField(np.broadcast_to(view, (1, 2, 40, 40, 3)).copy(), "s")
-    detail = base_detail_decomposition(field, BaseDetailParameters()).detail[0, 0] * DETAIL_UNIT
-    inner = detail[6:-6, 6:-6]
-    assert np.corrcoef(inner.ravel(), texture[6:-6, 6:-6].ravel())[0, 1] > 0.95
-    assert np.abs(inner).max() < 0.03
-
-
 def test_uniform_is_what_the_noise_explains() -> None:
     """Faint texture above the noise is texture, whatever its contrast; noise is not."""
     random = np.random.default_rng(0)
@@ -143,9 +124,3 @@ def test_sparsification_is_what_its_name_says() -> None:
     assert np.all(oracle(error) <= curve + 1e-9)
     unknown = np.full((2, 2), np.nan, np.float32)
     assert np.isnan(sparsification(confidence, unknown)).all()
-
-
-def test_range_narrower_than_the_scene_is_no_crash() -> None:
-    scene = render("pyramids", size=64, views=5)
-    narrow = scene.with_range(DisparityRange(0.0, 0.1, "given"))
-    assert np.isfinite(estimate_depth(narrow, "best").disparity).all()

@@ -15,7 +15,6 @@ from sepi.regularization.wls import (
     smoothness_coefficient,
     solve,
 )
-from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 
 
@@ -78,13 +77,6 @@ def test_energy_is_the_sum_of_equation_8():
     assert quadratic == pytest.approx(energy, rel=1e-5)
 
 
-def test_constant_depth_stays_as_it_is():
-    light_field = light_field_of(render("wall", size=64, views=3).views[1, 1])
-    flat = np.full(light_field.shape, 0.7, np.float32)
-    maps = run(light_field, StageMaps(flat, np.random.default_rng(0).random(flat.shape).astype(np.float32)))
-    np.testing.assert_allclose(maps.disparity, 0.7, atol=1e-5)
-
-
 def test_doubtful_outliers_are_pulled_to_their_surface():
     light_field = light_field_of(np.full((60, 60, 3), 120, np.uint8))
     disparity = np.zeros((60, 60), np.float32)
@@ -122,9 +114,3 @@ def test_texture_less_pixels_have_the_papers_confidence():
     rectified = rectified_confidence(maps.confidence, maps.mask("textureless"), WlsParameters())
     np.testing.assert_allclose(rectified[:3], 0.8)
     assert (np.diff(rectified[3:].ravel()) >= 0).all()
-
-
-def test_none_hands_the_depth_on():
-    light_field = light_field_of(np.full((20, 20, 3), 120, np.uint8))
-    maps = StageMaps(np.zeros((20, 20), np.float32), np.ones((20, 20), np.float32))
-    assert CHOICES["none"].run(light_field, maps, CHOICES["none"].parameters(), no_progress) is maps

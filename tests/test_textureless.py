@@ -83,11 +83,6 @@ def test_never_worse_on_scenes_without_bare_surfaces(scene):
     assert after <= 1.02 * before
 
 
-def test_none_hands_the_depth_on():
-    light_field, _, _, maps = bare_plane()
-    assert CHOICES["none"].run(light_field, maps, CHOICES["none"].parameters(), no_progress) is maps
-
-
 def test_lti_is_the_share_of_inner_texture_points():
     """Eq. 6, counted by hand: texture on a superpixel's rim does not count."""
     segments = tiles((20, 20), 10)

@@ -1,8 +1,7 @@
-"""The detail of the views equals a plain NumPy twin, and OpenCV's filter nearly so."""
+"""The detail of the views equals a plain NumPy twin."""
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 
@@ -43,18 +42,6 @@ def test_detail_equals_a_plain_twin(dtype: type, channels: int) -> None:
     for s in range(2):
         expected = detail_twin(as_unit_float(field.rgb_views[0, s]), 3, edge, 2.5)
         np.testing.assert_allclose(found[0, s], expected, atol=1.5 * DETAIL_UNIT)
-
-
-def test_the_filter_is_nearly_opencvs_bilateral_filter() -> None:
-    """Its weights are nearly Gaussian."""
-    field = render("pyramids", size=64)
-    parameters = BaseDetailParameters()
-    edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(field.reference_view)))
-    view = field.reference_view
-    base = cv2.bilateralFilter(view, 2 * parameters.base_radius + 1, edge, parameters.base_sigma_space)
-    found = base_detail_decomposition(field, parameters).detail[field.reference_position] * DETAIL_UNIT
-    expected = (view - base).mean(axis=2)
-    assert np.abs(found - expected).mean() < 0.06 * np.abs(expected).mean()
 
 
 def test_some_rows_of_some_views_are_those_of_the_whole() -> None:

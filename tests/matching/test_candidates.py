@@ -12,7 +12,7 @@ from sepi.matching.plane_sweep import CANDIDATES as PAPER
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.visibility_sweep import CANDIDATES as BEST
 from sepi.matching.visibility_sweep import FirstDepthParameters
-from sepi.scenes import SCENES, render
+from sepi.scenes import render
 from sepi.variants import STAGES
 
 PIXELS = 512 * 512
@@ -28,15 +28,6 @@ def test_light_fields_like_the_papers_get_the_published_number(width: float) -> 
     """9x9 views and ranges of 2 to 8 pixels; any other number would change scores that are published."""
     assert PAPER.number(width, 4, PIXELS) == 181
     assert BEST.number(width, 4, PIXELS) == 91
-
-
-@pytest.mark.parametrize("scene", SCENES)
-def test_built_in_scenes_get_the_usual_number(scene: str) -> None:
-    # of the views, only where they stand counts
-    usual = LightField(np.zeros((9, 9, 64, 64, 1), np.uint8), scene)
-    light_field = replace(usual, disparity_range=render(scene, size=64, views=3).disparity_range)
-    assert SweepParameters().number(light_field) == 181
-    assert FirstDepthParameters().number(light_field) == 91
 
 
 @pytest.mark.parametrize("rule", [PAPER, BEST, CandidateRule(91, 0.1, 0.35)])

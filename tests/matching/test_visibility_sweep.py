@@ -286,14 +286,3 @@ def test_margin_tells_one_minimum_from_two() -> None:
     # what fills vectors behind the last candidate is no other minimum
     semi_global.choose(volume, volume, disparities + 20, 3, disparity, margin)
     np.testing.assert_array_equal(margin, 0)
-
-
-def test_progress_ends_at_one() -> None:
-    seen: list[float] = []
-    scene = render("fronto_parallel", size=64)
-    first = first_depth(scene, FirstDepthParameters(num_disparities=5), seen.append)
-    assert seen[-1] == 1
-    seen.clear()
-    depth_from_visible_views(scene, first.disparity, VisibleViewsParameters(num_disparities=5), seen.append)
-    assert seen[-1] == 1
-    assert np.all(np.diff(seen) >= 0)

@@ -262,14 +262,6 @@ def test_shapes_grow_with_the_picture_and_disparities_stay() -> None:
     assert (np.abs(large.ground_truth[np.ix_(at, at)] - small.ground_truth) < 0.05).mean() > 0.95
 
 
-def test_default_is_nine_by_nine_views_of_192_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
-    # black ones are drawn at once
-    monkeypatch.setattr(rendering, "render_view", lambda scene, size, *_: np.zeros((size, size, 3), np.float32))
-    light_field = render("fronto_parallel")
-    assert light_field.views.shape == (9, 9, 192, 192, 3)
-    assert light_field.views.dtype == np.uint8
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
