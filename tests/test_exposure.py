@@ -35,7 +35,8 @@ def unlike(light_field: LightField, deviation: float) -> LightField:
 
 def test_views_that_are_alike_stay_as_they_are() -> None:
     """What moves into a view and out of it changes its brightness, too: taken for exposure it would do harm."""
-    fields = {name: render(name, size=64) for name in SCENES}
+    # the outermost views, in which most has moved, are among these
+    fields = {name: LightField(render(name, size=64).views[::2, ::2], name) for name in SCENES}
     assert [name for name, field in fields.items() if equally_bright(field) is not field] == []
 
 

@@ -324,8 +324,8 @@ def test_a_lens_blurs_what_is_out_of_focus(tmp_path: Path) -> None:
 
 
 def test_errors_of_cameras_move_pictures_and_not_the_reference(tmp_path: Path) -> None:
-    straight = rendered(tmp_path, room(), size=48)
-    turned, off = (rendered(tmp_path, room(), size=48, position_error=0.3, rotation_error=r) for r in (0.1, 0.2))
+    straight = rendered(tmp_path, room(), size=32)
+    turned, off = (rendered(tmp_path, room(), size=32, position_error=0.3, rotation_error=r) for r in (0.1, 0.2))
     assert np.array_equal(turned.views[1, 1], off.views[1, 1])
     assert not np.array_equal(turned.views[0, 0], off.views[0, 0])
     assert np.array_equal(straight.disparity[1, 1], off.disparity[1, 1])
@@ -334,7 +334,7 @@ def test_errors_of_cameras_move_pictures_and_not_the_reference(tmp_path: Path) -
     assert off.turns[1, 1].tolist() == [0, 0, 0]
     assert 0.1 < np.std((off.positions - straight.positions)[:, :, 0]) < 0.6
     assert not np.array_equal(straight.disparity[0, 0], off.disparity[0, 0])
-    wide = rendered(tmp_path, room(), size=48, baseline=2.0)
+    wide = rendered(tmp_path, room(), size=32, baseline=2.0)
     assert np.allclose(wide.disparity[1, 1], 2 * straight.disparity[1, 1], atol=1e-5)
 
 
