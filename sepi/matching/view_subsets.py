@@ -37,6 +37,8 @@ SIDES = {"left": (0, -1), "right": (0, 1), "up": (-1, 0), "down": (1, 0)}
 
 QUARTERS = (("left", "up"), ("left", "down"), ("right", "up"), ("right", "down"))
 
+_HARDLY_MORE = 1.1
+
 HALVES_AND_QUARTERS = ("full", *SIDES, *(f"{a}-{b}" for a, b in QUARTERS))
 """Names of the subsets of :func:`halves_and_quarters`."""
 
@@ -94,12 +96,10 @@ def half_planes(light_field: LightField, directions: int) -> ViewSubsets:
 
 
 def spread_views(light_field: LightField, at_least: int | None) -> BoolMap:
-    """Few views that are spread over the grid, reach as far as all or nearly so, and leave out few rows and columns.
+    """Few views that are spread evenly over the grid and reach as far as all, or nearly so.
 
-    Views on every second row and column repeat the aliases of a texture twice as often as all. So there are also a
-    half of the views, as on a chess board, and a third of them, with ``s + t`` divisible by three; then the same of
-    every second, fourth, ... row and column from the reference view. The fewest of these that are ``at_least`` so
-    many, and all views where there are not more.
+    Every second, fourth, ... row and column from the reference view, or of these every other view as on a chess board;
+    the fewest that are ``at_least`` so many, and all views where there are not more.
 
     Parameters
     ----------
@@ -117,14 +117,47 @@ def spread_views(light_field: LightField, at_least: int | None) -> BoolMap:
     t0, s0 = light_field.reference_position
     down, across = np.indices(light_field.grid) - np.array([t0, s0])[:, None, None]
     chosen = light_field.present
-    for step in 2 ** np.arange(max(light_field.grid).bit_length()):
-        rows_and_columns = light_field.present & (down % step == 0) & (across % step == 0)
-        for part in (1, 2, 3):
-            fewer = rows_and_columns & ((down + across) // step % part == 0)
+    step = 1
+    while True:
+        rows_and_columns = (down % step == 0) & (across % step == 0)
+        chess_board = rows_and_columns & ((down + across) // step % 2 == 0)
+        for part in (rows_and_columns, chess_board):
+            fewer = light_field.present & part
             if fewer.sum() < at_least:
                 return chosen
             chosen = fewer
-    return chosen
+        step *= 2
+
+
+def views_without_aliases(light_field: LightField, at_least: int) -> BoolMap:
+    """Few views for matching, on all rows and columns: :func:`spread_views` where no such ones are as few.
+
+    Views on every second row and column repeat the aliases of a texture twice as often as all views do. These do not:
+    a third of the views, with ``s + t`` divisible by three (of 17x17 views those on every second row and column); nine
+    views, the reference view and eight around it that are as far along one axis as there are views and one along the
+    other.
+
+    Parameters
+    ----------
+    light_field : LightField
+    at_least : int
+
+    Returns
+    -------
+    ndarray, shape (T, S), bool
+        Views that are present; the reference view is among them.
+    """
+    t0, s0 = light_field.reference_position
+    down, across = np.indices(light_field.grid) - np.array([t0, s0])[:, None, None]
+    near, far = np.sort(np.abs([down, across]), axis=0)
+    reach = min(t0, s0, light_field.grid[0] - 1 - t0, light_field.grid[1] - 1 - s0)
+    moves = (far == 0) | ((near == 1) & (far == reach))
+    thirds = [(down % step == 0) & (across % step == 0) & ((down + across) // step % 3 == 0) for step in (1, 2, 4)]
+    for few in (moves, *thirds):
+        present = light_field.present & few
+        if at_least <= present.sum() <= _HARDLY_MORE * at_least:
+            return present
+    return spread_views(light_field, at_least)
 
 
 def grid_steps(light_field: LightField) -> npt.NDArray[np.float64]:

@@ -42,7 +42,7 @@ from sepi.matching.semi_global import (
     SmoothingParameters,
 )
 from sepi.matching.sweep_arrays import Visibility, sampled_candidates
-from sepi.matching.view_subsets import spread_views
+from sepi.matching.view_subsets import spread_views, views_without_aliases
 from sepi.stage import Needs, Progress
 
 CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**30)
@@ -72,7 +72,9 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/method/best_initial.md")
     first_views: int = Field(
-        27, ge=2, description="views that all maps but the last compare, at least; spread evenly over the grid"
+        25,
+        ge=2,
+        description="views that all maps but the last compare, at least; spread over all rows and columns of the grid",
     )
     first_sampling: float = Field(
         2.0, ge=1, le=8, description="distance of their candidates; 1: as num_disparities says"
@@ -141,7 +143,7 @@ def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, 
     SepiError
         If the disparity range is unknown.
     """
-    views = spread_views(light_field, parameters.first_views)
+    views = views_without_aliases(light_field, parameters.first_views)
     volumes = _volumes(light_field, parameters, parameters.first_sampling)
     return _sweep(light_field, views, parameters.first_sampling, None, None, parameters, volumes, progress)
 
@@ -181,7 +183,7 @@ def depth_from_visible_views(
         If the disparity range is unknown.
     """
     n, noise = parameters.passes, parameters.mean_noise
-    few = spread_views(light_field, parameters.first_views)
+    few = views_without_aliases(light_field, parameters.first_views)
     if parameters.gaps:
         disparity = with_open_gaps(light_field, disparity, few, parameters)
     volumes = _volumes(light_field, parameters, *([parameters.first_sampling] * (n > 1)), parameters.sampling)
