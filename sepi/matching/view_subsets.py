@@ -37,6 +37,7 @@ SIDES = {"left": (0, -1), "right": (0, 1), "up": (-1, 0), "down": (1, 0)}
 
 QUARTERS = (("left", "up"), ("left", "down"), ("right", "up"), ("right", "down"))
 
+# of a number of views, times
 _HARDLY_MORE = 1.1
 
 HALVES_AND_QUARTERS = ("full", *SIDES, *(f"{a}-{b}" for a, b in QUARTERS))
@@ -130,12 +131,10 @@ def spread_views(light_field: LightField, at_least: int | None) -> BoolMap:
 
 
 def views_without_aliases(light_field: LightField, at_least: int) -> BoolMap:
-    """Few views for matching, on all rows and columns: :func:`spread_views` where no such ones are as few.
+    """As :func:`spread_views`, or a third of the views, with ``s + t`` divisible by three, where these are hardly more.
 
-    Views on every second row and column repeat the aliases of a texture twice as often as all views do. These do not:
-    a third of the views, with ``s + t`` divisible by three (of 17x17 views those on every second row and column); nine
-    views, the reference view and eight around it that are as far along one axis as there are views and one along the
-    other.
+    Views on every second row and column repeat the aliases of a texture twice as often as all views do; a third of them
+    leave out no row and no column.
 
     Parameters
     ----------
@@ -147,17 +146,10 @@ def views_without_aliases(light_field: LightField, at_least: int) -> BoolMap:
     ndarray, shape (T, S), bool
         Views that are present; the reference view is among them.
     """
-    t0, s0 = light_field.reference_position
-    down, across = np.indices(light_field.grid) - np.array([t0, s0])[:, None, None]
-    near, far = np.sort(np.abs([down, across]), axis=0)
-    reach = min(t0, s0, light_field.grid[0] - 1 - t0, light_field.grid[1] - 1 - s0)
-    moves = (far == 0) | ((near == 1) & (far == reach))
-    thirds = [(down % step == 0) & (across % step == 0) & ((down + across) // step % 3 == 0) for step in (1, 2, 4)]
-    for few in (moves, *thirds):
-        present = light_field.present & few
-        if at_least <= present.sum() <= _HARDLY_MORE * at_least:
-            return present
-    return spread_views(light_field, at_least)
+    few = spread_views(light_field, at_least)
+    rows, columns = np.indices(light_field.grid)
+    third = light_field.present & ((rows + columns - sum(light_field.reference_position)) % 3 == 0)
+    return third if few.sum() < third.sum() <= _HARDLY_MORE * few.sum() else few
 
 
 def grid_steps(light_field: LightField) -> npt.NDArray[np.float64]:

@@ -74,7 +74,7 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
     first_views: int = Field(
         25,
         ge=2,
-        description="views that all maps but the last compare, at least; spread over all rows and columns of the grid",
+        description="views that all maps but the last compare, at least; spread evenly over the grid",
     )
     first_sampling: float = Field(
         2.0, ge=1, le=8, description="distance of their candidates; 1: as num_disparities says"

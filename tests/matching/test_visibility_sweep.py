@@ -11,7 +11,7 @@ from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.nearest_surfaces import EMPTY, z_buffers
 from sepi.matching.sweep_arrays import Visibility, sampled_candidates
-from sepi.matching.view_subsets import spread_views
+from sepi.matching.view_subsets import spread_views, views_without_aliases
 from sepi.matching.visibility_sweep import (
     FirstDepthParameters,
     VisibleViewsParameters,
@@ -52,6 +52,15 @@ def test_few_views_that_stand_for_all(grid, view, at_least, rows, count) -> None
     assert chosen[view]
     assert chosen.sum() == count
     assert ["x" if some else "." for some in chosen[:, view[1]]] == list(rows)
+
+
+def test_a_third_of_the_views_leaves_out_no_row() -> None:
+    """Every second row and column have the aliases of a texture twice as near."""
+    field = LightField(np.zeros((9, 9, 4, 4, 3), np.uint8), "grid")
+    chosen = views_without_aliases(field, 25)
+    assert chosen[4, 4]
+    assert [chosen.sum(axis=axis).tolist() for axis in (0, 1)] == [[3] * 9] * 2
+    assert views_without_aliases(field, 9).sum() == 9
 
 
 def test_views_that_are_missing_do_not_stand_for_others() -> None:
