@@ -40,6 +40,7 @@ _TOGETHER = {
     "test_pipeline": "types",
     "test_error_bars": "error bars",
     "test_geometries": "geometries",
+    "test_calibration": "calibration",
     "test_workflow": "workflow",
     "test_module": "module",
     "test_slurm": "slurm",
