@@ -125,8 +125,8 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_each_problem_is_one_line_that_begins_with_the_file(made: Callable[[Files], Path], case: str) -> None:
     spoil, name, word = WRONG[case]
-    path = made(spoil(good()))
-    called = call(check_submission, path)
+    path = made(spoil({name: data for name, data in good().items() if "boxes" in name or "cotton" in name}))
+    called = call(check_submission, path, "--partial")
     assert called.exit_code == 1
     (line,) = called.stdout.splitlines()
     assert called.stdout == line + "\n"
