@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bench import choices, floor, tables
+from bench import choices
 from bench.__main__ import _all_measured, main
 from bench.measure import Case, Measurement, Prepared, Result, command, measured, read_result
 from bench.plain import WARPS, Warp, by_opencv, plain_sweep
@@ -61,10 +61,6 @@ class TestMeasuring:
         assert found.median == np.median(found.seconds)
         assert found.figures == {"known": 3.0, "sum": 2.0**17}
         assert len(measured(Case("g", "n", holding, (1,), most=1), 4).seconds) == 1
-
-    def test_failing_case_is_named(self) -> None:
-        with pytest.raises(SepiError, match=r"^benchmark g, n: ValueError: too bright$"):
-            measured(Case("g", "n", failing), 1)
 
     def test_command_is_timed_from_start_to_end(self) -> None:
         """Its memory is its own too, not that of the process that starts it."""
@@ -116,39 +112,6 @@ def test_choices_are_changed_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> N
     assert head == ["changed", "dots"]
     assert [name for name, _ in rows] == list(some)
     assert rows[0][1] == rows[2][1] != rows[1][1]
-
-
-class TestTables:
-    def test_part_of_the_floor(self) -> None:
-        """The page says how near a sweep comes to its arithmetic alone."""
-        found = result(
-            measurement("floor", "sample", 2.0, operations=4e9),
-            measurement("floor", "multiply-add of the window", 1.0, operations=1e10),
-            measurement("stages", "initial", 5.0, samples=4e9, channels=3, **{floor.WINDOW_OPERATIONS: 5e9}),
-            measurement("stages", "optimize", 5.0),
-        )
-        assert [row["times its floor"] for row in tables.steps(found)] == ["2.00", ""]
-        assert [row["share %"] for row in tables.steps(found)] == ["50.0", "50.0"]
-
-    def test_time_per_sample_and_speed_up(self) -> None:
-        found = result(
-            *(
-                measurement(group, f"{axis} {value}", seconds, size=10, views=2, num_disparities=5, threads=value)
-                for group in ("growth, initial", "growth, all stages")
-                for axis, value, seconds in (("num_disparities", 5, 2e-6), ("threads", 1, 8.0), ("threads", 2, 4.0))
-            )
-        )
-        assert list(tables.growth(found, "threads")[1].values())[:3] == ["2", "4.00", "2.00"]
-        # 2 microseconds for 100 pixels, 4 views, 5 candidates
-        assert tables.growth(found, "num_disparities")[0]["initial, ns per sample"] == "1.00"
-
-    def test_times_the_plain_ones(self) -> None:
-        found = result(
-            measurement("beside", "sepi", 20.0, num_disparities=10),
-            measurement("beside", "slow", 40.0, num_disparities=2, mean_difference=0, largest_difference=0),
-        )
-        row = tables.beside(found)[1]
-        assert (row[""], row["s per candidate"], row["times sepi's"]) == ("slow", "20.0", "10.0")
 
 
 class TestCompare:

@@ -657,14 +657,6 @@ def test_a_light_field_that_is_no_array_is_refused() -> None:
         sepi.LightField([[1, 2]], "mine")  # type: ignore[arg-type]
 
 
-def test_package_gives_its_names_and_no_others() -> None:
-    for name in sepi.__all__:
-        assert getattr(sepi, name) is not None
-    assert set(sepi.__all__) == set(dir(sepi))
-    with pytest.raises(AttributeError, match="nonsense"):
-        _ = sepi.nonsense
-
-
 # --- ingest
 
 

@@ -14,16 +14,15 @@ from sepi.report.graph import drawn
 from sepi.report.page import page_of
 
 
-def test_the_page_opens_from_disk_and_asks_for_nothing(browser: Any, example: Example) -> None:
-    """Everything is looked at once; whatever is loaded late would be asked for then, which :func:`opened` forbids."""
-    with opened(browser, example.page) as page:
-        for section in page.query_selector_all("section[id]"):
-            section.scroll_into_view_if_needed()
-            settled(page)
-        page.wait_for_selector(f"{CLOUD}[data-points]")
-        for title in (COTTON_TITLE, DOTS_TITLE, PICTURE_TITLE):
-            show_scene(page, title)
-        assert page.title().startswith("sepi")
+def test_the_page_opens_from_disk_and_asks_for_nothing(page: Any) -> None:
+    """Everything is looked at once; whatever is loaded late would be asked for then, which the fixture forbids."""
+    for section in page.query_selector_all("section[id]"):
+        section.scroll_into_view_if_needed()
+        settled(page)
+    page.wait_for_selector(f"{CLOUD}[data-points]")
+    for title in (COTTON_TITLE, DOTS_TITLE, PICTURE_TITLE):
+        show_scene(page, title)
+    assert page.title().startswith("sepi")
 
 
 def test_the_page_could_not_send_anything(browser: Any, example: Example) -> None:
