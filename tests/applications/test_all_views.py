@@ -17,14 +17,7 @@ from several_threads import SEVERAL
 
 import sepi
 from bench.all_views import disagreement, moved_pixels
-from sepi.applications.all_views import (
-    AllViews,
-    Sources,
-    ViewMaps,
-    _with_doubt,
-    anchor_views,
-    estimate_all_views,
-)
+from sepi.applications.all_views import AllViews, Sources, ViewMaps, _with_doubt, anchor_views, estimate_all_views
 from sepi.applications.carried_map import TOLERANCE, carried_map, corner_disparities
 from sepi.camera import Camera
 from sepi.cli.main import main

@@ -199,18 +199,10 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
         "in",
         ("view_1_2.tif", "finite"),
     ),
-    "float picture of 0..255": (
-        lambda: pictures("view_{t}_{s}.tif", VIEWS.astype(np.float32)),
-        "in",
-        (".tif", "0..1"),
-    ),
+    "float picture of 0..255": (lambda: pictures("view_{t}_{s}.tif", VIEWS.astype(np.float32)), "in", (".tif", "0..1")),
     # names and grids
     "empty folder": (lambda: Path("in").mkdir(), "in", ("in: ", "known format")),
-    "folder without pictures": (
-        lambda: (Path("in").mkdir(), Path("in/a.txt").touch()),
-        "in",
-        ("in: ", "known format"),
-    ),
+    "folder without pictures": (lambda: (Path("in").mkdir(), Path("in/a.txt").touch()), "in", ("in: ", "known format")),
     "nothing there": (lambda: None, "in", ("in: no such file or folder",)),
     "one view": (one_view_only, "in", ("in", "known format")),
     "view number twice": (
@@ -223,11 +215,7 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
         "in",
         ("img04.png", "img4.png"),
     ),
-    "running number missing": (
-        lambda: pictures("img{n}.png")[5].unlink(),
-        "in --grid 2x3",
-        ("in", "--grid"),
-    ),
+    "running number missing": (lambda: pictures("img{n}.png")[5].unlink(), "in --grid 2x3", ("in", "--grid")),
     "centre view missing": (lambda: pictures()[4].unlink(), "in", ("in", "(t, s) = (1, 1) is missing")),
     "wrong grid": (pictures, "in --grid 2x2", ("in", "2x2")),
     "grid that is no grid of that many": (lambda: pictures("img{n}.png"), "in --grid 2x3", ("in", "2x3")),

@@ -119,8 +119,7 @@ def test_axes_may_be_lower_case() -> None:
 
 
 @pytest.mark.parametrize(
-    "shape",
-    [(9, 9, 9, 9, 3), (5, 5, 9, 9), (3, 3, 3, 20, 20), (20, 5, 5, 20, 3), (8, 9, 10, 11, 12)],
+    "shape", [(9, 9, 9, 9, 3), (5, 5, 9, 9), (3, 3, 3, 20, 20), (20, 5, 5, 20, 3), (8, 9, 10, 11, 12)]
 )
 def test_shapes_that_do_not_tell_ask_for_axes(shape: tuple[int, ...]) -> None:
     """A guess here would be wrong half the time."""
