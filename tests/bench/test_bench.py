@@ -55,13 +55,6 @@ class TestMeasuring:
         assert large.peak_memory_mb - small.peak_memory_mb == pytest.approx(300, abs=30)
         assert large.figures["sum"] == 300 * 2**17
 
-    def test_median_of_the_repetitions(self) -> None:
-        found = measured(Case("g", "n", holding, (1,), {"known": 3.0}), 4)
-        assert len(found.seconds) == 4
-        assert found.median == np.median(found.seconds)
-        assert found.figures == {"known": 3.0, "sum": 2.0**17}
-        assert len(measured(Case("g", "n", holding, (1,), most=1), 4).seconds) == 1
-
     def test_command_is_timed_from_start_to_end(self) -> None:
         """Its memory is its own too, not that of the process that starts it."""
         found = measured(Case("g", "n", command, ("timeit", "-n1", "-r1", "import time; time.sleep(0.3)")), 2)
@@ -140,22 +133,6 @@ class TestCompare:
         called = CliRunner().invoke(main, ["compare", *map(str, files)])
         assert "not the same processor: abacus before, slide rule after" in called.stderr
         assert "not the same threads: 1 before, None after" in called.stderr
-
-    @pytest.mark.parametrize("content", [None, "", "[1]", "{}", '{"format": 99}', '{"format": 1, "measurements": 3}'])
-    def test_not_a_result(self, files: tuple[Path, Path], content: str | None) -> None:
-        files[1].unlink()
-        if content is not None:
-            files[1].write_text(content)
-        called = CliRunner().invoke(main, ["compare", *map(str, files)])
-        assert called.exit_code == 1
-        assert called.stderr.count("\n") == 1
-        assert str(files[1]) in called.stderr
-
-    def test_nothing_in_common(self, files: tuple[Path, Path]) -> None:
-        files[1].write_text(result(measurement("solvers", "Jacobi", 1.0)).as_json())
-        called = CliRunner().invoke(main, ["compare", *map(str, files)])
-        assert called.exit_code == 1
-        assert "nothing was measured in both" in called.stderr
 
 
 def test_machine_names_no_host_and_no_user() -> None:
@@ -237,10 +214,3 @@ def test_interrupted_command_leaves_nothing_running(tmp_path: Path) -> None:
     finally:
         process.kill()
         process.wait()
-
-
-def test_unknown_scene(tmp_path: Path) -> None:
-    called = CliRunner().invoke(main, ["run", "--scene", "nowhere", "--output", str(tmp_path / "out")])
-    assert called.exit_code == 1
-    assert "nowhere: neither a built-in scene" in called.stderr
-    assert not (tmp_path / "out").exists()

@@ -791,17 +791,6 @@ def test_any_names_give_numbers_or_an_error(names: list[str]) -> None:
     assert len({len(numbers) for numbers in found.numbers.values()}) == 1
 
 
-@given(st.lists(TEXT, max_size=5), TEXT, st.sampled_from(["{number}", "{row}_{column}", "{column}*{row}", ""]), TEXT)
-def test_any_pattern_is_one_or_an_error(names: list[str], before: str, fields: str, after: str) -> None:
-    pattern = before + fields + after
-    names = [*names, before + fields.format(number=7, row=3, column=-4) + after]
-    try:
-        found = parse_view_numbers("folder", names, pattern)
-    except SepiError:
-        return
-    assert set(found.numbers) | set(found.unmatched) == set(names)
-
-
 @given(st.integers(-(10**17), 10**17), st.integers(0, 10**17), TEXT.filter(lambda text: not set("{}*/\\-") & set(text)))
 def test_pattern_finds_the_numbers_that_made_the_name(row: int, column: int, text: str) -> None:
     between = text.strip("0123456789-") or "_"
