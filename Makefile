@@ -6,9 +6,10 @@
 # make faults  environment, then a hundred kills of the workflow and thousands of damaged files: half an hour
 # make fuzz   environment, then an hour (SECONDS=3600) of files made to trip the readers, led by what code they reach
 # make coverage  the whole test suite, and the share of lines and branches that it runs
-# make docs   environment, then the site of docs/, to build/docs/index.html: minutes, of which a second time few
+# make docs   environment, then docs-checks and the site of docs/, to build/docs/index.html: minutes, of which a second time few
+# make docs-checks  spelling and links of the documents, each command in them run or read by its parser, and how easily they read
 # make docs-links  whether the addresses in it answer; needs the network
-# make lint   style, format, types, imports, and what the project says to GitHub, Docker and the package index
+# make lint   style, format, types, imports, spelling, and what the project says to GitHub, Docker and the package index
 # make actionlint  more of the workflows of GitHub; needs the network
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
 # make dist   source archive and wheel for any Linux of this kind, to dist/, and the checks of the package index
@@ -24,9 +25,9 @@ PYTHON := $(shell for p in python3 python3.11 python3.12 python3.13; do \
 BIN := .venv/bin
 READY := .venv/ready
 
-LINTS := lint-style lint-types lint-imports lint-rules lint-project
+LINTS := lint-style lint-types lint-imports lint-rules lint-spelling lint-project
 
-.PHONY: all kernels check long-tests test test-system sanitize wheels faults fuzz coverage lint $(LINTS) actionlint docs docs-links demo bench dist release oldest clean
+.PHONY: all kernels check long-tests test test-system sanitize wheels faults fuzz coverage lint $(LINTS) actionlint docs docs-checks docs-links demo bench dist release oldest clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
@@ -116,13 +117,21 @@ lint-imports: $(READY)
 lint-rules: $(READY)
 	$(BIN)/snakefmt --line-length 120 --check Snakefile rules
 
+lint-spelling: $(READY)
+	$(BIN)/codespell *.md *.yaml ./docs config reports/README.md Snakefile rules sepi bench tools
+
 # warnings are errors; what nothing changed of is not made again
 SITE := $(BIN)/python -m sphinx -W --keep-going --quiet -d build/docs-read -t demo
-docs: $(READY) docs/_made/said-of-order.txt demo
+docs: docs-checks docs/_made/said-of-order.txt demo
 	$(ONE_THREAD) $(SITE) -b html docs build/docs
 	mkdir -p build/docs/demo
 	cp build/demo/reports/index.html build/docs/demo/
 	@echo "build/docs/index.html"
+
+# how easily the pages read is a report alone
+docs-checks: $(READY) lint-spelling
+	$(ONE_THREAD) $(BIN)/python -m pytest --quiet tests/docs/test_commands.py tests/docs/test_site.py -k "links or commands"
+	$(BIN)/python docs/readability.py
 
 docs-links: $(READY) docs/_made/said-of-order.txt
 	$(SITE) -t quick -b linkcheck docs build/docs-links

@@ -32,7 +32,7 @@ _MARKS = {"real_data": "real", "browser": "browser", "slurm": "slurm"}
 _FIRST = ("slurm", "real", "system", "workflow", "slow", "browser", "long")
 # written by `make long-tests`
 _LONG_TESTS = Path(__file__).with_name("long_tests.txt")
-# files whose tests share what takes long to make: real maps, a run of the workflow, a report, kernels for other types
+# files whose tests share what takes long to make: real maps, the workflow, a report, kernels for other types
 _TOGETHER = {
     **dict.fromkeys(["test_real", "test_real_formats", "test_real_methods"], "real"),
     **dict.fromkeys(["test_compare", "test_packing", "test_page", "test_page_browser"], "page"),
@@ -43,6 +43,7 @@ _TOGETHER = {
     "test_calibration": "calibration",
     "test_workflow": "workflow",
     "test_module": "module",
+    "test_commands": "commands",
     "test_slurm": "slurm",
     **dict.fromkeys(["test_kills", "test_machine"], "faults"),
 }

@@ -49,7 +49,7 @@ def poses(
     Poses are exact, so nothing has to be matched. Each view has a principal point of its own: programs that ignore it
     see another scene. Depth of the other views is that of 'sepi depth --all-views', else RESULT's, carried over; 0
     where it is not known. Positions are in metres where the camera is known. Where RESULT has error bars, COLMAP's
-    points have an error, and nerfstudio's depth has a standard deviation. docs/reference/outputs.md describes the
+    points have an error, and nerfstudio's depth has a standard deviation. docs/depth/other_programs.md describes the
     files.
 
     \b

@@ -9,6 +9,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -101,18 +102,42 @@ def superpixels(reference_view: FloatMap, size: int, compactness: float) -> Supe
     from skimage.segmentation import slic
 
     H, W = reference_view.shape[:2]
-    labels = slic(
-        reference_view,
-        n_segments=max(1, H * W // size**2),
+    turned, turned_back = _upright(reference_view)
+    # an odd step and as much beyond either side: seeds lie about the centre alike, and no pixel midway between two
+    step = size | 1
+    beyond = [(n + step * (n % 2)) // 2 for n in (-turned.shape[0] % step, -turned.shape[1] % step)]
+    padded = np.pad(turned, [(n, n) for n in (*beyond, 0)], "symmetric")
+    found = slic(
+        padded,
+        n_segments=padded.shape[0] * padded.shape[1] // step**2,
         compactness=compactness,
         start_label=0,
         channel_axis=2,
     )
+    inside = (slice(n, n + length) for n, length in zip(beyond, turned.shape, strict=False))
+    labels = turned_back(found[tuple(inside)])
     labels = np.unique(labels, return_inverse=True)[1].reshape(H, W).astype(np.int64)
     sizes = np.bincount(labels.ravel())
     rows, columns = np.indices((H, W))
     sums = [np.bincount(labels.ravel(), axis.ravel().astype(np.float64)) for axis in (columns, rows)]
     return Superpixels(labels, sizes, np.stack(sums, axis=1) / sizes[:, None])
+
+
+def _upright(view: FloatMap) -> tuple[FloatMap, Callable[[IntArray], IntArray]]:
+    """A view turned so that it gets brighter downwards, less so to the right; and what turns a map back.
+
+    SLIC begins at the upper left and goes on row by row: so it finds the same superpixels whichever way is up.
+    """
+    grey = view.sum(axis=2, dtype=np.float64)
+    down, across = (
+        float(grey.sum(axis=1 - axis) @ (np.arange(length) - (length - 1) / 2)) / length
+        for axis, length in enumerate(grey.shape)
+    )
+    mirrored = np.s_[:: -1 if down < 0 else 1, :: -1 if across < 0 else 1]
+    view = view[mirrored]
+    if abs(across) <= abs(down):
+        return view, lambda labels: labels[mirrored]
+    return view.transpose(1, 0, 2), lambda labels: labels.T[mirrored]
 
 
 def adjacency(segments: Superpixels) -> Adjacency:

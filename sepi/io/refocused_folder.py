@@ -1,6 +1,6 @@
 """The folder of refocused pictures, and the index that says where each is focused.
 
-docs/reference/outputs.md describes them.
+docs/depth/refocusing.md describes them.
 """
 
 from __future__ import annotations

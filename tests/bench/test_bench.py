@@ -97,14 +97,17 @@ def test_every_solver_gives_the_exact_solution() -> None:
 
 
 def test_choices_are_changed_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The table of docs/method/paper.md: a row for each change, scored by itself."""
+    """The table of docs/reproduce/ablations.md: a row for each change, empty where nothing changes."""
+    page = Path(__file__).parents[2] / "docs/reproduce/ablations.md"
+    shown = page.read_text(encoding="utf-8").split("| changed |")[1].split("\n\n")[0].splitlines()[2:]
+    assert [row.split("|")[1].strip() for row in shown] == list(choices.ALTERNATIVES)
     monkeypatch.setattr(choices, "opened", lambda name: render(name, size=64, views=3))
     some = {"as chosen": ("", {}), "no window": ("initial", {"window_radius": 0}), "again": ("", {})}
     monkeypatch.setattr(choices, "ALTERNATIVES", some)
     head, _, *rows = ([cell.strip() for cell in row.split("|")[1:3]] for row in choices.table(["dots"]).splitlines())
     assert head == ["changed", "dots"]
     assert [name for name, _ in rows] == list(some)
-    assert rows[0][1] == rows[2][1] != rows[1][1]
+    assert rows[2][1] == "" != rows[1][1] != rows[0][1]
 
 
 class TestCompare:

@@ -702,16 +702,3 @@ def test_ingest_reads_either_a_path_or_a_built_in_scene(tmp_path: Path, words: t
 def test_ingest_writes_nothing_on_bad_input(tmp_path: Path, words: tuple[str, ...]) -> None:
     error_of(ingested(*words, "--output", tmp_path / "lf.h5"))
     assert os.listdir(tmp_path) == []
-
-
-# --- what the project's front page promises
-
-
-def test_python_example_of_the_readme_runs(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    scene.rename("moved")
-    Path("scenes").mkdir()
-    Path("moved").rename("scenes/pyramids")
-    readme = (Path(__file__).parents[2] / "README.md").read_text()
-    (example,) = re.findall(r"```python\n(.*?)```", readme, flags=re.DOTALL)
-    exec(compile(example, "README.md", "exec"), {})
-    assert capsys.readouterr().out.startswith("(64, 64) ")

@@ -1,21 +1,47 @@
-"""The links and headings of Markdown files, as a forge resolves them."""
+"""The pages of the documentation, with their links and headings as a forge resolves them, and the code in them."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
-_PARSER = MarkdownIt("commonmark").enable("table")
+REPOSITORY = Path(__file__).parents[2]
+DOCS = REPOSITORY / "docs"
+MADE = frozenset({DOCS / "reference" / "api.md"})
+
+_GENERATED = ("examples", "reference/api", "_made", "gallery")
+_parsed = cache(MarkdownIt("commonmark").enable("table").parse)
+
+
+def site_pages() -> list[Path]:
+    """Those of the site that somebody writes."""
+    found = [page for page in sorted(DOCS.rglob("*.md")) if page not in MADE]
+    return [page for page in found if not page.relative_to(DOCS).as_posix().startswith(_GENERATED)]
+
+
+_OTHERS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config/README.md", "reports/README.md")
+FILES = {str(path.relative_to(REPOSITORY)): path for path in [*map(REPOSITORY.joinpath, _OTHERS), *site_pages()]}
+
+
+def blocks(text: str) -> list[tuple[str, str]]:
+    """Language and content of each block of code, those of directives included."""
+    return [(token.info, token.content) for token in _tokens(text) if token.type in ("fence", "code_block")]
+
+
+def spans(text: str) -> list[str]:
+    """The code between words."""
+    return [token.content for token in _tokens(text) if token.type == "code_inline"]
 
 
 def _tokens(text: str) -> Iterator[Token]:
-    for token in _PARSER.parse(text):
+    for token in _parsed(text):
         yield token
         yield from token.children or ()
 
@@ -30,7 +56,7 @@ def links(text: str) -> list[str]:
 
 def anchors(text: str) -> set[str]:
     """What may stand behind ``#`` in a link to this file: its headings in lower case, without signs."""
-    tokens = _PARSER.parse(text)
+    tokens = _parsed(text)
     seen: Counter[str] = Counter()
     found = set()
     for heading, content in pairwise(tokens):

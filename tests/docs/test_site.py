@@ -9,36 +9,23 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from markdown_links import broken_links
+from markdown_links import DOCS, FILES, MADE, REPOSITORY, broken_links, site_pages
 from warm_python import warm_python
 
-REPOSITORY = Path(__file__).parents[2]
-DOCS = REPOSITORY / "docs"
 sys.path.insert(0, str(DOCS))
 
-import make_pictures  # noqa: E402
-import pictures.failures  # noqa: E402
-import pictures.stages  # noqa: E402
-from extensions.figures_in_tables import kept_together  # noqa: E402
-from pictures.style import INKS, write_drawing  # noqa: E402
+import make_pictures
+import pictures.failures
+import pictures.stages
+from extensions.figures_in_tables import kept_together
+from pictures.style import INKS, write_drawing
 
-from sepi.lightfield import LightField  # noqa: E402
-from sepi.scenes import render  # noqa: E402
+from sepi.lightfield import LightField
+from sepi.scenes import render
 
-GENERATED = ("examples", "reference/api", "_made", "gallery")
-MADE = frozenset({DOCS / "reference" / "api.md"})
 SMALL = 64
 # no map is computed for these
 QUICK = ("corresponding-epis", "grid-of-views", "points-in-views", "seen-from-above", "stitched-epi")
-
-
-def _pages() -> list[Path]:
-    found = [page for page in sorted(DOCS.rglob("*.md")) if page not in MADE]
-    return [page for page in found if not page.relative_to(DOCS).as_posix().startswith(GENERATED)]
-
-
-PLAIN = [REPOSITORY / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "reports/README.md")]
-FILES = {str(path.relative_to(REPOSITORY)): path for path in [*PLAIN, *_pages()]}
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -64,12 +51,12 @@ def test_named_pages_exist() -> None:
 def test_every_page_is_in_the_contents() -> None:
     """A page that nobody finds in the navigation."""
     listed = {"index"}
-    for page in _pages():
+    for page in site_pages():
         folder = page.parent.relative_to(DOCS)
         for block in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
             names = [line for line in block.splitlines() if line and not line.startswith(":")]
             listed |= {(folder / name).as_posix() for name in names}
-    pages = {page.relative_to(DOCS).with_suffix("").as_posix() for page in _pages()}
+    pages = {page.relative_to(DOCS).with_suffix("").as_posix() for page in site_pages()}
     assert pages - listed == set()
     assert listed - pages <= {"examples/index", "reference/api"}
 
@@ -77,7 +64,7 @@ def test_every_page_is_in_the_contents() -> None:
 def test_every_drawing_is_shown() -> None:
     """A picture takes its time to be made and is on no page, or a page names one that nothing makes."""
     shown = {
-        name for page in _pages() for name in re.findall(r"```\{drawing\} (\S+)", page.read_text(encoding="utf-8"))
+        name for page in site_pages() for name in re.findall(r"```\{drawing\} (\S+)", page.read_text(encoding="utf-8"))
     }
     assert shown == set(make_pictures.drawings(SMALL))
 
