@@ -40,6 +40,7 @@ _TOGETHER = {
     "test_pipeline": "types",
     "test_error_bars": "error bars",
     "test_geometries": "geometries",
+    "test_calibration": "calibration",
     "test_workflow": "workflow",
     "test_module": "module",
     "test_commands": "commands",
@@ -133,12 +134,3 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> "Example":
     from page_example import make_example
 
     return make_example(tmp_path_factory.mktemp("example"))
-
-
-@pytest.fixture
-def page(browser: Any, example: "Example") -> Iterator[Any]:
-    """The page of the small report at desktop width, light; nothing may complain or leave the page."""
-    from browser import opened
-
-    with opened(browser, example.page, color_scheme="light") as found:
-        yield found

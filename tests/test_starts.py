@@ -168,15 +168,17 @@ def test_the_api_can_be_imported_where_a_system_lacks_signals_and_limits() -> No
 
 
 @needs_affinity
-@pytest.mark.parametrize("command", ["depth", "check", "info"])
-def test_a_command_takes_the_cores_that_it_was_given(tmp_path: Path, command: str) -> None:
-    """Without --threads, too; each library would take what it thinks that the machine has. Nor does it load others."""
+def test_commands_take_the_cores_that_they_were_given(tmp_path: Path) -> None:
+    """Without --threads, too; each library would take what it thinks that the machine has. Nor do they load others."""
     write_hci(render("dots", size=64, views=3), tmp_path / "dots")
-    words = [command, str(tmp_path / "dots"), *(["-o", str(tmp_path / "out")] if command == "depth" else [])]
+    scene, out = str(tmp_path / "dots"), str(tmp_path / "out")
     program = (
-        f"{NARROW}import sys\nfrom sepi.cli.main import main\nmain({words!r}, standalone_mode=False)\n"
-        f"assert {{name for name in {SLOW!r} if name in sys.modules}} == {{'PIL'}}\n"
-        "import cv2\nfrom sepi.threads import threads_used\nassert (threads_used(), cv2.getNumThreads()) == (1, 1)"
+        f"{NARROW}import sys\nfrom sepi.cli.main import main\n"
+        f"for words in ['info', {scene!r}], ['check', {scene!r}], ['depth', {scene!r}, '-o', {out!r}]:\n"
+        "    main(words, standalone_mode=False)\n"
+        f"    assert {{name for name in {SLOW!r} if name in sys.modules}} == {{'PIL'}}, words\n"
+        "    import cv2\n    from sepi.threads import threads_used\n"
+        "    assert (threads_used(), cv2.getNumThreads()) == (1, 1), words"
     )
     run_without_limits(program)
 

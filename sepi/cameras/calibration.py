@@ -138,7 +138,7 @@ def calibrate(
     >>> from sepi import Camera
     >>> from sepi.cameras.calibration import calibrate
     >>> from sepi.scenes import render
-    >>> views = render("curved_occluders", size=128, views=3).views
+    >>> views = render("curved_occluders", size=96, views=3).views
     >>> Path("sweep").mkdir()
     >>> for view, (t, s) in enumerate(np.ndindex(3, 3)):
     ...     written = cv2.imwrite(f"sweep/{view}.png", views[t, s, :, :, ::-1])

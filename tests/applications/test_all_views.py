@@ -13,18 +13,11 @@ import pytest
 from click.testing import CliRunner
 from error_lines import error_of
 from geometries import standing
-from several_threads import SEVERAL, threads
+from several_threads import SEVERAL
 
 import sepi
 from bench.all_views import disagreement, moved_pixels
-from sepi.applications.all_views import (
-    AllViews,
-    Sources,
-    ViewMaps,
-    _with_doubt,
-    anchor_views,
-    estimate_all_views,
-)
+from sepi.applications.all_views import AllViews, Sources, ViewMaps, _with_doubt, anchor_views, estimate_all_views
 from sepi.applications.carried_map import TOLERANCE, carried_map, corner_disparities
 from sepi.camera import Camera
 from sepi.cli.main import main
@@ -51,11 +44,6 @@ LAYERS = "stripes"
 @cache
 def layers() -> LightField:
     return render(LAYERS, size=SIZE, views=VIEWS)
-
-
-@cache
-def layers_found() -> AllViews:
-    return estimate_all_views(layers(), variant="fast")
 
 
 def truth_of(light_field: LightField) -> FloatMap:
@@ -218,50 +206,32 @@ def test_gaps_open_and_hidden_surfaces_stay_hidden() -> None:
 # --- all views --------------------------------------------------------------------------------------------------------
 
 
-def test_a_plane_parallel_to_the_views_is_the_same_in_all_of_them() -> None:
-    """The simplest scene: any error here is one of the carrying or the fusion."""
-    light_field = render("fronto_parallel", size=64, views=3)
-    found = estimate_all_views(light_field, variant="fast")
-    assert found.disparity.shape == (3, 3, 64, 64)
+def test_every_view_of_two_layers_is_close_to_the_truth() -> None:
+    """Other views' maps are of no use if they are much worse than the reference view's, or do not fit together."""
+    truth, baselines = truth_of(layers()), layers().baselines
+    found = estimate_all_views(layers(), variant="fast")
     assert found.disparity.dtype == found.confidence.dtype == np.float32
-    error = np.abs(found.disparity - 1)
-    assert error.mean() < 0.01
-    assert error.max() < 0.15
-    assert not found.extended.any()
     assert found.confidence.min() >= 0
     assert found.confidence.max() <= 1
-
-
-def test_every_view_of_two_layers_is_close_to_the_truth() -> None:
-    """Other views' maps are of no use if they are much worse than the reference view's."""
-    error = np.abs(layers_found().disparity - truth_of(layers()))
+    error = np.abs(found.disparity - truth)
     of_views = error.mean(axis=(2, 3))
     assert of_views.mean() < 0.05
     assert of_views.max() < 0.08
     assert (error > 0.07).mean() < 0.07
-
-
-def test_gaps_are_filled_by_views_that_see_into_them() -> None:
-    """What the reference view does not see must be better than a guess from what is beside it."""
-    truth, baselines = truth_of(layers()), layers().baselines
-    found = layers_found()
+    mean, bad = disagreement(found.disparity, baselines)
+    assert mean < 0.05
+    assert bad < 6
+    # what the reference view does not see must be better than a guess from what is beside it
     reference = found.disparity[2, 2]
     ours, guessed, pixels = 0.0, 0.0, 0
     for position in ((0, 0), (0, 3), (1, 4), (3, 0), (4, 4)):
         gap = np.isnan(carried_map(reference, tuple(baselines[position])))
         pixels += int(gap.sum())
-        ours += float(np.abs(found.disparity[position] - truth[position])[gap].sum())
+        ours += float(error[position][gap].sum())
         naive = moved_pixels(reference, baselines[position])
         guessed += float(np.abs(naive - truth[position])[gap].sum())
     assert pixels > 1000
     assert ours < 0.5 * guessed
-
-
-def test_views_agree_with_each_other() -> None:
-    """Otherwise point clouds of two views, or pictures made from them, would not fit together."""
-    mean, bad = disagreement(layers_found().disparity, layers().baselines)
-    assert mean < 0.05
-    assert bad < 6
 
 
 def test_the_reference_views_map_is_the_one_that_is_given() -> None:
@@ -342,23 +312,21 @@ def test_maps_of_another_shape_are_refused() -> None:
         estimate_all_views(layers(), StageMaps(flat, flat))
 
 
-@pytest.mark.parametrize("geometry", ["closer rows", "off the grid", "corner", "one row", "missing", "grey"])
+@pytest.mark.parametrize("geometry", ["closer rows", "off the grid", "one row"])
 def test_any_arrangement_of_views(geometry: str) -> None:
-    """Views that stand otherwise, or are missing, must not move surfaces to where they are not."""
+    """Views that stand otherwise, in grey, seen from a corner, or missing, must not move surfaces to elsewhere."""
     size, views = 64, 3
-    where = standing(geometry, (views, views)) if geometry in ("closer rows", "off the grid") else {}
+    where = standing(geometry, (views, views)) if geometry != "one row" else {}
     light_field = render("curved_occluders", size=size, views=views, **where)
     truth, present = truth_of(light_field), np.ones((views, views), bool)
-    if geometry == "corner":
-        light_field = light_field.seen_from((2, 0))
+    if geometry == "closer rows":
+        light_field = replace(light_field, views=light_field.views[..., 1:2].copy()).seen_from((2, 0))
+    if geometry == "off the grid":
+        present[0, 0] = present[2, 1] = False
+        light_field = replace(light_field, present=present)
     if geometry == "one row":
         truth, present = truth[1:2], present[1:2]
         light_field = replace(light_field, views=light_field.views[1:2], present=present)
-    if geometry == "missing":
-        present[0, 0] = present[2, 1] = False
-        light_field = replace(light_field, present=present)
-    if geometry == "grey":
-        light_field = replace(light_field, views=light_field.views[..., 1:2].copy())
     found = estimate_all_views(light_field, variant="fast")
     assert np.isnan(found.disparity[~present]).all()
     assert (found.confidence[~present] == 0).all()
@@ -376,31 +344,22 @@ def test_anchors_see_round_things_from_all_sides() -> None:
     assert anchor_views(row) == [(0, 2), (0, 0), (0, 4)]
 
 
-def test_threads_do_not_change_the_maps() -> None:
-    """Equal input must give equal bytes on any machine."""
-    light_field = render("curved_occluders", size=64, views=3)
-    maps = sepi.estimate_depth(light_field, "fast")
-    found = []
-    for number in (1, SEVERAL):
-        with threads(number):
-            found.append(estimate_all_views(light_field, maps, "fast"))
-    np.testing.assert_array_equal(found[0].disparity, found[1].disparity)
-    np.testing.assert_array_equal(found[0].confidence, found[1].confidence)
-
-
 # --- the command ------------------------------------------------------------------------------------------------------
 
 
 def test_the_command_writes_a_map_of_every_view(tmp_path: Path) -> None:
-    """What users call: the file beside the usual ones, which stay the same to the byte, and gone when not asked for."""
+    """What users call: the file beside the usual ones, which stay the same to the byte, and gone when not asked for.
+
+    Equal input gives equal bytes with any number of threads; the map of a missing view is none.
+    """
     scene = tmp_path / "pyramids"
     write_hci(render("pyramids", size=64, views=3), scene)
-    words = ["depth", str(scene), "--variant", "fast", "--threads", "1", "-o"]
+    words = ["depth", str(scene), "--variant", "fast", "--exclude", "0,2", "-o"]
     # the last one into the folder of one before
-    for folder, more in (("all", ["--all-views"]), ("again", ["--all-views"]), ("again", [])):
+    for folder, number, more in (("all", 1, ["--all-views"]), ("again", SEVERAL, ["--all-views"]), ("again", 1, [])):
         if not more:
             again = (tmp_path / "again" / "all_views.h5").read_bytes()
-        done = CliRunner().invoke(main, [*words, str(tmp_path / folder), *more])
+        done = CliRunner().invoke(main, [*words, str(tmp_path / folder), "--threads", str(number), *more])
         assert done.exit_code == 0, done.output
         assert ("all_views.h5" in done.output) == bool(more)
     plain = {path.name: path.read_bytes() for path in (tmp_path / "again").iterdir()}
@@ -427,7 +386,13 @@ def test_the_command_writes_a_map_of_every_view(tmp_path: Path) -> None:
             assert file[name].attrs["units"] == "pixels per view step"
         assert file.attrs["variant"] == "fast"
         np.testing.assert_array_equal(file["disparity"][1, 1], np.load(tmp_path / "all" / "disparity.npy"))
-        for t, s in np.ndindex(3, 3):
+        present = np.arange(9).reshape(3, 3) != 2
+        np.testing.assert_array_equal(file["present"][()], present)
+        # 0 would look like a map that was made
+        assert np.isnan(file["baselines"][0, 2]).all()
+        np.testing.assert_array_equal(np.isfinite(file["disparity"][()]).all(axis=(2, 3)), present)
+        assert np.isnan(file["disparity"][0, 2]).all()
+        for t, s in np.argwhere(present).tolist():
             truth = true_disparity("pyramids", size=64, baseline=(t - 1, s - 1))
             assert np.median(np.abs(file["disparity"][t, s] - truth)) < 0.03
 
@@ -450,21 +415,6 @@ def test_all_views_are_made_as_the_command_says(tmp_path: Path, monkeypatch: pyt
     for _, parameters, _, memory in made:
         assert parameters == {"initial": {"num_disparities": 21}}
         assert memory == 4000 * 2**20
-
-
-def test_missing_views_are_nan_in_the_file(tmp_path: Path) -> None:
-    """A map of 0 would look like one that was made."""
-    scene = tmp_path / "views"
-    write_hci(render("pyramids", size=64, views=3), scene)
-    folder = tmp_path / "maps"
-    words = ["depth", str(scene), "--variant", "fast", "-o", str(folder), "--all-views", "--exclude", "0,2"]
-    done = CliRunner().invoke(main, words)
-    assert done.exit_code == 0, done.output
-    with h5py.File(folder / "all_views.h5") as file:
-        assert np.isnan(file["disparity"][0, 2]).all()
-        assert np.isnan(file["baselines"][0, 2]).all()
-        assert np.isfinite(file["disparity"][()]).sum() == 8 * 64 * 64
-        assert file["present"][()].sum() == 8
 
 
 # --- what is made of them ---------------------------------------------------------------------------------------------

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
-from several_threads import SEVERAL, threads
 
 from sepi.applications import refocusing
 from sepi.applications.refocusing import all_in_focus, evenly_spaced, focal_stack, refocus, views_within
@@ -16,7 +15,6 @@ from sepi.kernels import refocusing as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.scenes import light_field, render
 from sepi.scenes.definitions import DEFINITIONS
-from sepi.stage import StageMaps
 
 INNER = np.s_[12:-12, 12:-12]
 
@@ -86,28 +84,6 @@ def test_a_plane_focused_at_its_disparity_is_the_reference_view() -> None:
     # rounding to 8 bit, since the disparity is a whole number
     assert off[0] < 0.5 / 255
     assert off[1] > 0.1
-
-
-def test_a_smaller_aperture_blurs_less() -> None:
-    """What the flag is for: more in focus."""
-    plane = render("fronto_parallel", size=64, views=5)
-    off = [np.abs(refocus(plane, 1.5, aperture=r) - plane.reference_view).mean() for r in (1, 2, None)]
-    assert off[0] < off[1] < off[2]
-
-
-@pytest.mark.parametrize("kind", ["uint8", "uint16", "float32"])
-def test_a_constant_picture_stays_constant(kind: str) -> None:
-    """A plain sky must not get a pattern, nor darken towards the border."""
-    full = 1 if kind == "float32" else np.iinfo(kind).max
-    light_field = LightField(np.full((3, 3, 16, 18, 3), round(0.25 * full) or 0.25, kind), "constant")
-    expected = light_field.reference_view
-    disparity = np.random.default_rng(0).uniform(-2, 2, (16, 18)).astype(np.float32)
-    np.testing.assert_array_equal(all_in_focus(light_field, disparity), expected)
-    for value in (0.0, 0.37, -1.9):
-        for maps in (None, disparity):
-            found = refocus(light_field, value, maps)
-            np.testing.assert_allclose(found, expected, atol=1e-6)
-            np.testing.assert_array_equal(np.rint(found * 65535), np.rint(expected * 65535))
 
 
 def test_far_beyond_the_picture_the_reference_view_is_alone() -> None:
@@ -350,25 +326,6 @@ def test_pixels_of_unknown_disparity_stay_as_they_are() -> None:
     np.testing.assert_array_equal(all_in_focus(light_field, nothing), light_field.reference_view)
     np.testing.assert_array_equal(refocus(light_field, 0.3, nothing), refocus(light_field, 0.3))
     assert np.isfinite(refocus(light_field, 0.3, disparity)).all()
-
-
-def test_maps_are_taken_as_a_whole() -> None:
-    """What estimate_depth gives can be handed on as it is."""
-    light_field = render("pyramids", size=64, views=3)
-    disparity = truth_of(light_field)
-    maps = StageMaps(disparity, np.ones_like(disparity))
-    np.testing.assert_array_equal(all_in_focus(light_field, maps), all_in_focus(light_field, disparity))
-
-
-def test_any_number_of_threads_gives_the_same_bytes() -> None:
-    light_field = render("pyramids", size=64, views=3)
-    found = []
-    for count in (1, SEVERAL):
-        with threads(count):
-            truth = truth_of(light_field)
-            found.append((all_in_focus(light_field, truth), refocus(light_field, 0.3), refocus(light_field, 2, truth)))
-    for one, several in zip(*found, strict=True):
-        np.testing.assert_array_equal(one, several)
 
 
 def test_progress_ends_at_one() -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bench import choices, floor, tables
+from bench import choices
 from bench.__main__ import _all_measured, main
 from bench.measure import Case, Measurement, Prepared, Result, command, measured, read_result
 from bench.plain import WARPS, Warp, by_opencv, plain_sweep
@@ -55,17 +55,6 @@ class TestMeasuring:
         assert large.peak_memory_mb - small.peak_memory_mb == pytest.approx(300, abs=30)
         assert large.figures["sum"] == 300 * 2**17
 
-    def test_median_of_the_repetitions(self) -> None:
-        found = measured(Case("g", "n", holding, (1,), {"known": 3.0}), 4)
-        assert len(found.seconds) == 4
-        assert found.median == np.median(found.seconds)
-        assert found.figures == {"known": 3.0, "sum": 2.0**17}
-        assert len(measured(Case("g", "n", holding, (1,), most=1), 4).seconds) == 1
-
-    def test_failing_case_is_named(self) -> None:
-        with pytest.raises(SepiError, match=r"^benchmark g, n: ValueError: too bright$"):
-            measured(Case("g", "n", failing), 1)
-
     def test_command_is_timed_from_start_to_end(self) -> None:
         """Its memory is its own too, not that of the process that starts it."""
         found = measured(Case("g", "n", command, ("timeit", "-n1", "-r1", "import time; time.sleep(0.3)")), 2)
@@ -79,12 +68,11 @@ class TestMeasuring:
 
 
 @pytest.mark.parametrize("warp", WARPS.values(), ids=list(WARPS))
-@pytest.mark.parametrize("name", ["curved_occluders", "stripes"])
-def test_plain_implementations_give_the_compiled_costs(name: str, warp: Warp) -> None:
+def test_plain_implementations_give_the_compiled_costs(warp: Warp) -> None:
     """A yardstick that computes something else measures nothing. Bounds the compiled sweep's rounding, too."""
     if warp is by_opencv and int(version("opencv-python-headless").split(".")[0]) < 5:
         pytest.skip("warpAffine of OpenCV 4 rounds positions to a 32nd of a pixel")
-    light_field = render(name, size=64, views=5)
+    light_field = render("stripes", size=64, views=5)
     parameters = SweepParameters(num_disparities=13)
     disparity, lowest = plain_sweep(light_field, parameters, warp)
     own = sweep(light_field, parameters)
@@ -122,39 +110,6 @@ def test_choices_are_changed_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> N
     assert rows[2][1] == "" != rows[1][1] != rows[0][1]
 
 
-class TestTables:
-    def test_part_of_the_floor(self) -> None:
-        """The page says how near a sweep comes to its arithmetic alone."""
-        found = result(
-            measurement("floor", "sample", 2.0, operations=4e9),
-            measurement("floor", "multiply-add of the window", 1.0, operations=1e10),
-            measurement("stages", "initial", 5.0, samples=4e9, channels=3, **{floor.WINDOW_OPERATIONS: 5e9}),
-            measurement("stages", "optimize", 5.0),
-        )
-        assert [row["times its floor"] for row in tables.steps(found)] == ["2.00", ""]
-        assert [row["share %"] for row in tables.steps(found)] == ["50.0", "50.0"]
-
-    def test_time_per_sample_and_speed_up(self) -> None:
-        found = result(
-            *(
-                measurement(group, f"{axis} {value}", seconds, size=10, views=2, num_disparities=5, threads=value)
-                for group in ("growth, initial", "growth, all stages")
-                for axis, value, seconds in (("num_disparities", 5, 2e-6), ("threads", 1, 8.0), ("threads", 2, 4.0))
-            )
-        )
-        assert list(tables.growth(found, "threads")[1].values())[:3] == ["2", "4.00", "2.00"]
-        # 2 microseconds for 100 pixels, 4 views, 5 candidates
-        assert tables.growth(found, "num_disparities")[0]["initial, ns per sample"] == "1.00"
-
-    def test_times_the_plain_ones(self) -> None:
-        found = result(
-            measurement("beside", "sepi", 20.0, num_disparities=10),
-            measurement("beside", "slow", 40.0, num_disparities=2, mean_difference=0, largest_difference=0),
-        )
-        row = tables.beside(found)[1]
-        assert (row[""], row["s per candidate"], row["times sepi's"]) == ("slow", "20.0", "10.0")
-
-
 class TestCompare:
     @pytest.fixture
     def files(self, tmp_path: Path) -> tuple[Path, Path]:
@@ -181,22 +136,6 @@ class TestCompare:
         called = CliRunner().invoke(main, ["compare", *map(str, files)])
         assert "not the same processor: abacus before, slide rule after" in called.stderr
         assert "not the same threads: 1 before, None after" in called.stderr
-
-    @pytest.mark.parametrize("content", [None, "", "[1]", "{}", '{"format": 99}', '{"format": 1, "measurements": 3}'])
-    def test_not_a_result(self, files: tuple[Path, Path], content: str | None) -> None:
-        files[1].unlink()
-        if content is not None:
-            files[1].write_text(content)
-        called = CliRunner().invoke(main, ["compare", *map(str, files)])
-        assert called.exit_code == 1
-        assert called.stderr.count("\n") == 1
-        assert str(files[1]) in called.stderr
-
-    def test_nothing_in_common(self, files: tuple[Path, Path]) -> None:
-        files[1].write_text(result(measurement("solvers", "Jacobi", 1.0)).as_json())
-        called = CliRunner().invoke(main, ["compare", *map(str, files)])
-        assert called.exit_code == 1
-        assert "nothing was measured in both" in called.stderr
 
 
 def test_machine_names_no_host_and_no_user() -> None:
@@ -278,10 +217,3 @@ def test_interrupted_command_leaves_nothing_running(tmp_path: Path) -> None:
     finally:
         process.kill()
         process.wait()
-
-
-def test_unknown_scene(tmp_path: Path) -> None:
-    called = CliRunner().invoke(main, ["run", "--scene", "nowhere", "--output", str(tmp_path / "out")])
-    assert called.exit_code == 1
-    assert "nowhere: neither a built-in scene" in called.stderr
-    assert not (tmp_path / "out").exists()

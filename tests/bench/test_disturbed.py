@@ -12,13 +12,11 @@ from sepi.scenes import render
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize(
-    ("name", "turns"),
-    [("curved_occluders", ["flip-both", "transpose-flip-rows"]), ("slanted_plane", ["transpose-flip-rows"])],
-)
-def test_no_verdict_is_wrong(name: str, turns: list[str]) -> None:
+@pytest.mark.parametrize("name", ["curved_occluders", "slanted_plane"])
+def test_no_verdict_is_wrong(name: str) -> None:
     """A wrong word turns depth inside out, or makes nonsense of it."""
-    found = dict(disturbed_verdicts(render(name, size=80, views=5), turns))
+    turns = ["transpose-flip-rows"]
+    found = dict(disturbed_verdicts(render(name, size=64, views=5), turns))
     assert list(found) == list(DISTURBANCES)
     assert not any(verdicts.orders["wrong"] for verdicts in found.values())
     assert all(sum(verdicts.orders.values()) == len(turns) for verdicts in found.values())

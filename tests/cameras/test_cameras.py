@@ -241,8 +241,6 @@ def test_poses_that_were_written_give_their_light_field_again(tmp_path: Path, ki
     known = again.require_disparity_range()
     assert known.minimum < truth.min() + 0.1
     assert known.maximum > truth.max() - 0.1
-    one, other = (sepi.estimate_depth(which).disparity for which in (light_field, again))
-    assert np.mean(np.abs(one - other) < 0.01) > 0.99
 
 
 @pytest.mark.parametrize("kind", ["colmap", "nerfstudio"])

@@ -1,12 +1,8 @@
 """Bad input of every kind, given to ``sepi depth`` as a user would: one clear line, exit code 1, nothing written."""
 
 import os
-import re
 import shutil
-import struct
 import tempfile
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -24,7 +20,6 @@ from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.io.hdf5 import write_light_field
 from sepi.io.origin import read_origin
-from sepi.io.pfm import write_pfm
 from sepi.lightfield import LightField
 from sepi.report.runs import read_numbers
 from sepi.scenes import render, write_hci
@@ -50,18 +45,6 @@ def benchmark_folder(folder: str = "in") -> Path:
     return Path(folder)
 
 
-def configured(key: str, value: str) -> Spoil:
-    """A benchmark folder with another value in its parameters."""
-
-    def make() -> None:
-        path = benchmark_folder() / "parameters.cfg"
-        text, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", path.read_text(), flags=re.MULTILINE)
-        assert count == 1
-        path.write_text(text)
-
-    return make
-
-
 def view_twice() -> None:
     folder = benchmark_folder()
     shutil.copy(folder / "input_Cam004.png", folder / "input_Cam4.png")
@@ -76,20 +59,9 @@ def cut(path: Path, part: float = 0.5) -> None:
     path.write_bytes(path.read_bytes()[: int(path.stat().st_size * part)])
 
 
-def cut_picture(ending: str, part: float) -> Spoil:
-    return lambda: cut(pictures("view_{t}_{s}" + ending)[4], part)
-
-
 def npy(array: np.ndarray = VIEWS, name: str = "in.npy") -> Path:
     np.save(name, array)
     return Path(name)
-
-
-def npy_header(shape: tuple[int, ...], kind: str = "|u1") -> None:
-    """A NumPy file that claims to be larger than it is."""
-    with Path("in.npy").open("wb") as file:
-        np.lib.format.write_array_header_1_0(file, {"descr": kind, "fortran_order": False, "shape": shape})
-        file.write(bytes(1000))
 
 
 def mat(name: str = "in.mat", **arrays: Any) -> Path:
@@ -115,25 +87,8 @@ def own_file_with_nan() -> None:
         file["views"][0, 0, 0, 0, 0] = np.nan
 
 
-def png_claiming(width: int, height: int) -> bytes:
-    """A PNG whose header, with a right checksum, claims a size that its few bytes cannot hold."""
-
-    def chunk(kind: bytes, body: bytes) -> bytes:
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-
-    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(bytes(99))) + chunk(b"IEND", b"")
-
-
 def other(path: Path, image: np.ndarray) -> None:
     assert cv2.imwrite(str(path), image)
-
-
-def npz_member_claiming_too_much() -> None:
-    npy_header((10**6, 10**6))
-    with zipfile.ZipFile("in.npz", "w") as archive:
-        archive.write("in.npy", "LF.npy")
-    Path("in.npy").unlink()
 
 
 def one_view_only() -> None:
@@ -141,154 +96,30 @@ def one_view_only() -> None:
         path.unlink()
 
 
-def linked_out() -> None:
-    path = pictures()[3]
-    path.rename("elsewhere.png")
-    path.symlink_to(Path("elsewhere.png").resolve())
-
-
 def zero_views() -> None:
     np.savez("in.npz", LF=np.zeros((0, 3, 64, 64, 3), np.uint8))
 
 
-def pickled() -> None:
-    np.save("in.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
-
-
-# what is made, the words after `sepi depth`, and what the one line must say
+# what is made, the words after `sepi depth`, and what the one line must say. Of each kind of input some: its reader has
+# tests of all that may be wrong with it
 CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
     # pictures
-    **{
-        f"picture cut off: {kind}": (cut_picture(f".{kind}", part), "in", (f"view_1_1.{kind}", "cut off"))
-        for kind, part in {"png": 0.5, "jpg": 0.9, "bmp": 0.5, "tif": 0.5, "ppm": 0.5, "webp": 0.5}.items()
-    },
-    "picture that is text": (lambda: pictures()[2].write_text("hello"), "in", ("view_0_2.png", "not a PNG")),
-    "picture of no bytes": (lambda: pictures()[2].write_bytes(b""), "in", ("view_0_2.png", "not a PNG")),
-    "picture with an absurd size": (
-        lambda: pictures()[2].write_bytes(png_claiming(100_000, 100_000)),
-        "in",
-        ("view_0_2.png", "100000x100000 pixels"),
-    ),
-    "picture of no width": (
-        lambda: pictures()[2].write_bytes(png_claiming(0, 64)),
-        "in",
-        ("view_0_2.png", "not a PNG, or damaged"),
-    ),
-    "pictures of two sizes": (
-        lambda: other(pictures()[5], np.zeros((64, 60, 3), np.uint8)),
-        "in",
-        ("view_1_2.png", "60x64", "alike"),
-    ),
-    "pictures of two depths": (
-        lambda: other(pictures()[5], np.zeros((64, 64, 3), np.uint16)),
-        "in",
-        ("view_1_2.png", "16 bit", "alike"),
-    ),
-    "grey among colour": (
-        lambda: other(pictures()[5], np.zeros((64, 64), np.uint8)),
-        "in",
-        ("view_1_2.png", "grey", "alike"),
-    ),
-    "NaN in a float picture": (
-        lambda: pictures("view_{t}_{s}.tif", floats(1, 2, np.nan)),
-        "in",
-        ("view_1_2.tif", "finite"),
-    ),
-    "infinite float picture": (
-        lambda: pictures("view_{t}_{s}.tif", floats(1, 2, np.inf)),
-        "in",
-        ("view_1_2.tif", "finite"),
-    ),
-    "float picture of 0..255": (
-        lambda: pictures("view_{t}_{s}.tif", VIEWS.astype(np.float32)),
-        "in",
-        (".tif", "0..1"),
-    ),
+    "picture cut off": (lambda: cut(pictures()[4]), "in", ("view_1_1.png", "cut off")),
     # names and grids
     "empty folder": (lambda: Path("in").mkdir(), "in", ("in: ", "known format")),
-    "folder without pictures": (
-        lambda: (Path("in").mkdir(), Path("in/a.txt").touch()),
-        "in",
-        ("in: ", "known format"),
-    ),
+    "folder without pictures": (lambda: (Path("in").mkdir(), Path("in/a.txt").touch()), "in", ("in: ", "known format")),
     "nothing there": (lambda: None, "in", ("in: no such file or folder",)),
     "one view": (one_view_only, "in", ("in", "known format")),
-    "view number twice": (
-        lambda: (pictures(), other(Path("in/view_01_02.png"), VIEWS[0, 0])),
-        "in",
-        ("view_01_02.png", "view_1_2.png"),
-    ),
     "running number twice": (
         lambda: (pictures("img{n}.png"), other(Path("in/img04.png"), VIEWS[0, 0])),
         "in",
         ("img04.png", "img4.png"),
     ),
-    "running number missing": (
-        lambda: pictures("img{n}.png")[5].unlink(),
-        "in --grid 2x3",
-        ("in", "--grid"),
-    ),
-    "centre view missing": (lambda: pictures()[4].unlink(), "in", ("in", "(t, s) = (1, 1) is missing")),
-    "wrong grid": (pictures, "in --grid 2x2", ("in", "2x2")),
+    "running number missing": (lambda: pictures("img{n}.png")[5].unlink(), "in --grid 2x3", ("in", "--grid")),
     "grid that is no grid of that many": (lambda: pictures("img{n}.png"), "in --grid 2x3", ("in", "2x3")),
-    "absurd number in a name": (
-        lambda: other(pictures()[0].with_name("view_999999_1.png"), VIEWS[0, 0]),
-        "in",
-        ("in", "1000000x3", "--pattern"),
-    ),
-    "pattern that fits no name": (pictures, "in --pattern img{number}.png", ("in", "img{number}.png")),
-    "pattern without numbers": (pictures, "in --pattern view.png", ("view.png", "{row}")),
-    "pattern with half a position": (pictures, "in --pattern view_{row}_1.png", ("{column}",)),
-    "link out of the folder": (linked_out, "in", ("view_1_0.png", "link", "--follow-links")),
-    "link to nowhere": (
-        lambda: (pictures()[3].unlink(), Path("in/view_1_0.png").symlink_to("gone.png")),
-        "in",
-        ("view_1_0.png",),
-    ),
     # benchmark folders
-    "folder of scenes": (
-        lambda: benchmark_folder("in/a"),
-        "in",
-        ("a folder of light fields; give one of them, such as in/a",),
-    ),
     "view of a benchmark folder twice": (view_twice, "in", ("input_Cam4.png: view 4 is given twice",)),
-    "benchmark folder without centre view": (
-        lambda: (benchmark_folder() / "input_Cam004.png").unlink(),
-        "in",
-        ("centre view (t, s) = (1, 1) is missing",),
-    ),
     "benchmark folder without views": (only_ground_truth, "in", ("no views",)),
-    "benchmark view of another size": (
-        lambda: other(benchmark_folder() / "input_Cam005.png", np.zeros((64, 60, 3), np.uint8)),
-        "in",
-        ("input_Cam005.png: 60x64",),
-    ),
-    "benchmark view cut off": (
-        lambda: cut(benchmark_folder() / "input_Cam007.png"),
-        "in",
-        ("input_Cam007.png: not a PNG, or damaged or cut off",),
-    ),
-    "nonsense parameters": (
-        configured("disp_min", "far"),
-        "in",
-        ("parameters.cfg: parameters.disp_min: input should be a valid number",),
-    ),
-    "range the wrong way round": (
-        configured("disp_min", "9"),
-        "in",
-        ("parameters.cfg: disparity range (parameters): expected two finite numbers MIN < MAX",),
-    ),
-    "binary parameters": (
-        lambda: (benchmark_folder() / "parameters.cfg").write_bytes(b"\x80\x81"),
-        "in",
-        ("parameters.cfg: not a text file",),
-    ),
-    "wrong grid in the parameters": (configured("num_cams_x", "2"), "in", ("input_Cam008.png: beyond the 6 views",)),
-    "ground truth of another size": (
-        lambda: write_pfm(benchmark_folder() / "gt_disp_lowres.pfm", np.zeros((5, 5), np.float32)),
-        "in",
-        ("gt_disp_lowres.pfm: ground truth is (5, 5)",),
-    ),
     # what the views show
     "all black": (lambda: pictures(views=np.zeros_like(VIEWS)), "in", ("in", "black")),
     "of one colour": (lambda: pictures(views=np.full_like(VIEWS, 90)), "in", ("in", "one colour")),
@@ -299,69 +130,16 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
     ),
     # arrays
     "npy cut off": (lambda: cut(npy()), "in.npy", ("in.npy",)),
-    "npy of text": (lambda: Path("in.npy").write_text("hello"), "in.npy", ("in.npy", "not a NumPy file")),
-    "npy with an absurd size": (lambda: npy_header((9, 9, 10**5, 10**5, 3)), "in.npy", ("in.npy",)),
-    "npy of objects": (pickled, "in.npy", ("in.npy",)),
-    "npy of two axes": (lambda: npy(np.zeros((8, 8), np.uint8)), "in.npy", ("in.npy", "axes")),
-    "npy of three axes": (lambda: npy(VIEWS[0, 0]), "in.npy", ("in.npy", "axes")),
     "npy with NaN": (lambda: npy(floats(1, 2, np.nan)), "in.npy", ("in.npy", "1,2", "--exclude")),
-    "npy with infinity": (lambda: npy(floats(1, 2, -np.inf)), "in.npy", ("in.npy", "1,2", "--exclude")),
-    "npy of floats of 32 bit": (lambda: npy(VIEWS * 1e6), "in.npy", ("in.npy", "0..1")),
-    "npy of complex numbers": (lambda: npy(VIEWS.astype(np.complex64)), "in.npy", ("in.npy", "complex64")),
-    "axes that are none": (npy, "in.npy --axes ABCDE", ("ABCDE",)),
-    "axes twice": (npy, "in.npy --axes TTHWC", ("TTHWC",)),
-    "too few axes": (npy, "in.npy --axes TSHW", ("in.npy", "TSHW")),
     "npz of nothing": (lambda: np.savez("in.npz"), "in.npz", ("in.npz",)),
     "npz without views": (zero_views, "in.npz", ("in.npz",)),
-    "npz cut off": (lambda: (np.savez("in.npz", LF=VIEWS), cut(Path("in.npz"))), "in.npz", ("in.npz",)),
-    "npz with an absurd size": (npz_member_claiming_too_much, "in.npz", ("in.npz",)),
-    "npz of two light fields": (lambda: np.savez("in.npz", a=VIEWS, b=VIEWS), "in.npz", ("a", "b", "--variable")),
-    "npz without the variable": (lambda: np.savez("in.npz", a=VIEWS), "in.npz --variable b", ("in.npz", "'b'", "a")),
-    "mat cut off": (lambda: cut(mat()), "in.mat", ("in.mat",)),
-    "mat of text": (lambda: Path("in.mat").write_text("hello"), "in.mat", ("in.mat",)),
     "mat without a light field": (lambda: mat(x=np.zeros((3, 3))), "in.mat", ("in.mat",)),
-    "mat 7.3 cut off": (
-        lambda: cut(hdf5(lambda f: f.create_dataset("LF", data=VIEWS.T), "in.mat"), 0.7),
-        "in.mat",
-        ("in.mat",),
-    ),
-    "mat 7.3 with an absurd size": (
-        lambda: hdf5(lambda f: f.create_dataset("LF", (3, 10**5, 10**5, 9, 9), np.uint8, chunks=True), "in.mat"),
-        "in.mat",
-        ("in.mat",),
-    ),
     # HDF5
     "HDF5 cut off": (lambda: cut(hdf5(lambda f: f.create_dataset("LF", data=VIEWS))), "in.h5", ("in.h5",)),
     "HDF5 of text": (lambda: Path("in.h5").write_text("x"), "in.h5", ("in.h5: not a light field",)),
     "HDF5 of our own with NaN": (own_file_with_nan, "in.h5", ("in.h5: nan: float views must be finite",)),
     "HDF5 without views": (lambda: hdf5(lambda f: f.create_dataset("x", data=1)), "in.h5", ("in.h5", "known format")),
-    "HDF5 with an absurd size": (
-        lambda: hdf5(lambda f: f.create_dataset("LF", (9, 9, 10**5, 10**5, 3), np.uint8)),
-        "in.h5",
-        ("in.h5",),
-    ),
-    "HCI 2013 with depth of another size": (
-        lambda: hdf5(
-            lambda f: (
-                f.create_dataset("LF", data=VIEWS),
-                f.create_dataset("GT_DEPTH", data=np.ones((3, 3, 9, 9))),
-                f.attrs.update({"dH": 1.0, "focalLength": 1.0, "shift": 0.0}),
-            )
-        ),
-        "in.h5",
-        ("in.h5", "GT_DEPTH"),
-    ),
     # lenslet pictures
-    "lenslet picture that is too small": (
-        lambda: other(Path("a_eslf.png"), VIEWS[0, 0][:20, :20]),
-        "a_eslf.png",
-        ("a_eslf.png",),
-    ),
-    "lenslet picture cut off": (
-        lambda: (other(Path("a_eslf.png"), np.tile(VIEWS[0, 0], (4, 4, 1))), cut(Path("a_eslf.png"))),
-        "a_eslf.png",
-        ("a_eslf.png", "cut off"),
-    ),
     # flags
     "unknown format": (npy, "in.npy --format nmupy", ("did you mean 'numpy'",)),
     "format that does not fit": (npy, "in.npy --format matlab", ("in.npy",)),

@@ -35,13 +35,17 @@ def maps() -> tuple[FloatMap, FloatMap, FloatMap]:
     return found[0], found[1], found[2]
 
 
-@pytest.fixture
-def files(tmp_path: Path) -> list[Path]:
+def written(folder: Path) -> list[Path]:
     """The maps as PFM: ours, other, truth."""
-    paths = [tmp_path / f"{name}.pfm" for name in ("ours", "other", "ground_truth")]
+    paths = [folder / f"{name}.pfm" for name in ("ours", "other", "ground_truth")]
     for path, values in zip(paths, maps(), strict=True):
         write_pfm(path, values)
     return paths
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[Path]:
+    return written(tmp_path)
 
 
 def compare(*words: object) -> Result:
@@ -56,11 +60,11 @@ def told(result: Result) -> str:
     return str(line)
 
 
-@pytest.fixture(params=["ground_truth", "no truth"])
-def page(request: pytest.FixtureRequest, browser: Any, files: list[Path], tmp_path: Path) -> Iterator[Any]:
-    """The page of two maps, with and without their truth."""
-    output = tmp_path / "page.html"
-    words = files if request.param == "ground_truth" else files[:2]
+@pytest.fixture(scope="module", params=["ground_truth", "no truth"])
+def page(request: pytest.FixtureRequest, browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """The page of two maps, with and without their truth, as the tests before have left it."""
+    output = tmp_path_factory.mktemp("page") / "page.html"
+    words = written(output.parent)[: 3 if request.param == "ground_truth" else 2]
     assert compare(*words, "-o", output).exit_code == 0
     with opened(browser, output, color_scheme="light") as found:
         yield found
@@ -144,6 +148,7 @@ def test_a_click_and_the_grid(page: Any) -> None:
     page.mouse.click(*place_of(page, '[data-part="wipe"]', 20, 20))
     settled(page)
     assert read_out(page)["pixel"] == "x 20, y 20"
+    choose(page, b="b")
     page.locator('figure[data-key="difference"]').get_by_role("button", name="as A").click()
     page.wait_for_selector('#viewer[data-shown="difference b"]')
 
@@ -207,7 +212,7 @@ def test_equal_input_gives_equal_bytes(files: list[Path], tmp_path: Path) -> Non
     assert (tmp_path / "one.html").read_bytes() == (tmp_path / "two.html").read_bytes()
 
 
-def test_equal_names_are_told_apart(browser: Any, tmp_path: Path) -> None:
+def test_equal_names_are_told_apart(tmp_path: Path) -> None:
     """Two programs' maps often have one name; a map may be held against itself."""
     ours, other, _ = maps()
     for folder, values in (("old", ours), ("new", other)):
@@ -218,10 +223,7 @@ def test_equal_names_are_told_apart(browser: Any, tmp_path: Path) -> None:
     assert "<h1>old/disparity.pfm beside new/disparity.pfm</h1>" in output.read_text()
     same = tmp_path / "old" / "disparity.pfm"
     compare(same, same, "-o", output)
-    with opened(browser, output) as page:
-        assert page.text_content("h1") == "disparity.pfm (A) beside disparity.pfm (B)"
-        point_at(page, 30, 30)
-        assert read_out(page)["value a"] == read_out(page)["value b"]
+    assert "<h1>disparity.pfm (A) beside disparity.pfm (B)</h1>" in output.read_text()
 
 
 def test_names_are_no_markup(browser: Any, tmp_path: Path) -> None:

@@ -340,11 +340,3 @@ def test_tiff_maps_are_scored_as_the_result_is() -> None:
     assert json.loads(scores[0])
     # as ground truth, too: no error at all
     assert call("evaluate", "maps", "map.tif").stdout.splitlines()[1].split()[:3] == ["paper", "all", "0.000"]
-
-
-@pytest.mark.parametrize("command", ["poses", "convert"])
-def test_each_command_has_help(command: str) -> None:
-    called = call(command, "--help")
-    assert called.exit_code == 0
-    assert called.stdout.startswith("Usage:")
-    assert command in call("--help").stdout

@@ -87,10 +87,7 @@ CLAIMS: dict[str, list[str]] = {
         "list(failed) == ['broken'] and 'broken/input_Cam000.png' in failed['broken']",
         "not Path(workplace.name).exists()",
     ],
-    "plot_13_every_view": [
-        "agree.min() > 0.75 and agree[2, 2] == 1",
-        "np.max(1 - agree - hidden) < 0.03",
-    ],
+    "plot_13_every_view": ["agree.min() > 0.75 and agree[2, 2] == 1", "np.max(1 - agree - hidden) < 0.03"],
     "plot_14_calibrated_cameras": [
         "np.median(error[known]) < 5 and 0.6 < known.mean() < 1",
         "light_field.grid == (3, 3) and light_field.rig.units == 'metres'",

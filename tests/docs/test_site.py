@@ -9,7 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from markdown_links import DOCS, FILES, MADE, REPOSITORY, anchors, broken_links, links, site_pages
+from markdown_links import DOCS, FILES, MADE, REPOSITORY, broken_links, site_pages
 from warm_python import warm_python
 
 sys.path.insert(0, str(DOCS))
@@ -32,20 +32,6 @@ QUICK = ("corresponding-epis", "grid-of-views", "points-in-views", "seen-from-ab
 def test_links_resolve(file: str) -> None:
     """A reader of a checkout, or on a forge, who follows a link finds no such page or heading."""
     assert broken_links(FILES[file], MADE) == []
-
-
-def test_broken_links_are_found(tmp_path: Path) -> None:
-    """The test above would be silent."""
-    page = tmp_path / "page.md"
-    page.write_text("# A `b`: c\n\n[x](other.md) [y](#a-b-c) [z](#nothing) [w](https://nowhere.example)\n")
-    assert broken_links(page, frozenset()) == ["other.md", "#nothing"]
-
-
-def test_links_and_anchors_of_markdown() -> None:
-    """Links in code would be followed, or headings that repeat be mixed up."""
-    text = "## Same\n\n## Same\n\n    [no](code.md)\n\n| a |\n|---|\n| [yes](table.md) ![p](p.png) |\n"
-    assert links(text) == ["table.md", "p.png"]
-    assert anchors(text) == {"same", "same-1"}
 
 
 def test_named_pages_exist() -> None:

@@ -95,10 +95,7 @@ BAD_FILES: dict[str, tuple[Callable[[Path], None], str]] = {
     "no source": (spoiled(lambda f: f.attrs.pop("source")), "damaged"),
     "range of three numbers": (spoiled(lambda f: f.attrs.__setitem__("disparity_range", [1, 2, 3])), "damaged"),
     "range the wrong way round": (spoiled(lambda f: f.attrs.__setitem__("disparity_range", [2, 1])), "MIN < MAX"),
-    "views of four axes": (
-        spoiled(lambda f: replace(f, "views", np.zeros((3, 4, 4, 3), np.uint8))),
-        "(T, S, H, W, C)",
-    ),
+    "views of four axes": (spoiled(lambda f: replace(f, "views", np.zeros((3, 4, 4, 3), np.uint8))), "(T, S, H, W, C)"),
     "rows at no distance": (spoiled(lambda f: f.attrs.__setitem__("row_spacing", 0)), "row_spacing must be a positive"),
     "positions of another grid": (
         spoiled(lambda f: f.create_dataset("positions", data=np.zeros((3, 3, 2)))),

@@ -16,7 +16,7 @@ from warm_python import warm_python
 
 from sepi.errors import SepiError
 from sepi.report import graph
-from sepi.report.graph import Edges, drawn, parsed, rule_edges
+from sepi.report.graph import Edges, drawn, rule_edges
 
 REPOSITORY = Path(__file__).parents[2]
 DIAMOND = [("a", "b"), ("a", "c"), ("b", "d"), ("c", "d"), ("a", "d")]
@@ -69,22 +69,6 @@ def drawn_edges(picture: ElementTree.Element) -> set[tuple[str, str]]:
                 assert lines[point], "a line that ends nowhere"
                 waiting += lines[point]
     return found
-
-
-def test_what_snakemake_prints_is_read() -> None:
-    text = """---
-title: Rulegraph
----
-flowchart TB
-    id0[all]
-    id1[page]
-    id10[numbers]
-    style id0 fill:#D9575D,stroke-width:2px,color:#333333
-    id1 --> id0
-    id10 --> id1
-"""
-    assert parsed(text) == [("numbers", "page"), ("page", "all")]
-    assert parsed("no graph here") == []
 
 
 @pytest.mark.parametrize(("edges", "kept"), [(DIAMOND, DIAMOND[:4]), (CHAIN, CHAIN[:3]), ([("a", "b")], [("a", "b")])])

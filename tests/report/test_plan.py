@@ -5,30 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from report_results import SCENES, VARIANTS
 
 from sepi.errors import SepiError
 from sepi.report.plan import Plan
-from sepi.workflow.result_paths import stage_of
-
-
-def test_variants_share_the_files_of_their_first_stages(plan: Plan) -> None:
-    files = [plan.stage_file("hci", "cotton", variant, "initial") for variant in VARIANTS]
-    assert len(set(files)) == 1
-    assert files[0] == plan.results / "hci/cotton/stages/sepi/initial.h5"
-    # of each scene: scores, times of nine stages, light field and ground truth
-    assert len(plan.number_inputs()) == 5 * (1 + 9 + 2)
-
-
-def test_a_stage_that_hands_its_maps_on_has_no_file() -> None:
-    """Choice none is no job: what is asked for after it is the file before."""
-    handed_on = {"initial": "sepi", "occlusion": "none", "textureless": "none", "optimize": "none"}
-    made = Plan(Path("results"), SCENES, VARIANTS | {"mine": handed_on})
-    folder = Path("results/hci/cotton/stages/sepi")
-    assert made.stage_file("hci", "cotton", "no_occlusion", "occlusion") == folder / "initial.h5"
-    assert made.stage_file("hci", "cotton", "no_occlusion", "textureless") == folder / "none/lti/textureless.h5"
-    assert made.stage_file("hci", "cotton", "mine", "optimize") == folder / "initial.h5"
-    assert stage_of(made.stage_key("mine", "optimize")) == "initial"
 
 
 @pytest.mark.parametrize(

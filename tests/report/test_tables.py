@@ -66,13 +66,6 @@ def test_wrong_numbers_are_one_line(content: str | None, arguments: list[str], m
 
 
 @pytest.mark.parametrize("table", MAIN_TABLES)
-def test_pages_name_their_protocol(table: str, found: dict[str, Any]) -> None:
-    text = markdown(found, table).lower()
-    assert "protocol" in text or table == "runtime"
-    assert "benchmark (border 15)" in text or table != "stages"
-
-
-@pytest.mark.parametrize("table", MAIN_TABLES)
 def test_the_page_and_the_tables_show_the_same(table: str, external: dict[str, Any]) -> None:
     """The HTML page shows what JSON says, a paper what LaTeX says: no figure may differ."""
     report = report_of(external, table)

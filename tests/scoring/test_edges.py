@@ -46,19 +46,6 @@ def plain(ground_truth: np.ndarray, estimate: np.ndarray) -> tuple[np.ndarray, l
     return region, background, foreground
 
 
-def test_the_region_is_two_pixels_to_each_side() -> None:
-    """Else scores at edges are diluted by what is right anyway."""
-    edges = edges_of(SQUARE)
-    expected = np.zeros(SQUARE.shape, bool)
-    expected[8:22, 10:30] = True
-    expected[12:18, 14:26] = False
-    # but for the corners, which are farther away
-    expected[[8, 8, 21, 21], [10, 29, 10, 29]] = False
-    np.testing.assert_array_equal(edges.region, expected)
-    np.testing.assert_array_equal(edges.foreground, expected & (SQUARE == 1))
-    assert set(edges.middle[expected]) == {0.5}
-
-
 @pytest.mark.parametrize("by", [-2, -1, 0, 1, 2])
 def test_a_moved_outline_is_fat_or_thin_and_not_both(by: int) -> None:
     """Someone reads from the two which way the edges of a method err."""

