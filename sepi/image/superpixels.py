@@ -106,7 +106,7 @@ def superpixels(reference_view: FloatMap, size: int, compactness: float) -> Supe
     # an odd step and as much beyond either side: seeds lie about the centre alike, and no pixel midway between two
     step = size | 1
     beyond = [(n + step * (n % 2)) // 2 for n in (-turned.shape[0] % step, -turned.shape[1] % step)]
-    padded = np.pad(turned, [(n, n) for n in (*beyond, 0)], "symmetric")
+    padded = np.pad(turned, [(n, n) for n in (*beyond, 0)], "edge")
     found = slic(
         padded,
         n_segments=padded.shape[0] * padded.shape[1] // step**2,
