@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
-from math import prod
+from math import isqrt, prod
 from pathlib import Path
 from typing import Any
 
@@ -221,8 +221,12 @@ def readings(shape: tuple[int, ...], grid: tuple[int, int] | None = None) -> lis
     if len(shape) == len("NHW"):
         # else a picture in colour
         rows = [size for size in rows if size["N"] not in _COLOURS]
-    # pictures are larger than there are views; else views in colour come before pictures
-    rows = [size for size in rows if _is_small(size)] or [s for s in rows if "C" in s and s["N"] == shape[0]] or rows
+    # pictures are larger than there are views; else views in colour come before pictures, or are those of a square grid
+    coloured = [size for size in rows if "C" in size]
+    first = [size for size in coloured if size["N"] == shape[0]]
+    squares = [size for size in coloured if size["N"] % 2 and isqrt(size["N"]) ** 2 == size["N"]]
+    unclear = first if any(size in squares for size in first) else first + squares
+    rows = [size for size in rows if _is_small(size)] or unclear or rows
     found = [
         size
         for size in (*grids, *rows)

@@ -77,10 +77,11 @@ def test_axes_of_grey_arrays_are_found(axes: str) -> None:
         ((64, 80, 4, 25), {"HWTS", "HWCN"}),
         ((3, 3, 3, 20, 20), {"TSCHW", "CTSHW"}),
         ((1, 25, 3, 64, 80), {"TSHW", "NCHW"}),
+        ((64, 80, 81, 3), {"NHWC", "HWNC"}),
     ],
 )
 def test_an_axis_that_may_be_colours_or_a_row_of_views_is_left_open(shape: tuple[int, ...], expected: set[str]) -> None:
-    """Pictures tell, sizes do not: 25 torch pictures in colour were read as 25x3 grey views."""
+    """Pictures tell, sizes do not: 25 torch pictures in colour were read as 25x3 grey views, 81 views as 64."""
     with pytest.raises(UnclearAxesError) as caught:
         taken(np.ones(shape, np.uint8))
     assert set(caught.value.readings) == expected
@@ -98,6 +99,7 @@ def test_an_axis_that_may_be_colours_or_a_row_of_views_is_left_open(shape: tuple
         ("TSHWC", (1, 5, 5, 64, 80, 3), (5, 5, 64, 80, 3)),
         ("TSCHW", (1, 1, 5, 5, 3, 64, 80), (5, 5, 64, 80, 3)),
         ("NHWC", (1, 81, 64, 80, 3), (1, 81, 64, 80, 3)),
+        ("CNHW", (3, 81, 64, 80), (1, 81, 64, 80, 3)),
     ],
 )
 def test_stacks_of_views_and_batches_of_one(axes: str, shape: tuple[int, ...], views: tuple[int, ...]) -> None:
