@@ -37,8 +37,9 @@ SIDES = {"left": (0, -1), "right": (0, 1), "up": (-1, 0), "down": (1, 0)}
 
 QUARTERS = (("left", "up"), ("left", "down"), ("right", "up"), ("right", "down"))
 
-# of a number of views, times
+# of a number of views, times; of views to one side of the reference view, all are of use
 _HARDLY_MORE = 1.1
+_SHORT = 2
 
 HALVES_AND_QUARTERS = ("full", *SIDES, *(f"{a}-{b}" for a, b in QUARTERS))
 """Names of the subsets of :func:`halves_and_quarters`."""
@@ -131,10 +132,11 @@ def spread_views(light_field: LightField, at_least: int | None) -> BoolMap:
 
 
 def views_without_aliases(light_field: LightField, at_least: int) -> BoolMap:
-    """As :func:`spread_views`, or a third of the views, with ``s + t`` divisible by three, where these are hardly more.
+    """As few views as :func:`spread_views`, or hardly more, that repeat fewer aliases of a texture.
 
-    Views on every second row and column repeat the aliases of a texture twice as often as all views do; a third of them
-    leave out no row and no column.
+    Those on every second row and column have aliases twice as often as all views do. A third of the views, with
+    ``s + t`` divisible by three, does not; nor do 13 views: the reference view, the corners, and eight that stand one
+    step from the border along one axis and one step from the reference view along the other.
 
     Parameters
     ----------
@@ -146,10 +148,17 @@ def views_without_aliases(light_field: LightField, at_least: int) -> BoolMap:
     ndarray, shape (T, S), bool
         Views that are present; the reference view is among them.
     """
-    few = spread_views(light_field, at_least)
-    rows, columns = np.indices(light_field.grid)
-    third = light_field.present & ((rows + columns - sum(light_field.reference_position)) % 3 == 0)
-    return third if few.sum() < third.sum() <= _HARDLY_MORE * few.sum() else few
+    t0, s0 = light_field.reference_position
+    reach = min(t0, s0, light_field.grid[0] - 1 - t0, light_field.grid[1] - 1 - s0)
+    down, across = np.indices(light_field.grid) - np.array([t0, s0])[:, None, None]
+    near, far = np.sort(np.abs([down, across]), axis=0)
+    third = (down + across) % 3 == 0
+    star = (far == 0) | ((near == 1) & (far == reach - 1)) | ((near == reach) & (far == reach))
+    for views in (third, star):
+        few: BoolMap = light_field.present & views
+        if reach > _SHORT and at_least <= few.sum() <= _HARDLY_MORE * at_least:
+            return few
+    return spread_views(light_field, at_least)
 
 
 def grid_steps(light_field: LightField) -> npt.NDArray[np.float64]:

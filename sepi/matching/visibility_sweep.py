@@ -321,13 +321,15 @@ def _visibility(
         if light_field.missing is not None:
             everywhere = nearest_surfaces(light_field, None, present, band.rows)
         return Visibility(everywhere, np.float32(0), np.float32(1), present, np.empty((2, 0, 0), np.int32))
+    searched = present & views_without_aliases(light_field, parameters.searched_views)
     # in noise, the mean of fewer views is the lowest of many candidates' by chance
-    noisy = isinstance(light_field, DenoisedLightField)
+    if isinstance(light_field, DenoisedLightField) or searched.sum() < parameters.searched_views:
+        searched = present
     return Visibility(
         nearest_surfaces(light_field, disparity, present, band.rows),
         np.float32(parameters.occlusion_margin),
         np.float32(parameters.occluded_view_weight),
-        present if noisy else spread_views(light_field, parameters.searched_views),
+        searched,
         _likely_candidates(disparity, disparities),
     )
 

@@ -57,9 +57,12 @@ def test_few_views_that_stand_for_all(grid, view, at_least, rows, count) -> None
 def test_a_third_of_the_views_leaves_out_no_row() -> None:
     """Every second row and column have the aliases of a texture twice as near."""
     field = LightField(np.zeros((9, 9, 4, 4, 3), np.uint8), "grid")
-    chosen = views_without_aliases(field, 25)
-    assert chosen[4, 4]
-    assert [chosen.sum(axis=axis).tolist() for axis in (0, 1)] == [[3] * 9] * 2
+    for at_least, count in ((25, 27), (13, 13)):
+        chosen = views_without_aliases(field, at_least)
+        assert chosen[4, 4]
+        assert chosen.sum() == count
+        # of 13, one row and column are two off the middle on either side
+        assert all((chosen.sum(axis=axis) > 0).sum() >= 7 for axis in (0, 1))
     assert views_without_aliases(field, 9).sum() == 9
 
 
