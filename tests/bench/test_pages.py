@@ -17,6 +17,8 @@ from bench.scene import Scene
 from sepi.lightfield import LightField
 from sepi.scenes import render
 
+pytestmark = pytest.mark.slow
+
 DOCS = Path(__file__).parents[2] / "docs"
 BELOW_COMMANDS = re.compile(r"((?:    .*\n)*    python -m bench (?:run|noise).*\n(?:    .*\n)*)\n((?:\|.*\n)+)")
 
