@@ -7,7 +7,8 @@
 # make fuzz   environment, then an hour (SECONDS=3600) of files made to trip the readers, led by what code they reach
 # make coverage  the whole test suite, and the share of lines and branches that it runs
 # make docs   environment, then docs-checks and the site of docs/, to build/docs/index.html: minutes, of which a second time few
-# make docs-checks  spelling and links of the documents, each command in them run or read by its parser, and how easily they read
+# make docs-checks  spelling and links of the documents, each command in them run or read by its parser, a command for each table
+#             of figures, and how easily they read
 # make docs-links  whether the addresses in it answer; needs the network
 # make lint   style, format, types, imports, spelling, and what the project says to GitHub, Docker and the package index
 # make actionlint  more of the workflows of GitHub; needs the network
@@ -130,7 +131,7 @@ docs: docs-checks docs/_made/said-of-order.txt demo
 
 # how easily the pages read is a report alone
 docs-checks: $(READY) lint-spelling
-	$(ONE_THREAD) $(BIN)/python -m pytest --quiet tests/docs/test_commands.py tests/docs/test_site.py -k "links or commands"
+	$(ONE_THREAD) $(BIN)/python -m pytest --quiet tests/docs/test_commands.py tests/docs/test_site.py tests/docs/test_tables.py -k "links or commands or tables"
 	$(BIN)/python docs/readability.py
 
 docs-links: $(READY) docs/_made/said-of-order.txt

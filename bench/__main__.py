@@ -13,6 +13,7 @@ from tqdm import tqdm
 from bench import plot, tables
 from bench.cases import GROUPS
 from bench.measure import Case, Measurement, Result, measured, read_result
+from bench.noisy import DIGITS
 from bench.scene import Scene
 from sepi.command import SepiGroup
 from sepi.compared.methods import LEARNED
@@ -28,7 +29,6 @@ from sepi.threads import available_cores, use_threads
 from sepi.variants import VARIANTS, variant_named
 
 if TYPE_CHECKING:
-    from bench.error_model import Judged
     from bench.error_samples import Sample
 
 _PATH = click.Path(path_type=Path)
@@ -224,12 +224,21 @@ def sweep(
 @click.option("--scene", "scenes", multiple=True, help="Built-in scene or light field with ground truth; repeatable.")
 @click.option("--sigma", "sigmas", type=click.FloatRange(0, 128), multiple=True, help="Noise, of 255; repeatable.")
 @click.option("--variant", "variants", type=click.Choice(list(VARIANTS)), multiple=True, help="Repeatable.")
+@click.option("--score", "scores", type=click.Choice(list(DIGITS)), multiple=True, help="Repeatable; all unless given.")
+@click.option("--allowed", is_flag=True, help="Beside them what noise allows: Q25 / BadPix 0.07 %.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
-def noise(scenes: tuple[str, ...], sigmas: tuple[float, ...], variants: tuple[str, ...], threads: int | None) -> None:
+def noise(
+    scenes: tuple[str, ...],
+    sigmas: tuple[float, ...],
+    variants: tuple[str, ...],
+    scores: tuple[str, ...],
+    allowed: bool,
+    threads: int | None,
+) -> None:
     """Print scores of variants on light fields with noise added: MSE x100 / Q25 x100 / BadPix 0.07 %.
 
-    Beside them what noise allows a pixel alone and in a window of its surface, by Cramer's and Rao's bound: Q25 and
-    BadPix of errors that are normal and no larger than they must be.
+    What noise allows a pixel alone, and in a window of its surface, is Cramer's and Rao's bound: scores of errors that
+    are normal and no larger than they must be.
 
     \b
     Example:
@@ -240,8 +249,9 @@ def noise(scenes: tuple[str, ...], sigmas: tuple[float, ...], variants: tuple[st
 
     use_threads(threads or available_cores())
     light_fields = [scene_for_choosing(scene, "off") for scene in scenes or ("dots",)]
-    found = list(rows(light_fields, sigmas or (0.0, 3.0, 8.0), variants or ("best", "fast", "best_no_denoising")))
-    click.echo(tables.markdown(found))
+    chosen = sigmas or (0.0, 3.0, 8.0), variants or ("best", "fast")
+    found = list(rows(light_fields, *chosen, scores or tuple(DIGITS), allowed))
+    click.echo(tables.markdown(tables.longer_side_down(found)))
 
 
 @main.command()
@@ -294,14 +304,14 @@ def errors(
 ) -> None:
     """Fit the numbers of the error bars (sepi/error_bars/calibration.py) and print them, and what they are worth.
 
-    Coverage of the interval of 90 %, its median width in pixels per view step of which the farthest view is four away,
-    and the said and found share of errors below 0.07 there.
+    Coverage of the interval of 90 %; for the first variant its median width, in pixels per view step of which the
+    farthest view is four away, and the area under the sparsification error curve by sigma and by smoothness.
 
     \b
     Example:
       python -m bench errors --scene rack --scene pencils --sigma 0 --sigma 8 --leave-out
     """
-    from bench.error_model import as_code, fitted, judged, left_out, pooled
+    from bench.error_model import as_code, fitted, judgements, left_out, pooled
     from bench.error_samples import CALIBRATIONS, light_fields, sample
 
     use_threads(threads or available_cores())
@@ -325,26 +335,15 @@ def errors(
     samples = sampled(scenes or ("rack", "pencils"), levels) + sampled(steps, (0.0,))
     calibration = fitted(samples, CALIBRATIONS[choice])
     click.echo(as_code(choice.upper(), calibration))
-    alone = left_out(samples, CALIBRATIONS[choice]) if leave_out else {}
-    rows, held_out = [], sampled(judge, levels, held_out=True)
-    for one in samples + held_out:
-        row = {"scene": one.name, "variant": one.variant, **_judgement(judged(one, calibration))}
-        if leave_out:
-            fit = alone.get(one.world, calibration)
-            row |= {f"{key}, left out": text for key, text in _judgement(judged(one, fit)).items()}
-        rows.append(row)
-    click.echo(tables.markdown(rows))
-    for some in (samples, held_out, samples + held_out) if held_out else (samples,):
-        click.echo(f"\n{pooled(some, calibration)}")
-
-
-def _judgement(found: Judged) -> dict[str, str]:
-    return {
-        "coverage %": f"{found.coverage:.1f}",
-        "width": f"{found.width:.4f}",
-        "said / found %": f"{found.said:.1f} / {found.found:.1f}",
-        "AUSE sigma / smoothness": f"{found.ause:.2f} / {found.ause_smooth:.2f}",
-    }
+    held_out = sampled(judge, levels, held_out=True)
+    click.echo(tables.markdown(judgements(samples + held_out, {}, calibration)))
+    if leave_out:
+        click.echo("\nFitted to all other scenes:\n")
+        click.echo(tables.markdown(judgements(samples, left_out(samples, CALIBRATIONS[choice]), calibration)))
+    names = ", ".join(f"`{variant}`" for variant in variants)
+    parts = {"of the fit": samples, "held out": held_out}
+    rows = [{"maps": f"{names}: {len(some)} {of}", **pooled(some, calibration)} for of, some in parts.items() if some]
+    click.echo(f"\n{tables.markdown(rows)}")
 
 
 def _all_measured(cases: list[Case], repeats: int, threads: int) -> tuple[list[Measurement], int]:

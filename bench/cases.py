@@ -83,10 +83,12 @@ def _variant_cases(scene: Scene) -> Iterator[Case]:
     output = str(scene.folder / "variant")
     for variant in VARIANTS_BESIDE:
         words = ("depth", str(scene.source), "--output", output, "--threads", str(scene.threads), "--variant", variant)
-        yield Case("variants", f"{variant}, files to maps", command, ("sepi", *words))
-        yield Case("variants", f"{variant}, once more in a process", whole_variant, (scene.path, variant))
+        yield Case("variants", f"{variant}: files to maps", command, ("sepi", *words))
+        yield Case("variants", f"{variant}: once more in a process", whole_variant, (scene.path, variant))
         if scene.threads > 1:
-            yield Case("variants", f"{variant}, so on one thread", whole_variant, (scene.path, variant), threads=1)
+            yield Case(
+                "variants", f"{variant}: the same on one thread", whole_variant, (scene.path, variant), threads=1
+            )
     for variant in VARIANTS_BESIDE:
         for name, choice in variant_named(variant).choices.items():
             if choice != HANDED_ON:
@@ -131,14 +133,14 @@ def _large_case(scene: Scene) -> Iterator[Case]:
     whole(scene.grown(64, 3), scene.num_disparities).call()
     size, views = LARGE
     path, name = scene.grown(size, views), f"{views}x{views} views of {size}x{size}"
-    yield Case("large", name, whole, (path, scene.num_disparities), most=1)
+    yield Case("large", f"{VARIANT}: {name}", whole, (path, scene.num_disparities), most=1)
     whole_variant(scene.grown(64, 3), "best").call()
-    yield Case("large", f"{name}, variant best", whole_variant, (path, "best"), most=1)
+    yield Case("large", f"best: {name}", whole_variant, (path, "best"), most=1)
     # in a folder of its own: all jobs are to be done
     folder = scene.folder / "workflow"
     folder.mkdir()
     words = ("--snakefile", str(SNAKEFILE), "--directory", str(folder), "--cores", str(scene.threads), "--quiet", "all")
-    yield Case("large", "snakemake, built-in scenes", command, ("snakemake", *words, "--", "all"), most=1)
+    yield Case("whole", "snakemake, built-in scenes", command, ("snakemake", *words, "--", "all"), most=1)
 
 
 def _plain_cases(scene: Scene) -> Iterator[Case]:

@@ -37,8 +37,6 @@ class Judged(NamedTuple):
     ----------
     coverage, width : float
         Share of the errors within the interval, %, and its median width, pixels per view step.
-    said, found : float
-        Mean probability of a small error, and the share of such errors, %.
     ause, ause_smooth : float
         Area under the sparsification error curve (:func:`sepi.scoring.error_bars.ause`) by the standard deviation, and
         by the smoothness of the map and the information of the views, which a confidence used to be.
@@ -46,8 +44,6 @@ class Judged(NamedTuple):
 
     coverage: float
     width: float
-    said: float
-    found: float
     ause: float
     ause_smooth: float
 
@@ -93,28 +89,40 @@ def judged(one: Sample, calibration: Calibration) -> Judged:
     bars = described(mixture_of(_pictures(one), calibration), TAIL, CLOSE)
     margin = one.step / 2
     held = (one.error <= bars.above[0] + margin) & (one.error >= -bars.below[0] - margin)
-    small = np.abs(one.error) <= CLOSE
     width = float(np.median(bars.above + bars.below))
-    said, found = 100 * float(bars.probability.mean()), 100 * float(small.mean())
     doubts = bars.sigma[0], (1 - one.cues["smooth_confidence"]).astype(np.float32)
     orders = [ause(doubt, one.error.astype(np.float32)) for doubt in doubts]
-    return Judged(100 * float(held.mean()), width, said, found, *orders)
+    return Judged(100 * float(held.mean()), width, *orders)
 
 
-def pooled(samples: Sequence[Sample], calibration: Calibration) -> str:
-    """All samples together: mean and least coverage, the order of the errors, and whether confidences are right."""
+def judgements(samples: Sequence[Sample], fits: Mapping[str, Calibration], other: Calibration) -> list[dict[str, str]]:
+    """A row for each light field; of the calibrations of its scenes, or the ``other``."""
+    rows: dict[str, dict[str, str]] = {}
+    for one in samples:
+        found = judged(one, fits.get(one.world, other))
+        row = rows.setdefault(one.name, {"light field": one.name})
+        row[f"`{one.variant}`, coverage %"] = f"{found.coverage:.1f}"
+        row.setdefault("width", f"{found.width:.3f}")
+        row.setdefault("AUSE by `sigma` / by smoothness", f"{found.ause:.2f} / {found.ause_smooth:.2f}")
+    return list(rows.values())
+
+
+def pooled(samples: Sequence[Sample], calibration: Calibration) -> dict[str, str]:
+    """All samples together: mean and range of coverage, whether confidences are right, and the order of the errors."""
     worth = [judged(one, calibration) for one in samples]
     ratios = np.array([one.ause / one.ause_smooth for one in worth])
-    said = [described(mixture_of(_pictures(one), calibration), TAIL, CLOSE).probability[0] for one in samples]
+    confidences = [described(mixture_of(_pictures(one), calibration), TAIL, CLOSE).probability[0] for one in samples]
     error = np.concatenate([one.error for one in samples]).astype(np.float32)
-    tenths = reliability(np.concatenate(said), error, CLOSE)
+    tenths = reliability(np.concatenate(confidences), error, CLOSE)
     coverages = [one.coverage for one in worth]
-    parts = (f"{100 * a:.1f} / {100 * b:.1f}" for a, b in zip(tenths.said, tenths.found, strict=True))
-    return (
-        f"{len(samples)} maps: coverage {np.mean(coverages):.1f} %, {min(coverages):.1f} to {max(coverages):.1f} %; "
-        f"AUSE by sigma over that by smoothness {np.exp(np.log(ratios).mean()):.2f}, above 1 on {np.sum(ratios > 1)}; "
-        f"confidence, said / found %: {', '.join(parts)}"
-    )
+    said, found = tenths.said, tenths.found
+    off = np.where(tenths.enough, np.abs(found - said), 0)
+    worst = int(off.argmax())
+    return {
+        "coverage, mean % (range)": f"{np.mean(coverages):.1f} ({min(coverages):.1f} to {max(coverages):.1f})",
+        "`confidence` off by at most": f"{off[worst]:.2f} ({said[worst]:.2f} said, {found[worst]:.2f} found)",
+        "AUSE by `sigma`, of that by smoothness": f"{np.exp(np.log(ratios).mean()):.2f}",
+    }
 
 
 def left_out(samples: Sequence[Sample], form: Calibration) -> dict[str, Calibration]:

@@ -74,7 +74,7 @@ def light_fields(
         light_field = scene_for_choosing(scene, NOISE_LEVELS[0])
         for sigma in sigmas:
             if sigma:
-                yield f"{light_field.name} +{sigma:g}", with_noise(light_field, sigma)
+                yield f"{light_field.name} + {sigma:g}", with_noise(light_field, sigma)
             else:
                 yield light_field.name, light_field
 

@@ -16,8 +16,11 @@ from sepi.scoring.scores import score
 
 Row = dict[str, str]
 
-ALLOWED = {"allowed, a pixel alone": 0, "allowed, 5x5 pixels": 2}
+ALLOWED = {"allowed, alone": 0, "allowed, 5x5": 2}
 """What noise allows whoever is asked, by how many pixels around tell: radius of the window."""
+
+DIGITS = {"mse100": 2, "q25": 2, "badpix007": 1}
+"""Scores, and their decimals."""
 
 
 NO_NOISE = 1e-9
@@ -36,23 +39,27 @@ def with_noise(light_field: LightField, sigma: float) -> LightField:
     return replace(light_field, views=(noisy if views.dtype == np.float32 else np.rint(noisy)).astype(views.dtype))
 
 
-def rows(light_fields: Iterable[LightField], sigmas: Sequence[float], variants: Sequence[str]) -> Iterator[Row]:
-    """A row for each light field and level of noise: the noise that is measured in it, each variant's scores, and what
-    noise allows.
-    """
+def rows(
+    light_fields: Iterable[LightField],
+    sigmas: Sequence[float],
+    variants: Sequence[str],
+    scores: Sequence[str],
+    allowed: bool,
+) -> Iterator[Row]:
+    """A row for each light field and level of noise: each variant's scores, and what the measured noise allows."""
     for light_field in light_fields:
         assert light_field.ground_truth is not None
-        of_unit_noise = {name: deviations_allowed(light_field, 1.0, radius) for name, radius in ALLOWED.items()}
+        of_unit_noise = {
+            name: deviations_allowed(light_field, 1.0, radius) for name, radius in ALLOWED.items() if allowed
+        }
         for sigma in sigmas:
             noisy = with_noise(light_field, sigma) if sigma else light_field
             measured = view_noise(noisy).usual
-            row = {"scene": light_field.name, "added": f"{sigma:g}", "measured": f"{255 * measured:.1f}"}
+            row = {"light field": light_field.name + (f" + {sigma:g}" if sigma else "")}
             for variant in variants:
                 found = score(estimate_depth(noisy, variant).disparity, light_field.ground_truth)
-                row[variant] = " / ".join(
-                    f"{found[name]:.{digits}f}" for name, digits in (("mse100", 2), ("q25", 2), ("badpix007", 1))
-                )
+                row[f"`{variant}`"] = " / ".join(f"{found[name]:.{DIGITS[name]}f}" for name in scores)
             for name, deviations in of_unit_noise.items():
-                allowed = scores_allowed(max(measured, NO_NOISE) * deviations)
-                row[name] = f"{allowed['q25']:.2f} / {allowed['badpix007']:.1f}"
+                least = scores_allowed(max(measured, NO_NOISE) * deviations)
+                row[name] = f"{least['q25']:.2f} / {least['badpix007']:.1f}"
             yield row

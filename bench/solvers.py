@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pyamg
-import scipy.sparse as sparse
 from scipy.sparse import linalg
 
 from bench.measure import Figures, Prepared
@@ -38,17 +37,16 @@ def multigrid(kind: str, matrix: Any, right: Vector, start: Vector, rtol: float)
     return np.asarray(hierarchy.solve(right, x0=start, tol=rtol, accel="cg", maxiter=500))
 
 
-def jacobi(matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
-    """Conjugate gradients with the diagonal."""
-    return _conjugate_gradients(matrix, right, start, rtol, sparse.diags_array(1 / matrix.diagonal()))
-
-
 def incomplete(matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
     """Conjugate gradients with an incomplete factorisation."""
     factors = linalg.spilu(
         matrix.tocsc(), drop_tol=1e-4, fill_factor=10, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0
     )
-    return _conjugate_gradients(matrix, right, start, rtol, linalg.LinearOperator(matrix.shape, factors.solve))
+    inverse = linalg.LinearOperator(matrix.shape, factors.solve)
+    solution, missed = linalg.cg(matrix, right, x0=start, rtol=rtol, maxiter=MAX_ITERATIONS, M=inverse)
+    if missed:
+        raise SepiError(f"no convergence in {MAX_ITERATIONS} iterations")
+    return np.asarray(solution)
 
 
 def direct(matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
@@ -61,21 +59,14 @@ def direct(matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
 
 SOLVERS: dict[str, Solver] = {
     "direct (SuperLU)": direct,
-    # Jacobi, and multigrid where that does not arrive soon
-    "sepi's": lambda matrix, right, start, rtol: solve(matrix, right, start.astype(np.float32), rtol),
-    "multigrid, Ruge-Stuben + CG": partial(multigrid, "ruge_stuben"),
-    "multigrid, smoothed aggregation + CG": partial(multigrid, "smoothed_aggregation"),
-    "Jacobi + CG": jacobi,
+    "sepi's: Jacobi + CG, multigrid where needed": lambda matrix, right, start, rtol: solve(
+        matrix, right, start.astype(np.float32), rtol
+    ),
+    "multigrid (Ruge-Stuben) + CG": partial(multigrid, "ruge_stuben"),
+    "multigrid (smoothed aggregation) + CG": partial(multigrid, "smoothed_aggregation"),
     "incomplete LU + CG": incomplete,
 }
 """Name to solver, the exact one first."""
-
-
-def _conjugate_gradients(matrix: Any, right: Vector, start: Vector, rtol: float, inverse: Any) -> Vector:
-    solution, missed = linalg.cg(matrix, right, x0=start, rtol=rtol, maxiter=MAX_ITERATIONS, M=inverse)
-    if missed:
-        raise SepiError(f"no convergence in {MAX_ITERATIONS} iterations")
-    return np.asarray(solution)
 
 
 def prepare(path: Path, name: str) -> Prepared:

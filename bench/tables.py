@@ -8,12 +8,15 @@ from tabulate import tabulate
 
 from bench import floor
 from bench.measure import Measurement, Result
+from sepi.variants import STAGES
 
 Row = dict[str, str]
 """Heading to text; a cell without a figure is empty."""
 
 AXES = {"size": 2, "views": 2, "num_disparities": 1, "threads": -1}
 """What grows, and the power of it that time grows with if it is linear in pixels, views, candidates and work."""
+
+UNITS = {"size": "pixels a side", "views": "views a side", "num_disparities": "candidates"}
 
 SCORES = {"mse100": "MSE x100", "q25": "Q25 x100", "badpix007": "BadPix %"}
 
@@ -35,16 +38,29 @@ def markdown(rows: list[Row]) -> str:
     return str(tabulate(rows, headers="keys", tablefmt="pipe", colalign=alignment, disable_numparse=True))
 
 
+def longer_side_down(rows: list[Row]) -> list[Row]:
+    """The same table, with the side of more names as its first column."""
+    first, *others = rows[0]
+    if len(rows) >= len(others):
+        return rows
+    return [{"": name} | {row[first]: row[name] for row in rows} for name in others]
+
+
 def sections(result: Result) -> dict[str, list[Row]]:
     """Every table for which there are measurements, by its heading."""
     tables = {
-        "Whole": [_row(m) for m in (result.group("whole") | result.group("large")).values()],
-        "Variants": [_row(m, _scores(m)) for m in result.group("variants").values()],
+        "Whole": [_row(m) for m in result.group("whole").values()],
+        "Variants": variants(result),
         "One core busy, times as long": [_row(m, m.figures) for m in result.group("busy").values()],
         "Steps": steps(result),
-        **{f"Growth with {axis}, built-in scene": growth(result, axis) for axis in AXES},
-        "Initial stage beside plain ones": beside(result),
-        "Solvers of the global optimisation": [_row(m, m.figures) for m in result.group("solvers").values()],
+        "Growth, built-in scene": growth(result),
+        "Initial stage beside plain ones": [
+            {"": name, "s per candidate": f"{seconds:.2g}"} for name, seconds in per_candidate(result).items()
+        ],
+        "Solvers of the global optimisation": [
+            {"": name, "s": _figure(m.median), "largest error": f"{m.figures['largest_difference']:.0g}"}
+            for name, m in result.group("solvers").items()
+        ],
         "HDF5 compression": [_row(m, m.figures) for m in result.group("storage").values()],
     }
     return {heading: rows for heading, rows in tables.items() if rows}
@@ -62,41 +78,36 @@ def steps(result: Result) -> list[Row]:
     return rows
 
 
-def growth(result: Result, axis: str) -> list[Row]:
-    """One axis growing: seconds, and seconds per sample (threads: speed-up over one), which stay level if linear."""
+def variants(result: Result) -> list[Row]:
+    """A row for each part of what variants do: seconds, and memory where it is more than one stage."""
+    rows: dict[str, Row] = {}
+    for name, m in (result.group("variants") | result.group("large")).items():
+        variant, _, part = name.partition(": ")
+        memory = "" if part in STAGES else f" / {_figure(m.peak_memory_mb)} MB"
+        rows.setdefault(part, {"": part})[f"`{variant}`"] = f"{_figure(m.median)} s{memory}"
+    return list(rows.values())
+
+
+def growth(result: Result) -> list[Row]:
+    """Nanoseconds per sample while one of pixels, views and candidates grows; they stay level if time is linear."""
     rows = []
-    for name, first in result.group("growth, initial").items():
-        if not name.startswith(f"{axis} "):
-            continue
-        at = first.figures
-        row = {axis: f"{at[axis]:.0f}"}
+    for axis, unit in UNITS.items():
+        points = [name for name in result.group("growth, initial") if name.startswith(f"{axis} ")]
+        row = {"": f"{', '.join(name.removeprefix(f'{axis} ') for name in points)} {unit}"}
         for what in ("initial", "all stages"):
-            group = result.group(f"growth, {what}")
-            median = group[name].median
-            row[f"{what} s"] = _figure(median)
-            if axis == "threads":
-                row[f"{what}, speed-up"] = _figure(group["threads 1"].median / median)
-            else:
-                samples = (at["size"] * at["views"]) ** 2 * at["num_disparities"]
-                row[f"{what}, ns per sample"] = _figure(1e9 * median / samples)
-        rows.append(row | {"peak memory MB": _figure(group[name].peak_memory_mb)})
+            found = [result.group(f"growth, {what}")[name] for name in points]
+            row[f"{what}, ns"] = ", ".join(f"{1e9 * m.median / _samples(m):#.2g}" for m in found)
+        rows += [row] if points else []
     return rows
+
+
+def _samples(m: Measurement) -> float:
+    return (m.figures["size"] * m.figures["views"]) ** 2 * m.figures["num_disparities"]
 
 
 def per_candidate(result: Result) -> dict[str, float]:
     """Seconds per candidate of the initial stage and the plain ones, by name."""
     return {name: m.median / m.figures["num_disparities"] for name, m in result.group("beside").items()}
-
-
-def beside(result: Result) -> list[Row]:
-    """Plain implementations of the initial stage: seconds of a candidate, and times those of this project."""
-    seconds, group = per_candidate(result), result.group("beside")
-    rows = []
-    for name, m in group.items():
-        more = {"s per candidate": seconds[name], "times sepi's": seconds[name] / seconds["sepi"]}
-        differences = {key: m.figures.get(key) for key in ("mean_difference", "largest_difference")}
-        rows.append(_row(m, {**more, **differences}))
-    return rows
 
 
 def comparison(before: Result, after: Result) -> list[Row]:

@@ -1,9 +1,15 @@
-"""Scores in tables of the pages, from what ``snakemake --config hci_root=... -- all ablation`` made.
+"""Figures in tables of the pages, from the CSV files of a run: ``python docs/make_tables.py . README.md docs/*/*.md``.
 
-``python docs/make_tables.py . README.md docs/reproduce/ablations.md`` after a run here; the first word is the folder
-that it was run in. Above such a table a comment says how scores are written, ``<!-- scores {mse100:.2f} -->``, by the
-heads of ``reports/stages.csv``. Cells are filled where a row names a variant as code and a column a scene; after the
-words ``or empty`` those are left empty that equal the first row's.
+The first word is the folder of the run; tables whose files are not there stay. A comment above a table says how its
+cells are made::
+
+    <!-- from reports/stages.csv, variant by scene: {mse100:.2f} / {badpix007:.1f} or empty -->
+    <!-- from reports/edges.csv, scene variant: {area:.1f} | {mse100_there:.2f}, {mse100_away:.2f} -->
+
+First come files, then columns of theirs: what the first cells of a row name and, after ``by``, what the heads name; in
+a cell code is the name if there is any, else the words before a comma or bracket. Then come the forms of the cells,
+again from the first when there is none left; after ``or empty`` cells stay empty that equal the first row's. Rows of a
+file count that have ``NAME=VALUE``, as given or of :data:`USUAL`; of several for one cell it is the mean.
 """
 
 from __future__ import annotations
@@ -11,52 +17,73 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
+from statistics import mean
 
 import click
 
-Scores = Mapping[tuple[str, str], Mapping[str, float]]
-"""Variant and scene to scores of the whole final map."""
+USUAL = {"protocol": "paper", "region": "all", "stage": "optimize"}
+"""Final maps as a whole."""
 
-_TABLE = re.compile(r"<!-- scores (.+?)( or empty)? -->\n\n?((?:\|.*\n)+)")
+TABLE = re.compile(
+    r"<!-- from (?P<what>[^:]+): (?P<forms>.+?)(?P<empty> or empty)? -->\n\n?(?P<rows>(?:\|[^\n]*\n)+)", re.S
+)
 
-
-def read_scores(file: Path) -> Scores:
-    """What a run's table of stages says."""
-    with file.open(encoding="utf-8", newline="") as opened:
-        rows = [row for row in csv.DictReader(opened) if (row["protocol"], row["region"]) == ("paper", "all")]
-    # the last stage of each comes last; maps of other programs have none
-    ours = [row for row in rows if row["stage"] != "external"]
-    return {(row["variant"], row["scene"]): {k: float(v) for k, v in [*row.items()][7:]} for row in ours}
+FIGURE = re.compile(r"\{([^:}]+):([^}]+)\}")
 
 
-def filled(page: str, scores: Scores) -> str:
-    """A page with the scores that are known in its tables."""
+class Figures(list[str]):
+    """Cells of a column; written as their mean, without those that have no figure."""
 
-    def table(found: re.Match[str]) -> str:
-        head, _, *rows = ([cell.strip() for cell in row.split("|")[1:-1]] for row in found[3].splitlines())
-        for row in rows:
-            variant = re.search("`(.+?)`", row[0])
-            for place, scene in enumerate(head):
-                one = scores.get((variant[1] if variant else "", scene))
-                if one is not None:
-                    text = found[1].format(**one)
-                    row[place] = "" if found[2] and row is not rows[0] and text == rows[0][place] else text
-        lines = found[0].splitlines()[: -len(rows)]
-        lines += ["|" + "".join(f" {cell} |" if cell else " |" for cell in row) for row in rows]
-        return "\n".join(lines) + "\n"
+    def __format__(self, form: str) -> str:
+        known = [float(cell) for cell in self if cell not in ("", "nan")]
+        return format(mean(known), form) if known else "-"
 
-    return _TABLE.sub(table, page)
+
+def name_in(cell: str) -> str:
+    """What a cell of a page names."""
+    return (re.search("`(.+?)`", cell) or re.match("([^,(]*)", cell) or "")[1].strip()
+
+
+def _written(figures: Mapping[str, Figures], form: re.Match[str]) -> str:
+    return format(figures[form[1]], form[2])
+
+
+def filled(table: re.Match[str], run: Path) -> str:
+    """A table with the figures that a run has for it."""
+    *given, named = " ".join(table["what"].split()).split(", ")
+    rows, _, across = named.partition(" by ")
+    keys = [*rows.split(), *filter(None, [across])]
+    wanted = {k: v for k, v in USUAL.items() if k not in keys} | dict(w.split("=") for w in given if "=" in w)
+    known: dict[tuple[str, ...], dict[str, Figures]] = {}
+    for file in (run / word for word in given if "=" not in word and (run / word).exists()):
+        for record in csv.DictReader(file.read_text(encoding="utf-8").splitlines()):
+            if all(record.get(key, value) == value for key, value in wanted.items()):
+                figures = known.setdefault(tuple(record[key] for key in keys), {})
+                for column, text in record.items():
+                    figures.setdefault(column, Figures()).append(text)
+    forms = " ".join(table["forms"].split()).split(" | ")
+    head, _, *cells = ([cell.strip() for cell in line.split("|")[1:-1]] for line in table["rows"].splitlines())
+    names = len(rows.split())
+    for row in cells:
+        for place in range(names, len(row)):
+            name = (*map(name_in, row[:names]), *([name_in(head[place])] if across else []))
+            if name in known:
+                form = forms[(place - names) % len(forms)]
+                text = FIGURE.sub(partial(_written, known[name]), form)
+                row[place] = "" if table["empty"] and row != cells[0] and text == cells[0][place] else text
+    start = table[0].splitlines()[: -len(cells)]
+    return "\n".join([*start, *("|" + "".join(f" {c} |" if c else " |" for c in row) for row in cells), ""])
 
 
 @click.command()
 @click.argument("run", type=click.Path(path_type=Path, exists=True))
 @click.argument("pages", nargs=-1, type=click.Path(path_type=Path, exists=True))
 def main(run: Path, pages: tuple[Path, ...]) -> None:
-    """Write the scores of a RUN into the tables of PAGES."""
-    scores = read_scores(run / "reports" / "stages.csv")
+    """Write the figures of a RUN into the tables of PAGES."""
     for page in pages:
-        page.write_text(filled(page.read_text(encoding="utf-8"), scores), encoding="utf-8")
+        page.write_text(TABLE.sub(partial(filled, run=run), page.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":

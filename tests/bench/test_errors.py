@@ -1,5 +1,6 @@
 """The numbers of the error bars make the errors likeliest, and say of other scenes what they say of these."""
 
+import re
 from functools import partial
 from pathlib import Path
 
@@ -73,8 +74,11 @@ def test_the_command_fits_and_judges_scenes(tmp_path: Path, monkeypatch: pytest.
     done, again = (CliRunner().invoke(main, words) for _ in range(2))
     assert done.exit_code == 0, done.output
     assert "SECOND_ORDER = Calibration(" in done.stdout
-    assert "dots +3" in done.stdout
-    assert "1 maps: coverage" in done.stdout
+    assert "dots + 3" in done.stdout
+    *_, head, _, row = done.stdout.splitlines()
+    assert row.startswith("| `fast`: 1 of the fit")
+    page = Path(__file__).parents[2] / "docs/method/error_bars.md"
+    assert re.sub(" +", " ", head) in page.read_text(encoding="utf-8")
     # kept pixels are those that were computed
     assert again.stdout == done.stdout
     assert len(list(tmp_path.iterdir())) == 1
