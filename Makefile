@@ -131,7 +131,7 @@ docs: docs-checks docs/_made/said-of-order.txt demo
 
 # how easily the pages read is a report alone
 docs-checks: $(READY) lint-spelling
-	$(ONE_THREAD) $(BIN)/python -m pytest --quiet tests/docs/test_commands.py tests/docs/test_site.py tests/docs/test_tables.py -k "links or commands or tables"
+	$(ONE_THREAD) $(BIN)/python -m pytest --quiet tests/docs/test_commands.py tests/docs/test_site.py tests/docs/test_made_tables.py -k "links or commands or tables"
 	$(BIN)/python docs/readability.py
 
 docs-links: $(READY) docs/_made/said-of-order.txt
