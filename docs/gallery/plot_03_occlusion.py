@@ -139,26 +139,31 @@ plt.show()
 # What it is worth
 # ----------------
 #
-# The same method with that stage switched off is the variant ``no_occlusion``.
-# The mask ``occluded`` of a rendered scene holds the pixels that at least one
-# view does not see. There, the squared error falls by more than a third. The
-# variant ``best`` chooses the views one by one, and goes further. Narrow gaps
-# between rods stay hard for all.
+# The variant ``no_occlusion_no_textureless`` leaves this stage out, and that of
+# superpixels, which would smooth over what we look at; ``no_textureless`` has
+# half-SEPIs again. The mask ``occluded`` of a rendered scene holds the pixels
+# that at least one view does not see. There, the squared error falls by more
+# than a third. The variant ``best`` chooses the views one by one, and goes
+# further. Narrow gaps between rods stay hard for all.
 
 occluded = light_field.masks["occluded"]
 figure, axes = plt.subplots(1, 2, figsize=(6, 3.5), layout="constrained")
 mse = {}
-for variant in ("no_occlusion", "paper", "best"):
+for variant, name in (
+    ("no_occlusion_no_textureless", "all views"),
+    ("no_textureless", "half-SEPIs"),
+    ("best", "best"),
+):
     disparity = sepi.estimate_depth(light_field, variant).disparity
-    mse[variant] = score(disparity, light_field.ground_truth, region=occluded)[
+    mse[name] = score(disparity, light_field.ground_truth, region=occluded)[
         "mse100"
     ]
-    print(f"{variant:13s} MSE x100 of occluded pixels: {mse[variant]:6.2f}")
-    if variant != "best":
-        axis = axes[0 if variant == "no_occlusion" else 1]
+    print(f"{name:10s} MSE x100 of occluded pixels: {mse[name]:6.2f}")
+    if name != "best":
+        axis = axes[0 if name == "all views" else 1]
         error = np.abs(disparity - light_field.ground_truth)
         image = axis.imshow(error, vmax=2, cmap="magma")
-        axis.set_title(variant)
+        axis.set_title(name)
         axis.set_axis_off()
 figure.colorbar(
     image,

@@ -30,7 +30,7 @@ CLAIMS: dict[str, list[str]] = {
     "plot_03_occlusion": [
         "cost_at_truth['right'] < 0.5 * cost_at_truth['full'] < 0.5 * cost_at_truth['left']",
         "all(abs(curves.minimum(name)[0] - true) < 0.05 for name in ('full', 'left', 'right'))",
-        "mse['best'] < mse['paper'] < 2 / 3 * mse['no_occlusion']",
+        "mse['best'] < mse['half-SEPIs'] < 2 / 3 * mse['all views']",
         "maps.subset_names[maps.extra['view_subset'][y, x]].startswith('right')",
     ],
     "plot_04_textureless_regions": [
