@@ -139,12 +139,12 @@ plt.show()
 # What it is worth
 # ----------------
 #
-# The variant ``no_occlusion_no_textureless`` leaves this stage out, and that of
-# superpixels, which would smooth over what we look at; ``no_textureless`` has
-# half-SEPIs again. The mask ``occluded`` of a rendered scene holds the pixels
-# that at least one view does not see. There, the squared error falls by more
-# than a third. The variant ``best`` chooses the views one by one, and goes
-# further. Narrow gaps between rods stay hard for all.
+# The variant ``no_occlusion_no_textureless`` leaves out this stage, and that
+# of superpixels, which would smooth over what we look at; ``no_textureless``
+# has half-SEPIs again. The mask ``occluded`` of a rendered scene holds the
+# pixels that at least one view does not see. There, the squared error falls by
+# more than a third. The variant ``best`` chooses the views one by one, and
+# goes further. Narrow gaps between rods stay hard for all.
 
 occluded = light_field.masks["occluded"]
 figure, axes = plt.subplots(1, 2, figsize=(6, 3.5), layout="constrained")
