@@ -36,7 +36,7 @@ ENTRIES: dict[str, dict[str, Any]] = {
         "initial": {"choice": "semi_global", "first_views": 9, "first_sampling": 3},
         # of one pass that takes a tenth longer for it hardly anything gets better
         "occlusion": {"choice": "visibility", "passes": 1, "views": 25, "sampling": 2, "mean_noise": 1},
-        "textureless": "uniform_planes",
+        "textureless": {"choice": "uniform_planes", "views": 9},
         # of so few views faint detail in noise tells less than it harms
         "optimize": {"choice": "second_order", "views": 25, "solves": 1, "least_noise": 0},
     },

@@ -321,10 +321,14 @@ def _visibility(
         if light_field.missing is not None:
             everywhere = nearest_surfaces(light_field, None, present, band.rows)
         return Visibility(everywhere, np.float32(0), np.float32(1), present, np.empty((2, 0, 0), np.int32))
-    searched = present & views_without_aliases(light_field, parameters.searched_views)
+    searched = present
     # in noise, the mean of fewer views is the lowest of many candidates' by chance
-    if isinstance(light_field, DenoisedLightField) or searched.sum() < parameters.searched_views:
-        searched = present
+    if not isinstance(light_field, DenoisedLightField):
+        for chosen_by in (views_without_aliases, spread_views):
+            few = present & chosen_by(light_field, parameters.searched_views)
+            if few.sum() >= parameters.searched_views:
+                searched = few
+                break
     return Visibility(
         nearest_surfaces(light_field, disparity, present, band.rows),
         np.float32(parameters.occlusion_margin),

@@ -47,6 +47,9 @@ LEFT_OF_SLOPES = 15 / 128
 MOST_CONTRADICTED = 0.1
 """Of a region, that views may know otherwise where its plane is right elsewhere."""
 
+NOISY_VIEWS = 25
+"""Of noisy views, are averaged at least: the mean of fewer has so much noise that texture passes for a plain region."""
+
 LIT_SHARE = 0.01
 """Of the picture, below which nothing is asked: it takes as long as a round of the optimisation."""
 
@@ -103,9 +106,10 @@ def fill_uniform_regions(
 
     # planes need it, where views have taken what memory there is
     take_blas_buffer()
-    compared = spread_views(light_field, parameters.views)
     field = denoised(light_field, parameters.denoising)
     noisy = isinstance(field, DenoisedLightField)
+    averaged = parameters.views if parameters.views is None or not noisy else max(parameters.views, NOISY_VIEWS)
+    compared = spread_views(light_field, averaged)
     colours = BaseDetailParameters(colour_scale=parameters.colour_scale, use_detail=False)
     matching = GaussNewton(field, colours, parameters.occlusion_margin, compared)
     variance = _variance_of_views(light_field, field, compared)
