@@ -58,7 +58,7 @@ long-tests: $(READY)
 	$(TESTS) -m "$(QUICK) and not long" --note-long tests/long_tests.txt
 
 # of a core of the calibration loop in tests/cpu_budget.py: a fifth more than they take
-CPU_SECONDS := 2250
+CPU_SECONDS := 1900
 test: $(READY)
 	$(TESTS) -m "not system and not faults" --cpu-budget $(CPU_SECONDS)
 
