@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from sepi.built_in_variants import PARTS_OF_BEST
-from sepi.lightfield import LightField
+from sepi.lightfield import DisparityRange, LightField
 from sepi.pipeline import estimate_depth
 from sepi.regularization.border_planes import BorderPlaneParameters, ransac_plane
 from sepi.regularization.uniform_regions import UniformPlanesParameters, plain_pixels
@@ -70,6 +71,29 @@ def test_edges_are_sharp_and_texture_is_no_edge(name: str) -> None:
         paper = score(estimate_depth(scene, "paper").disparity, scene.ground_truth)
         for measure, part in (("mse100", 0.6), ("q25", 0.6), ("badpix007", 0.3)):
             assert best[measure] < part * paper[measure], measure
+
+
+def checked(size: int, period: float) -> LightField:
+    """A checked patch at 0.5 px per view step before a textured ground; its next aliases lie outside the range."""
+    y, x = np.mgrid[:size, :size].astype(np.float32)
+    rng = np.random.default_rng(0)
+    ground = cv2.GaussianBlur(rng.random((2 * size, 2 * size), np.float32), (0, 0), 1.2)
+    ground = (ground - ground.min()) / np.ptp(ground)
+    views = np.empty((9, 9, size, size, 1))
+    for t, s in np.ndindex(9, 9):
+        v, u = y + 0.5 * (t - 4), x + 0.5 * (s - 4)
+        checks = 0.5 + 0.3 * np.sin(2 * np.pi * u / period) * np.sin(2 * np.pi * v / period)
+        behind = cv2.remap(ground, x - 0.8 * (s - 4) + size / 2, y - 0.8 * (t - 4) + size / 2, cv2.INTER_CUBIC)
+        patch = np.maximum(abs(u - size / 2), abs(v - size / 2)) < size / 4
+        views[t, s, ..., 0] = np.where(patch, checks, behind)
+    noisy = np.clip(views + rng.normal(0, 0.008, views.shape), 0, 1)
+    return LightField(np.uint8(255 * noisy + 0.5), "checks", disparity_range=DisparityRange(-2, 2, "given"))
+
+
+def test_few_views_repeat_no_alias() -> None:
+    """Views on every second or fourth row and column fit half or a quarter of a period away, too."""
+    patch = np.s_[28:-28, 28:-28]
+    assert np.mean(np.abs(estimate_depth(checked(96, 8), "best").disparity[patch] - 0.5) > 0.3) <= 0.01
 
 
 def test_uniform_is_what_the_noise_explains() -> None:
