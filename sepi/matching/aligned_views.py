@@ -1,4 +1,4 @@
-"""Views aligned with the reference view by a map, sampled in bands of rows: what any sum over views goes through."""
+"""Views aligned with the reference view by a map, sampled in bands of rows; every sum over views uses them."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ BYTES_PER_PIXEL = 2 * 4 + 2 + 4
 
 
 class Seeing(NamedTuple):
-    """Where views are hidden.
+    """Where the views are occluded.
 
     Attributes
     ----------
     nearest : ndarray, shape (T, S, n, W), float32
-        What is nearest in the views (:func:`sepi.matching.nearest_surfaces.nearest_surfaces`), rows from the splines'
-        ``low`` on.
+        Nearest disparity in each view (:func:`sepi.matching.nearest_surfaces.nearest_surfaces`); rows start at the
+        splines' ``low``.
     occlusion_margin : float32
         By how much an occluder must be nearer, pixels per view step.
     """
@@ -35,7 +35,7 @@ class Seeing(NamedTuple):
 
 
 class AlignedViews:
-    """Views of a light field, sampled where a map has the pixels of the reference view.
+    """Views of a light field, sampled where a disparity map places the pixels of the reference view.
 
     Parameters
     ----------
@@ -110,6 +110,6 @@ class AlignedViews:
         forget_splines(field)
 
     def forget_detail(self) -> None:
-        """Give back the detail of the views, where what is to come needs their splines alone."""
+        """Free the detail of the views when later steps need only their splines."""
         if self._splines is not None:
             forget_detail(self._light_field)

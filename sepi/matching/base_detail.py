@@ -1,11 +1,10 @@
-"""Base-detail decomposition: the colours of each view, and the fine detail that stays without smooth shading.
+"""Base-detail decomposition: the colours of each view, and its fine detail without smooth shading.
 
 Photo-consistency assumes that a surface looks alike from everywhere. Shading does not: a glossy wall or floor changes
-its brightness smoothly from view to view, and where texture is weak that change outweighs it, so that the colours alone
-pull the depth aside over whole regions. Detail is what is left of a view when its edge-preserving mean (the bilateral
-filter of [1]_) is taken away: texture passes, smooth changes do not, and edges stay in the base, so that a surface's
-detail does not show its neighbour's colours. Colours with a wide scale decide at edges, detail with a narrow one
-inside surfaces.
+its brightness smoothly from view to view. Where texture is weak, that change outweighs it, and the colours alone bias
+the depth over whole regions. Detail is a view minus its edge-preserving mean (the bilateral filter of [1]_). It keeps
+texture but no smooth changes. Edges stay in the base, so a surface's detail does not show its neighbour's colours.
+Colours with a wide scale decide at edges, detail with a narrow one inside surfaces.
 
 References
 ----------
@@ -62,7 +61,7 @@ class BaseDetailParameters(DenoisingParameters):
 
     @property
     def base(self) -> tuple[float, ...]:
-        """What the detail depends on, but for the views."""
+        """Parameters that the detail depends on, apart from the views."""
         return self.base_radius, self.base_sigma_colour, self.base_sigma_space
 
     @property
@@ -78,7 +77,7 @@ class BaseDetail(NamedTuple):
     Attributes
     ----------
     colours : ndarray, shape (T, S, H, W, 3), uint8, uint16 or float32
-        The views as they are in memory; of grey ones three times the same.
+        The views as stored in memory; grey views repeat their channel three times.
     colour_unit : float32
         What a colour value is multiplied with to span 0..1.
     detail : ndarray, shape (T, S, n or 0, W), int16
@@ -138,7 +137,7 @@ def base_detail_decomposition(
     present : ndarray, shape (T, S), bool, optional
         The views that are wanted; all that are present unless given.
     again : bool
-        The same views will be asked for again, in other rows: all rows are made and kept, where there is memory for it.
+        The same views will be needed again in other rows: compute and keep all rows if memory allows.
 
     Returns
     -------
@@ -170,7 +169,7 @@ def base_detail_decomposition(
 
 
 def detail_of(picture: FloatMap, parameters: BaseDetailParameters, edge: float, rows: Rows) -> npt.NDArray[np.int16]:
-    """Detail of a picture, as that of a view is made.
+    """Detail of a picture, computed like that of a view.
 
     Parameters
     ----------
@@ -236,7 +235,7 @@ def _make_detail(
 class _Kept(OfViews):
     """The detail of some views so far.
 
-    Detail is kept of whole views; what is made in bands of rows, since memory is short, is not, unless all rows fit.
+    Only the detail of whole views is kept. Detail computed in bands, if memory is short, is kept only if all rows fit.
     """
 
     made_with: tuple[float, ...] = ()
@@ -245,7 +244,7 @@ class _Kept(OfViews):
 
 
 def forget_detail(light_field: LightField) -> None:
-    """Give back the detail that is kept, which is made again if it is asked for."""
+    """Free the cached detail; it is recomputed on demand."""
     kept = kept_of(light_field, _Kept)
     kept.detail = kept.made = None
 
@@ -260,10 +259,10 @@ def _all_rows_fit(light_field: LightField) -> bool:
 def _detail_so_far(
     light_field: LightField, parameters: BaseDetailParameters, rows: Rows, present: BoolMap
 ) -> tuple[npt.NDArray[np.int16], BoolMap]:
-    """Room for the detail of some rows, with what is made already, and the views of which it is yet to be made."""
+    """Array for the detail of some rows, with what is computed so far, and the views that still lack it."""
     height, width = light_field.shape
     with_detail = parameters.use_detail
-    # pages that nobody writes to take no memory
+    # untouched pages take no memory
     shape = (*light_field.grid, rows.high - rows.low if with_detail else 0, width)
     if not with_detail or rows != (0, height):
         return np.zeros(shape, np.int16), present
@@ -279,7 +278,7 @@ def _detail_so_far(
 def reference_noise(light_field: LightField) -> float:
     """Noise of the reference view (:func:`sepi.image.noise.noise_of_reference_view`).
 
-    Of denoised views what is left where nothing but noise was: the mask would not see it, since it is smooth.
+    For denoised views, the residue where there was only noise: it is smooth, so the mask would miss it.
     """
     if isinstance(light_field, DenoisedLightField):
         return LEFT * light_field.noise

@@ -1,8 +1,8 @@
-"""How many candidate disparities a sweep takes, where the user does not say.
+"""Number of candidate disparities of a sweep, unless the user sets it.
 
-What must be fine is the sampling in the view that moves most: a candidate further, a pixel moves there by the disparity
-sampling times the distance of the farthest view. A sweep has a number of candidates that is *usual*; it takes fewer
-where these would be finer than is of use, and more where they would be coarser than its optimisation can bridge.
+The sampling must be fine in the farthest view: from one candidate to the next, a pixel moves there by the disparity
+sampling times that view's distance. A sweep has a *usual* number of candidates. It takes fewer where these would be
+finer than is of use, and more where they would be coarser than its optimisation can bridge.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class CandidateRule(NamedTuple):
     finest, coarsest : float
         Least and largest sampling in the farthest view with the usual number, pixels.
     volume_bytes : int or None
-        What a cost volume of float32 may take with more than the usual number; None for a sweep that holds none.
+        Limit on a float32 cost volume with more than the usual number; None for a sweep without a cost volume.
     """
 
     usual: int
@@ -81,7 +81,7 @@ def _intervals(moved: float, sampling: float) -> int:
 
 
 class CandidateParameters(Parameters):
-    """Parameters of a sweep over candidate disparities: what follows from the two that each sweep declares."""
+    """Parameters of a sweep over candidate disparities, derived from the two that each sweep declares."""
 
     if TYPE_CHECKING:
         rule: ClassVar[CandidateRule]

@@ -1,12 +1,12 @@
-"""Views without what noise alone explains.
+"""Denoised views.
 
-Of each view, the detail of up to two pixels (what a binomial mean ``1 2 1`` along both axes takes away) is kept as far
-as its energy in a window exceeds that of the noise there, as the Wiener filter has it [1]_: texture and edges stay, and
-where nothing rises above the noise its variance falls to a seventh. What is left no longer depends much on how far
-between pixels a sample lies, which would draw faint texture to some candidates.
+A Wiener filter [1]_ scales the detail of up to two pixels of each view (what a binomial mean ``1 2 1`` along both axes
+removes): it keeps as much as its energy in a window exceeds that of the noise. Texture and edges stay; where nothing
+rises above the noise, its variance falls to a seventh. The residual noise hardly depends on a sample's sub-pixel
+position. If it did, faint texture would be drawn to some candidates.
 
-Views with little noise stay as they are. The smoothing of costs takes its colours from a reference view that is freed
-of noise at edges, too, by a bilateral filter [2]_: noise would pass for edges, across which nothing is carried.
+Views with little noise stay unchanged. Cost smoothing takes its colours from a reference view that a bilateral filter
+[2]_ denoises at edges, too. Noise would otherwise pass for edges, and smoothing stops at edges.
 
 References
 ----------
@@ -117,12 +117,12 @@ def denoised(light_field: LightField, least: float, least_noise: float = 0.0) ->
 
 
 def measured_noise(light_field: LightField) -> ViewNoise:
-    """:func:`sepi.matching.view_noise.view_noise`, of views that are not denoised; in a workspace just once."""
+    """:func:`sepi.matching.view_noise.view_noise` of the original views; computed once per workspace."""
     return _noise(light_field, kept_of(light_field, _Kept))
 
 
 def sure_noise(light_field: LightField) -> ViewNoise | None:
-    """:func:`measured_noise` where views have noise, and what looks like it cannot be else; or None."""
+    """:func:`measured_noise` if the views are noisy and what looks like noise can be nothing else; otherwise None."""
     noise = measured_noise(light_field)
     return noise if _is_sure(noise) and not _is_little(noise) else None
 
@@ -137,14 +137,14 @@ def _is_little(noise: ViewNoise) -> bool:
 
 
 def _noise_of_parts(image: FloatMap) -> float:
-    """Noise of the parts of an image that have most: a scale that bears with it must bear with theirs."""
+    """Noise of the noisiest parts of an image; a scale that tolerates noise must tolerate theirs."""
     parts = [image[part_of_picture(number, image.shape[:2])] for number in np.ndindex(PARTS, PARTS)]
     return float(np.quantile([noise_level(part) for part in parts], _NOISIEST))
 
 
 @dataclass
 class _Kept(OfViews):
-    """What is known of some views: their noise, and what they are without it; None as they are."""
+    """Noise of some views, and the denoised views; None if they stay unchanged."""
 
     noise: ViewNoise | None = None
     least: float = 0.0
@@ -161,7 +161,7 @@ def _denoised_views(light_field: LightField, noise: ViewNoise, least: float) -> 
     if _is_little(noise):
         return None
     views = light_field.views
-    # levels of as many bits: what is left of the noise is more than their rounding
+    # keeps the bit depth: the residual noise exceeds the rounding
     out = np.zeros_like(views)
     height, width = light_field.shape
     by_place = np.asarray(cv2.resize(np.float32(least) * noise.by_place, (width, height)), np.float32)
@@ -171,7 +171,7 @@ def _denoised_views(light_field: LightField, noise: ViewNoise, least: float) -> 
 
 
 def lines_between(brightness: FloatMap, variance: FloatMap) -> FloatMap:
-    """Variance of the noise by brightness: lines from one to the next that is known, level beyond both ends.
+    """Noise variance by brightness: piecewise linear between known values, constant beyond both ends.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def lines_between(brightness: FloatMap, variance: FloatMap) -> FloatMap:
     Returns
     -------
     ndarray, shape (N + 1, 4), float32
-        Of each line the brightness where it begins, its length, its first variance, and by how much that rises.
+        Each line's start brightness, length, start variance, and increase of the variance.
     """
     begins, variances = np.append(np.float32(-1e9), brightness), np.append(variance[:1], variance)
     length, rise = np.append(np.diff(begins), np.float32(1)), np.append(np.diff(variances), np.float32(0))
@@ -189,7 +189,7 @@ def lines_between(brightness: FloatMap, variance: FloatMap) -> FloatMap:
 
 
 def guide_of(light_field: LightField, mean: FloatMap | None = None) -> FloatMap:
-    """Colours that tell where costs may be carried on, without noise at edges, too.
+    """Colours that guide cost smoothing, denoised at edges, too.
 
     Parameters
     ----------

@@ -1,11 +1,10 @@
-"""Costs that noise alone makes, by how far between pixels a candidate's samples lie.
+"""Expected matching costs of pure noise, by the sub-pixel positions of a candidate's samples.
 
 A sample between pixels averages their noise: its variance is that of a pixel times the sum of the interpolation's
-squared weights, 1 at whole pixels and 1/4 amid four of them. Candidates at which most views are sampled between pixels
-would cost less whatever the depth, and faint texture in noise would go to them. So each candidate's match, what its
-cost (Eq. 3) is below 1, is divided by what noise leaves of one at such places, in units of what it leaves anywhere: a
-view that does not match has none. Without noise nothing changes. Near the border of the picture, too, all views count
-as if they saw the pixel.
+squared weights, 1 at whole pixels and 1/4 amid four of them. Candidates that sample most views between pixels would
+cost less whatever the depth, and would attract faint texture in noise. A candidate's match is 1 minus its cost (Eq. 3).
+It is divided by the match that noise leaves at such positions, in units of what it leaves anywhere; a view that does
+not match has none. Without noise nothing changes. All views count as if they saw the pixel, near the border, too.
 
 The paper, whose light fields have hardly any noise, does not have it.
 """
@@ -68,13 +67,13 @@ def expected_costs(
     squared_scale: float,
     multiple: int,
 ) -> ExpectedCosts:
-    """What noise makes of the costs of candidates.
+    """Expected costs of the candidates under noise.
 
     Parameters
     ----------
     light_field : LightField
     noise : ViewNoise or None
-        Of its views; None where there is little, or nothing is to be made of it.
+        Of its views; None if there is little, or if it is to be ignored.
     candidates : Candidates
     groups : ndarray, shape (T, S), int64
         Group of each view, 0..G-1; -1 leaves a view out, and the reference view is.
@@ -120,10 +119,10 @@ def expected_costs(
 
 
 def _not_cut_off(light_field: LightField) -> FloatMap:
-    """What is left of the noise's variance where samples round a pixel are black or overexposed, (H, W).
+    """Share of the noise variance that remains where samples round a pixel are black or overexposed, (H, W).
 
-    Of a signal that is cut off in so much of its samples the square of the rest is, about; once more that, since the
-    noise is told less surely there, and too much corrected is worse than too little.
+    A signal clipped in part of its samples keeps about the square of the rest. That factor is applied once more: the
+    noise is less certain there, and overcorrection is worse than undercorrection.
     """
     image = light_field.reference_view
     told = ((image > BLACK) & (image < SATURATED)).mean(axis=2, dtype=np.float32)

@@ -1,12 +1,12 @@
-"""What is seen through gaps, told from what borders them.
+"""Gaps between near surfaces, through which a farther surface shows.
 
-A gap between two things shows the wall behind, in each view another part of it. As long as a wall's colours hardly
-change, all views agree with a patch of such colours that fills the gap and moves with its borders; and once a map has
-that patch, it hides the wall from every view, so that no later sweep can find it. So before a map tells what is hidden,
-patches that are coloured as something farther is nearby are tried as that: in the views in which nothing else hides
-them there, they have to fit much better than where they are.
+A gap between two things shows another part of the wall behind in each view. If the wall's colours hardly change, all
+views agree with a patch of such colours that fills the gap and moves with its borders. Once a map has that patch, it
+occludes the wall in every view, and no later sweep can find the wall. So before a map is used for occlusion, patches
+with the colours of something farther nearby are tried at its depth. They must fit much better there than at their own,
+in the views in which nothing else occludes them.
 
-Both depths are asked of the same views and pixels: noise, and colours that change slowly, count on either side alike.
+Both depths are compared in the same views and pixels, so noise and slow colour changes count alike on either side.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class GapParameters(OcclusionMarginParameters):
 def with_open_gaps(
     light_field: LightField, disparity: FloatMap, present: BoolMap, parameters: GapParameters
 ) -> FloatMap:
-    """A map with what is seen through gaps as far away as it is.
+    """Disparity map with the surfaces seen through gaps moved back to their depth.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def with_open_gaps(
     others[light_field.reference_position] = False
     there, here, seeing = compared_depths(light_field, disparity, farther, others, parameters.occlusion_margin)
     better = there < np.float32(parameters.gap_gain) * here
-    # amid like colours: at edges residuals are of interpolation
+    # only in uniform colours: at edges, residuals come from interpolation
     voters = asked & _plain(guide, parameters.gap_colour)
     return np.where(asked & _outvoted(voters, better, seeing, int(others.sum())), farther, disparity)
 
@@ -89,7 +89,7 @@ def compared_depths(
     occlusion_margin: float,
     most: float = np.inf,
 ) -> FloatMap:
-    """Squared residuals at two depths, in the views in which nothing hides the second.
+    """Squared residuals at two depths, in the views in which nothing occludes the second.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def _plain(guide: FloatMap, distance: float) -> BoolMap:
 
 
 def _outvoted(voters: BoolMap, better: BoolMap, seeing: FloatMap, others: int) -> BoolMap:
-    """Where enough voters are about, enough views see what they vote on, and most find the farther depth better."""
+    """Pixels with enough voters around, seen by enough views, most of which prefer the farther depth."""
     # sums of whole numbers: exact, in whatever order
     voting, about, seen = (
         cv2.boxFilter(values.astype(np.float32), -1, (_WINDOW, _WINDOW), normalize=False)
