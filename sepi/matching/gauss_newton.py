@@ -1,4 +1,4 @@
-"""Disparity below the disparity sampling: Gauss-Newton on the residuals of all views that see a pixel.
+"""Sub-sample disparity: Gauss-Newton on the residuals of all views that see a pixel.
 
 For pixel ``p``, a view of baseline ``v`` and mean ``m`` of the views, the residual ``r_v(d) = L_v(p - d v) - m(p)``
 changes with the disparity by ``-g v``, where ``g`` is the derivative of the mean along y and x. With robust weights
@@ -30,7 +30,7 @@ _DIFFERENCE = np.array([-1, 0, 1], np.float32) / 2
 
 
 class Evidence(NamedTuple):
-    """What the views say about a disparity beside the Gauss-Newton step: sums of each pixel over those that see it.
+    """Evidence on a disparity beside the Gauss-Newton step: sums of each pixel over the views that see it.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Evidence(NamedTuple):
     misfit : ndarray, shape (H, W), float32
         Squared residual of the colours, times its weight.
     agreement, detail_agreement : ndarray, shape (H, W), float32
-        Weight of the views by colours, and by detail: 1 for each that is as the mean is.
+        Weight of the views by colours, and by detail: 1 for each view that equals the mean.
     seeing : ndarray, shape (H, W), float32
         Number of views.
     """
@@ -56,7 +56,7 @@ class GaussNewton(AlignedViews):
 
     @cached_property
     def colour_variance(self) -> float:
-        """What squared residuals of colours are divided by, in gradients and curvatures."""
+        """Divisor of the squared residuals of colours, in gradients and curvatures."""
         return self._parameters.colour_scale**2 + variance_of_residuals(reference_noise(self._light_field), 3)
 
     def gradient_and_hessian(
@@ -79,12 +79,12 @@ class GaussNewton(AlignedViews):
             The curvature is the inverse variance of the disparity, 1 / (pixels per view step)^2.
         """
         gradient, curvature = self._sums(2, disparity, mean, *(slopes or spline_derivatives(mean)))
-        # the next map is another one
+        # the next map differs
         self._nearest = None
         return gradient, curvature
 
     def with_evidence(self, mean: FloatMap, disparity: FloatMap) -> tuple[FloatMap, FloatMap, Evidence]:
-        """:meth:`gradient_and_hessian`, and what else the views say about the disparity.
+        """:meth:`gradient_and_hessian`, and further evidence of the views on the disparity.
 
         Parameters
         ----------

@@ -1,11 +1,11 @@
-"""What other views say of a pixel, in place of the reference view, where these are noisy.
+"""Mean of other views, which replaces the reference view in noisy light fields.
 
-The noise of the reference view is in every residual alike, so that no number of views averages it away. The mean of
-views that see a pixel, as the map so far has it, hardly has any. Views that are unlike the reference view count less
-in it, so that where the map is wrong it stays near that.
+The noise of the reference view is in every residual alike, so no number of views averages it away. The mean of the
+views that see a pixel according to the current map has hardly any noise. Views unlike the reference view count less in
+the mean, so it stays near the reference view where the map is wrong.
 
-No view is compared with a mean that it is part of: its own noise would make it fit best where the map has it already,
-and in strong noise whatever is wrong would stay.
+No view is compared with a mean that it is part of. Its own noise would make it fit best at the map's current disparity,
+and in strong noise every error would stay.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def mean_reference(
     parameters: BaseDetailParameters,
     occlusion_margin: float,
 ) -> FloatMap | None:
-    """Mean of the views that see each pixel, of those that are not compared.
+    """Mean, at each pixel, of the views that see it and are not compared.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def mean_reference(
     Returns
     -------
     ndarray, shape (H, W, 3), float32, or None
-        Colours, 0..1; nothing where there are too few others.
+        Colours, 0..1; None if there are too few other views.
     """
     from sepi.matching.aligned_views import AlignedViews
     from sepi.matching.spline_views import forget_splines
@@ -54,6 +54,6 @@ def mean_reference(
         return None
     colours_alone = parameters.model_copy(update={"use_detail": False})
     mean = AlignedViews(light_field, colours_alone, occlusion_margin, others).mean(disparity)[..., :3]
-    # what is to come needs the memory
+    # later steps need the memory
     forget_splines(light_field)
     return np.ascontiguousarray(mean)

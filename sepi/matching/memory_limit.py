@@ -1,8 +1,8 @@
-"""A limit on the memory of an estimate: what is taken whatever happens, and what that leaves for the bands.
+"""A limit on the memory of an estimate: the part always needed, and the rest, which the bands may use.
 
 The views, the maps, the cost volumes of variant ``best`` and the rows of costs of each thread of a plane sweep are held
-as a whole; what is made of all views at once is made in bands of rows (:mod:`sepi.matching.row_bands`), narrower ones
-where there is less memory. The results are the same. The compared methods hold everything as a whole.
+as a whole. Whatever needs all views at once is computed in bands of rows (:mod:`sepi.matching.row_bands`), narrower
+ones if memory is short. The results are the same. The compared methods hold everything as a whole.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _BYTES_OF_MAPS = 200
 
 
 def require_memory_of(light_field: LightField, stages: Iterable[Parameters]) -> None:
-    """See that there is memory for an estimate, where a limit on the process's address space is set.
+    """Check that an estimate fits into the limit on the process's address space, if one is set.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def require_memory_of(light_field: LightField, stages: Iterable[Parameters]) -> 
 
 
 def bytes_of_bands(light_field: LightField, stages: Iterable[Parameters], memory: int) -> int:
-    """What the bands may take, so that an estimate stays within a limit.
+    """Bytes that the bands may take, so that an estimate stays within a limit.
 
     Parameters
     ----------
@@ -77,14 +77,14 @@ def bytes_of_bands(light_field: LightField, stages: Iterable[Parameters], memory
 
 
 def bytes_of_volumes(light_field: LightField, stages: Iterable[Parameters]) -> int:
-    """What cost volumes take as a whole, which other stages may use for something else; the range must be known."""
+    """Bytes of the cost volumes, which other stages may reuse; the disparity range must be known."""
     sweeps = [p.fewer(light_field, p.finest_sampling) for p in stages if isinstance(p, VisibilitySweepParameters)]
     height, width = light_field.shape
     return BYTES_PER_CANDIDATE * max(sweeps, default=0) * height * width
 
 
 def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple[int, int]:
-    """What is held as a whole, and that with the narrowest bands."""
+    """Bytes held as a whole, without and with the narrowest bands."""
     stages = list(stages)
     height, width = light_field.shape
     rings = [p.sweep_bytes(light_field, threads_used()) for p in stages if isinstance(p, SweepParameters)]

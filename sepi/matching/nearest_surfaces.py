@@ -1,4 +1,4 @@
-"""What hides a pixel of the reference view in the others: a nearer surface, or the end of what a view shows."""
+"""Occluders of reference pixels in the other views: nearer surfaces, and the end of what a view shows."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def nearest_surfaces(light_field: LightField, disparity: FloatMap | None, presen
     ----------
     light_field : LightField
     disparity : ndarray, shape (H, W), float32, or None
-        Of the reference view, pixels per view step; None: nothing hides anything, but for missing pixels.
+        Of the reference view, pixels per view step; None: no occlusion, except by missing pixels.
     present : ndarray, shape (T, S), bool
         The views that are wanted.
     rows : Rows
@@ -36,8 +36,8 @@ def nearest_surfaces(light_field: LightField, disparity: FloatMap | None, presen
     Returns
     -------
     ndarray, shape (T, S, n, W), float32
-        From :func:`z_buffers`, with ``MISSING`` at pixels that a view does not show, and beside them, since a sample
-        that lies between pixels reads them, too.
+        From :func:`z_buffers`, with ``MISSING`` at pixels that a view does not show, and beside them, since samples
+        between pixels read them, too.
     """
     if disparity is None:
         nearest = _with_margin(*light_field.grid, rows.high - rows.low, light_field.shape[1])
@@ -70,9 +70,9 @@ def z_buffers(
     Returns
     -------
     ndarray, shape (T, S, high - low, W), float32
-        ``EMPTY`` where no pixel falls. A pixel occludes the positions beside which it falls, two along either axis,
-        since a bilinear sample between them reads its colour too, or the one that it falls on. What is at the border of
-        the map goes on beyond it.
+        ``EMPTY`` where no pixel falls. A pixel between positions occludes two along either axis, since a bilinear
+        sample between them reads its colour, too; otherwise it occludes the one that it falls on. The map's border
+        values continue beyond the border.
     """
     nearest = _with_margin(*present.shape, high - low, disparity.shape[1])
     kernels.z_buffers(np.ascontiguousarray(disparity), present, baselines, low, high, nearest)
@@ -80,7 +80,7 @@ def z_buffers(
 
 
 def _with_margin(*shape: int) -> FloatMap:
-    """An array, not initialised, and the numbers behind it that vectors reach into."""
+    """An uninitialised array, with the numbers behind it that vector loads reach into."""
     return np.empty(math.prod(shape) + LANES, np.float32)[:-LANES].reshape(shape)
 
 

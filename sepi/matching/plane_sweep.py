@@ -75,25 +75,25 @@ class SweepParameters(CandidateParameters):
 
     @property
     def groups(self) -> int:
-        """Groups of views whose costs are summed apart, at most."""
+        """Largest number of view groups whose costs are summed separately."""
         return 1
 
     def noise_to_correct(self, light_field: LightField) -> ViewNoise | None:
-        """Noise whose costs are corrected; None where it may be texture, which would be corrected the wrong way."""
+        """Noise whose costs are corrected; None if it may be texture, which the correction would harm."""
         return sure_noise(light_field) if self.correct_noise else None
 
     def sweep_bytes(self, light_field: LightField, threads: int) -> int:
-        """What :func:`sweep` takes beside views and maps: the views by channel, and what each thread holds."""
+        """Bytes that :func:`sweep` takes beside views and maps: the views by channel, and each thread's arrays."""
         height, width = light_field.shape
         busy = min(threads, -(-height // _rows_at_a_stretch(height, threads)))
         views = light_field.views.dtype.itemsize * 3 * math.prod((*light_field.grid, height, width + LANES))
         return views + busy * self.thread_bytes(self.number(light_field), width)
 
     def thread_bytes(self, number: int, width: int) -> int:
-        """What a thread of :func:`sweep` holds with so many candidates, of pictures so wide.
+        """Bytes that a thread of :func:`sweep` holds, by number of candidates and picture width.
 
-        Those are the costs and the numbers of samples in the rows of a window, and their sums over the windows of a
-        block of pixels, of every candidate and group.
+        It holds, for every candidate and group, the costs and the numbers of samples in the rows of a window, and
+        their sums over the windows of a block of pixels.
         """
         size, vectors = 2 * self.window_radius + 1, -(-number // LANES)
         columns = min(width, TILE_WIDTH) + 2 * self.window_radius + LANES
@@ -121,9 +121,9 @@ class SweepResult:
     def confidence(self) -> FloatMap:
         """Eq. 5, mean over minimum, brought from 1..inf to 0..1 as ``1 - min / mean``; 0 where all costs are zero.
 
-        Of both, :data:`NOISE_LEFT_OUT` of what noise alone costs is left out, where it is corrected.
+        Where noise is corrected, both leave out the share :data:`NOISE_LEFT_OUT` of the cost of noise alone.
         """
-        # at least as much of the mean stays as where there is nothing but noise
+        # the mean keeps at least what it has in pure noise
         of_noise = np.minimum(NOISE_LEFT_OUT * self.of_noise, self.mean - (1 - NOISE_LEFT_OUT) * self.of_noise)
         with np.errstate(divide="ignore", invalid="ignore"):
             confidence = np.where(self.mean > of_noise, 1 - (self.cost - of_noise) / (self.mean - of_noise), 0)
@@ -150,8 +150,8 @@ def sweep(
 ) -> SweepResult:
     """Sweep the candidate disparities and keep the best one of each pixel and subset of views.
 
-    Scale and window are widened by the noise of the reference view, so that noise alone neither looks like a mismatch
-    nor like another surface. Costs are without what noise makes of interpolation (:mod:`sepi.matching.expected_costs`).
+    The noise of the reference view widens scale and window, so that noise alone looks neither like a mismatch nor like
+    another surface. Costs are corrected for interpolated noise (:mod:`sepi.matching.expected_costs`).
 
     Parameters
     ----------
@@ -207,13 +207,13 @@ def sweep(
 def _rows_at_a_stretch(height: int, threads: int) -> int:
     """Rows of one task: two tasks for each thread, so that all have work and progress shows.
 
-    Rows of the window above and below a task are done again by its neighbours, so tasks must not be too low.
+    Neighbouring tasks repeat the window's rows above and below a task, so tasks must not have too few rows.
     """
     return max(16, min(128, -(-height // (2 * threads))))
 
 
 def _without_empty(groups: npt.NDArray[np.int64], subsets: BoolMap) -> tuple[npt.NDArray[np.int64], BoolMap]:
-    """Groups numbered through, and the subsets of them, without those that have no view."""
+    """Groups renumbered without empty ones, and the subsets of them."""
     used = np.unique(groups[groups >= 0])
     numbers = np.full(subsets.shape[1] + 1, -1)
     numbers[used] = np.arange(len(used))

@@ -1,8 +1,8 @@
-"""Bands of picture rows: what is made of all views at once, a band at a time, so that memory stays bounded.
+"""Bands of picture rows, which bound the memory of steps that need all views at once.
 
-A row of the reference view is seen in rows of the other views that are no farther than the largest disparity times the
-longest baseline. What is computed of the views' rows (detail, splines, z-buffers) does not depend on where a band
-begins: results are the same for any number of bands.
+A row of the reference view appears in rows of the other views no farther away than the largest disparity times the
+longest baseline. The arrays of the views' rows (detail, splines, z-buffers) do not depend on where a band begins, so
+results are the same for any number of bands.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Band(NamedTuple):
 def row_bands(
     light_field: LightField, present: BoolMap, reach: float, bytes_per_pixel: int, beside: int = 0
 ) -> list[Band]:
-    """The bands in which a light field is gone through.
+    """The bands in which a light field is processed.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ def row_bands(
     reach : float
         Largest absolute disparity, pixels per view step.
     bytes_per_pixel : int
-        What is held of each pixel of each view of a band.
+        Memory for each pixel of each view of a band.
     beside : int
-        Rows above and below a band that are looked at with it.
+        Rows above and below a band that its computation reads.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def row_bands(
 
 
 def least_band_bytes(light_field: LightField, bytes_per_pixel: int) -> int:
-    """What the narrowest bands take, at most; the disparity range must be known."""
+    """Upper bound on the bytes of the narrowest bands; the disparity range must be known."""
     known = light_field.require_disparity_range()
     moved = _rows_moved(light_field, light_field.present, max(abs(known.minimum), abs(known.maximum)))
     height, width = light_field.shape
@@ -73,5 +73,5 @@ def least_band_bytes(light_field: LightField, bytes_per_pixel: int) -> int:
 
 
 def _rows_moved(light_field: LightField, present: BoolMap, reach: float) -> int:
-    """By how many rows a pixel moves at most, and its sample reaches further."""
+    """Largest shift of a pixel in rows, with the reach of its sample."""
     return math.ceil(reach * float(abs(light_field.baselines[present][:, 0]).max(initial=0.0))) + 2

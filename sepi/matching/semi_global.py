@@ -1,4 +1,4 @@
-"""Semi-global smoothing of a cost volume [1]_, after averaging over pixels of one's own colour.
+"""Semi-global smoothing of a cost volume [1]_, after averaging over pixels of like colour.
 
 The volume is averaged over a small window with weights that fall quickly with the difference of colour, so that edges
 stay where the colours change, and then smoothed along eight paths: a change by one candidate costs ``small_penalty``,
@@ -76,9 +76,9 @@ class SmoothingParameters(Parameters):
     def for_views(self, views: int) -> Self:
         """These parameters for light fields of few views: as given from :data:`ENOUGH_VIEWS` on.
 
-        Costs are means over the views, and what they say against a smooth map counts once for each: with a third of the
-        views, a mean weighs a third of what it does, so penalties weigh three times as much. The window grows while it
-        holds no more samples of all views than it does where there are enough.
+        Costs are means over the views, and each view counts once as evidence against a smooth map. With a third of the
+        views, a mean weighs a third as much, so penalties weigh three times as much. The window grows while it holds no
+        more samples of all views than with enough views.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class SmoothingParameters(Parameters):
 
 @dataclass(frozen=True)
 class SmoothedResult:
-    """What the smoothed volume says of each pixel.
+    """Disparity and confidence from the smoothed volume.
 
     Attributes
     ----------
@@ -116,9 +116,9 @@ class SmoothedResult:
 
 
 class CostVolumes:
-    """Memory for averaged costs and for what smoothing makes of them, which the next sweep uses again.
+    """Memory for averaged and for smoothed costs, which the next sweep reuses.
 
-    To be given new memory takes a process as long as to fill it.
+    Allocating new memory takes as long as filling it.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ class CostVolumes:
 
 
 class AveragedCosts:
-    """Costs of a sweep, averaged over pixels of one's own colour; a few rows at a time, as they come.
+    """Costs of a sweep, averaged over pixels of like colour, a few rows at a time.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ class AveragedCosts:
         return self._costs[:, first : first + rows]
 
     def add(self, rows: int) -> None:
-        """Average what can be, now that costs of so many rows more are there."""
+        """Add the costs of ``rows`` more rows, and average all rows that are ready."""
         radius = self._parameters.window_radius
         self._next += rows
         begin, end = self._done, self._next if self._next == self._height else max(self._done, self._next - radius)

@@ -1,4 +1,4 @@
-"""All views sheared by a disparity: what each of them shows of every pixel of the reference view.
+"""All views sheared by a disparity: each view's sample of every pixel of the reference view.
 
 A light field sheared by ``d`` holds, at pixel ``(y, x)`` of view ``(t, s)``, what that view shows at
 ``(y, x) - d * baseline``. Where ``d`` is the pixel's disparity, all views show the same point there: its *angular

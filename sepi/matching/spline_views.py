@@ -22,7 +22,7 @@ MARGIN: int = kernels.MARGIN
 
 
 class SplineViews(NamedTuple):
-    """What a Gauss-Newton iteration needs of the views, and of some of their rows.
+    """The data of the views, or of some of their rows, that a Gauss-Newton iteration needs.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ def spline_views(
     present : ndarray, shape (T, S), bool
         The views of which they are wanted.
     room : ndarray, optional
-        Splines of as many rows of the same views that are needed no more, which these take the place of.
+        Obsolete splines of as many rows of the same views, whose memory is reused.
 
     Returns
     -------
@@ -138,7 +138,7 @@ class _Kept(OfViews):
 
 
 def forget_splines(light_field: LightField) -> None:
-    """Give back the splines that are kept, which are made again if they are asked for."""
+    """Free the cached splines; they are recomputed on demand."""
     kept = kept_of(light_field, _Kept)
     kept.splines = kept.colours = kept.detail = None
 
@@ -150,9 +150,9 @@ def _splines_so_far(
     present: BoolMap,
     room: npt.NDArray[np.int16] | None,
 ) -> tuple[npt.NDArray[np.int16], BoolMap, BoolMap]:
-    """Room for splines, with those that are made already, and the views whose colours and detail are yet to be made."""
+    """Array for splines, with those computed so far, and the views that still lack colours and detail."""
     height, width = light_field.shape
-    # pages that nobody writes to take no memory
+    # untouched pages take no memory
     shape = (*light_field.grid, rows.high - rows.low + 2 * MARGIN, width + 2 * MARGIN, 4)
     with_detail = present if parameters.use_detail else np.zeros_like(present)
     if room is not None:
@@ -160,7 +160,7 @@ def _splines_so_far(
     if rows != (0, height):
         return np.zeros(shape, np.int16), present, with_detail
     kept = kept_of(light_field, _Kept)
-    # who does without detail takes its channel for empty
+    # callers without detail expect its channel to be empty
     same_detail = parameters.use_detail and kept.made_with == parameters.base
     if kept.detail is not None and kept.detail.any() and not same_detail:
         kept.splines = None

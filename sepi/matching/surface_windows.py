@@ -1,12 +1,12 @@
 """Gauss-Newton steps over windows that hold one surface.
 
-A window makes a step surer, but only by pixels that move alike. Across a depth step it carries what the edge of the
-nearer surface tells, which is much, to pixels of the farther one, of which the views may know little: where these are
-wrong, they would be held there. Nor does a slope beside a nearer surface belong to the farther one: the mean of the
-views has the edge between the two, which the views that see the pixel have somewhere else.
+A window makes a step more certain, but only through pixels that move alike. Across a depth step it carries the strong
+evidence of the nearer surface's edge to pixels of the farther one, where the views may have little, and would hold
+wrong pixels there. Nor does a slope beside a nearer surface belong to the farther one: the mean of the views contains
+the edge between the two, and the views that see the pixel have that edge elsewhere.
 
-Where a map has a surface too large, its disparity does not tell; its colour may: a wall beside a box that is drawn as
-near as the box still has the colours of the wall.
+Where a map extends a surface too far, disparity does not reveal it, but colour may: a wall that the map places as near
+as the box beside it still has the colours of the wall.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LEAST_WIDTH = 1e-6
 
 
 class Surfaces(NamedTuple):
-    """What tells whether two pixels are of one surface.
+    """Criteria for whether two pixels belong to one surface.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Surfaces(NamedTuple):
 def windowed_step(
     gradient: FloatMap, curvature: FloatMap, disparity: FloatMap, surfaces: Surfaces, radius: int, max_update: float
 ) -> tuple[FloatMap, FloatMap]:
-    """Update of each pixel, and its curvature, over what a window of ``2 radius + 1`` pixels has of its surface.
+    """Update and curvature of each pixel, over the pixels of its surface in a window of ``2 radius + 1`` pixels.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def windowed_step(
     update, curvature : ndarray, shape (H, W), float32
         The curvature is the window's mean, to which other surfaces add nothing.
     """
-    # less and less from one margin on to three: in noise a map must not hang on what is just within
+    # fades from one margin to three: a hard limit would make noisy maps depend on pixels just within
     width = np.float32(max(2 * surfaces.margin, LEAST_WIDTH))
     nearer = cv2.dilate(disparity, np.ones((3, 3), np.uint8)) - disparity
     share = np.clip(np.float32(1.5) - nearer / width, np.float32(BESIDE_NEARER), np.float32(1))
