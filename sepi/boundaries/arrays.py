@@ -1,4 +1,4 @@
-"""Arrays that the decision beside depth steps works on, in named groups: what its kernels take."""
+"""Named groups of arrays that the kernels of the decision beside depth steps take."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sepi.lightfield import BoolMap, FloatMap
 
 
 class RimViews(NamedTuple):
-    """The views that are compared, and what hides what in them.
+    """The compared views, and the occlusions in them.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class RimViews(NamedTuple):
 
 
 class Sides(NamedTuple):
-    """The surfaces of a map, and what the reference view shows of them.
+    """The surfaces of a map, and their colours in the reference view.
 
     Attributes
     ----------

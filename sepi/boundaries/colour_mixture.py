@@ -1,4 +1,4 @@
-"""How surely a pixel beside a depth discontinuity is background for the most part, by the mixture of colours in it.
+"""Evidence that a pixel beside a depth discontinuity is mostly background, from its mixture of colours.
 
 A pixel that an edge runs through mixes the colours ``F`` of the nearer surface and ``B`` of the more distant one, and
 its residuals are small at the nearer disparity, with which the edge moves: depth maps are one pixel too wide there. Its
@@ -27,7 +27,7 @@ _COLOURED = 0.02
 def mixture_evidence(
     disparity: FloatMap, around: Surroundings, guide: FloatMap, noise: float, parameters: BoundaryParameters
 ) -> FloatMap:
-    """How surely the colours say that a pixel of the nearer surface is background for the most part.
+    """Evidence of the colours that a pixel of the nearer surface is mostly background.
 
     Parameters
     ----------
@@ -63,10 +63,10 @@ def mixture_evidence(
 
 
 def _trust(guide: FloatMap) -> np.float32:
-    """How much a colour between two others tells, 0..1: in a grey picture all are."""
+    """Weight of the evidence of a colour between two others, 0..1: in a grey picture all are."""
     colours = guide.reshape(-1, 3).astype(np.float64)
     colours = colours - colours.mean(axis=0)
-    # exactly zero for grey, whatever is rounded
+    # exactly zero for grey, despite rounding
     beside_grey = colours - colours[:, [1, 2, 0]]
     chroma = (beside_grey**2).sum() / 3 / max((colours**2).sum(), 1e-12)
     return np.float32(_GREY_TRUST + (1 - _GREY_TRUST) * min(chroma / _COLOURED, 1.0))

@@ -1,14 +1,14 @@
 """Near or far beside a depth step, by all views and the reference view's colours, along edges.
 
-A pixel that an edge runs through shows a share of the nearer surface, and of what is behind it the rest. It moves with
-the nearer one and fits that one's disparity, however small its share is: by matching alone, surfaces are one pixel too
-wide, and narrow gaps between them close. Where the share is more than a half the pixel is near, else far. It is told by
+A pixel that an edge runs through shows a share of the nearer surface, and for the rest the surface behind. It moves
+with the nearer one and fits its disparity, however small its share is: by matching alone, surfaces are one pixel too
+wide, and narrow gaps between them close. The pixel is near if the share exceeds a half, else far. The evidence:
 
 - all views, which show it before other and other pieces of background (:mod:`sepi.boundaries.surface_shares`),
 - its colour, between those of both surfaces (:mod:`sepi.boundaries.colour_mixture`),
 - its neighbours: the edge goes on through them (:mod:`sepi.boundaries.edge_lines`).
 
-Each share has a cost, by what the views and the colours say against it, and by how far it is from what the map has.
+The cost of a share is the evidence of views and colours against it, and its distance from the map's current side.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def assigned_to_surfaces(light_field: LightField, disparity: FloatMap, parameter
     Returns
     -------
     ndarray, shape (H, W), float32
-        ``disparity`` itself where nothing has a vote, or there is no step.
+        ``disparity`` itself if there is no evidence, or no step.
     """
     if not (parameters.use_shares or parameters.use_mixture):
         return disparity
@@ -68,7 +68,7 @@ def assigned_to_surfaces(light_field: LightField, disparity: FloatMap, parameter
 def _costs(
     light_field: LightField, disparity: FloatMap, around: Surroundings, rim: Rim, parameters: BoundaryParameters
 ) -> ShareCosts:
-    """What views, colours and the map itself say against each share; told where views or colours say anything."""
+    """Costs of each share by views, colours and the map itself; ``told`` where views or colours give evidence."""
     if parameters.use_shares:
         costs, told = share_costs(light_field, disparity, around, rim, parameters)
     else:

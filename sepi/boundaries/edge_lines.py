@@ -1,10 +1,10 @@
-"""Edges through the pixels beside depth steps: what a pixel's neighbours say of it.
+"""Edges through the pixels beside depth steps: evidence from a pixel's neighbours.
 
-A pixel's own share of the nearer surface is known badly where views show little contrast, and the pixels that decide
-are those that the edge runs right through. The edge goes on through their neighbours: each edge leaves a certain share
-of every pixel of a patch to the nearer surface, and costs what these shares cost. Of a patch about each pixel beside a
-step all edges are tried, in steps of direction and offset, straight ones and such as bend round something small; the
-pixel belongs to the surface that has its middle by the one that costs least.
+A pixel's own share of the nearer surface is poorly known where views show little contrast, and the decisive pixels are
+those that the edge runs right through. The edge continues through their neighbours: it leaves a certain share of every
+pixel of a patch to the nearer surface, and costs what these shares cost. All edges through a patch about each pixel
+beside a step are tried, in steps of direction and offset, straight ones and ones bent round something small. The pixel
+belongs to the surface that holds its middle according to the cheapest edge.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _WIDTH = 0.8  # standard deviation of the patch's weights, pixels
 
 
 def line_evidence(disparity: FloatMap, rim: Rim, costs: FloatMap) -> FloatMap:
-    """By how much the best edge that leaves a pixel to the farther surface costs less than the best that does not.
+    """Cost advantage of the best edge that gives a pixel to the farther surface, over the best other edge.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Edges(NamedTuple):
 
 
 def _edges(steps: int) -> Edges:
-    """Straight ones of all directions and offsets, and the same bent round the nearer surface; so many steps are 1."""
+    """Edges of all directions and offsets, straight and bent round the nearer surface; ``steps`` steps are 1."""
     down, across = (part.ravel() for part in np.mgrid[-1:2, -1:2])
     angle = 2 * np.pi * np.arange(_DIRECTIONS)[:, None] / _DIRECTIONS
     along, beside = np.sin(angle) * down + np.cos(angle) * across, np.cos(angle) * down - np.sin(angle) * across

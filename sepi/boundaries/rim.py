@@ -11,7 +11,7 @@ from sepi.lightfield import BoolMap, FloatMap
 
 
 class Rim(NamedTuple):
-    """The pixels beside a depth step, and the two surfaces that may be theirs.
+    """The pixels beside a depth step, and the two surfaces that they may belong to.
 
     Attributes
     ----------
@@ -20,7 +20,7 @@ class Rim(NamedTuple):
     inside : ndarray, shape (H, W), bool
         Whether a pixel lies beside a step.
     is_near : ndarray, shape (H, W), bool
-        Which of the two the map has.
+        Whether the map has the nearer one.
     """
 
     near: FloatMap

@@ -1,12 +1,12 @@
-"""Specks of the map: a few pixels whose depth nothing around them shares.
+"""Specks of the map: a few pixels whose depth no surrounding pixel shares.
 
-A surface is seen in more than a few pixels, but for the rare tip: a speck is where matching went astray, mostly beside
-an edge, where few views see a pixel, or on a plain surface, where a depth farther behind it is as good as any. Holes,
-with nothing but nearer pixels round them, may be larger: what is behind a hole hardly any view shows, so that hardly
-any contradicts it. The pixels of a speck join the neighbours whose colours are most like their own.
+A surface covers more than a few pixels, apart from rare tips. A speck is a matching error, mostly beside an edge, where
+few views see a pixel, or on a plain surface, where a depth farther behind it fits as well as any. Holes, surrounded by
+nearer pixels only, may be larger: hardly any view shows the surface behind a hole, so hardly any contradicts it. The
+pixels of a speck join the neighbours whose colours are most like their own.
 
-What is behind a fence shows in gaps of a few pixels, too. Such a gap is as deep as something that is not far, and stays
-where no view says that it had better be closed.
+A surface behind a fence also shows in gaps of a few pixels. Such a gap is as deep as something close by in the picture,
+and stays unless views favour closing it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _NEIGHBOURS = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
 def without_specks(
     light_field: LightField, disparity: FloatMap, present: BoolMap, parameters: BoundaryParameters
 ) -> FloatMap:
-    """A map without specks, gaps being none.
+    """Disparity map without specks; gaps do not count as specks.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def join_specks(
     joined = np.where(left, np.float32(np.nan), disparity)
     y, x = np.nonzero(left)
     while len(y):
-        # from their rims inwards: what was joined in this round has a say in the next
+        # from the rims inwards: pixels joined in this round count as neighbours in the next
         unlike = np.full(len(y), np.inf)
         values = np.full(len(y), np.nan, np.float32)
         for dy, dx in _NEIGHBOURS:

@@ -1,4 +1,4 @@
-"""How much of a pixel beside a depth step each view shows as the nearer of its two surfaces.
+"""Share of the nearer of its two surfaces in a pixel beside a depth step, from all views.
 
 A pixel that an edge runs through shows a share ``a`` of the nearer surface, of colour ``F``, and of the background the
 rest. It moves with the nearer surface: along that disparity every view ``v`` shows the same share before another piece
@@ -37,7 +37,7 @@ BYTES_PER_PIXEL = 4
 
 
 class ShareCosts(NamedTuple):
-    """How badly shares of the nearer surface explain what the views show of the pixels of a rim.
+    """Costs of shares of the nearer surface as explanations of the views' colours at the pixels of a rim.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class ShareCosts(NamedTuple):
 
 
 def nothing_told(count: int) -> ShareCosts:
-    """Costs of so many pixels that no view was asked about."""
+    """Costs of ``count`` pixels without evidence from any view."""
     return ShareCosts(np.zeros((count, kernels.SHARES), np.float32), np.zeros(count, bool))
 
 
@@ -79,7 +79,7 @@ def share_costs(
     pixels = np.flatnonzero(rim.inside)
     found = nothing_told(len(pixels))
     guide = light_field.reference_view
-    # no farther surface within a pixel: none shows through
+    # no farther surface within a pixel, so none shows through
     clean = disparity - around.farthest < parameters.boundary_step
     sides = Sides(disparity, guide, clean, parameters.clean_radius)
     views = _views_alike(light_field, sides, parameters)

@@ -1,4 +1,4 @@
-"""What lies around a pixel, by which it is told whether an edge runs through it."""
+"""Disparities around a pixel, which show whether an edge runs through it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Planes of regions by what lies on their border.
+"""Planes of regions, from the disparities on their border.
 
 An edge moves with the nearer of the two surfaces that meet there, so a region is nowhere nearer than its border: the
 plane sought agrees with as much of the border as possible, while border that would lie *behind* it counts against it.

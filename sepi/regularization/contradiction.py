@@ -1,8 +1,8 @@
-"""Where the views contradict a plane: they know the depth that was there.
+"""Pixels where the views contradict a plane in favour of the previous depth.
 
-A plane that a few pixels of a border tell, or that is put into what was taken for uniform, may lead away from a depth
-that faint texture knows. So the views are asked about both: where the plane fits clearly worse than noise alone would
-make it, over some pixels, they know better. Not of the rim of a region: its pixels show what stands beside it, too.
+A plane from a few border pixels, or in a region wrongly taken for uniform, may replace a correct depth from faint
+texture. So both are compared with the views: where the plane fits clearly worse, over some pixels, than noise alone
+explains, the views contradict it. The rim of a region is left out: its pixels also show what stands beside it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def contradicted(
     light_field : LightField
         Not denoised: noise has to be that of each pixel by itself.
     before, after : ndarray, shape (H, W), float32
-        Pixels per view step; where they are equal nothing is asked.
+        Pixels per view step; where they are equal nothing is compared.
     regions : ndarray, shape (H, W), bool
         Where they may differ.
     present : ndarray, shape (T, S), bool

@@ -143,7 +143,7 @@ def _within(region: Region, plane: Plane, known: DisparityRange) -> tuple[Plane,
 
 
 def _squeezed(plane: Plane, light_field: LightField) -> float:
-    """By how much of its width, at most, some view sees a plane narrower than the reference: ``p - d(p) v`` tells."""
+    """Largest share of its width by which a view sees a plane narrower than the reference does, by ``p - d(p) v``."""
     _, across, down = plane
     return float(np.abs(light_field.baselines[light_field.present] @ np.array([down, across])).max())
 

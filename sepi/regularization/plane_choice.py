@@ -1,7 +1,7 @@
-"""Which plane a region without texture is given, and which of its pixels keep what they have.
+"""Plane of a region without texture, and the pixels of it that keep their disparity.
 
-There are three that may know: its border (:mod:`sepi.regularization.border_planes`), how its light changes
-(:mod:`sepi.regularization.lit_planes`), and, where noise hides faint texture, the disparity that it has.
+There are three sources: its border (:mod:`sepi.regularization.border_planes`), its light gradient
+(:mod:`sepi.regularization.lit_planes`), and, where noise hides faint texture, its current disparity.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Chosen(NamedTuple):
 def chosen_plane(
     region: Region, disparity: FloatMap, border: BorderPlane | None, lit: LitPlane | None, noisy: bool
 ) -> Chosen | None:
-    """Which plane a region is given; None where it keeps its disparity.
+    """Plane of a region; None if it keeps its disparity.
 
     That of its border, where enough of that is known and its light does not contradict it. In noise only of a large
     region whose border is one plane, since faint texture, which noise hides, knows more than a few pixels beside it;
@@ -146,7 +146,7 @@ def own_plane(region: Region, disparity: FloatMap, lit: LitPlane) -> Plane | Non
 
 def _plane_of(basis: npt.NDArray[np.float64], values: npt.NDArray[np.float64]) -> Plane:
     """Of the least squares."""
-    # a product of matrices would round as the number of threads has it
+    # the rounding of a matrix product would depend on the number of threads
     normal = np.einsum("ni,nj->ij", basis, basis), np.einsum("ni,n->i", basis, values)
     return np.asarray(np.linalg.lstsq(*normal, rcond=None)[0])
 
@@ -157,7 +157,7 @@ def _spread(values: npt.NDArray[np.float64], expected: npt.NDArray[np.float64]) 
 
 
 def kept_pixels(pixels: BoolMap, disparity: FloatMap, before: FloatMap, chosen: Chosen) -> BoolMap:
-    """Which pixels of a region in noise keep the disparity that they have.
+    """Pixels of a region in noise that keep their disparity.
 
     Parts that lie off its plane and go on beyond the region: a dark fold may hang together with the dark wall behind
     it, while its depth is known from round about. Large parts, unless the light confirms the plane. And where the

@@ -1,4 +1,4 @@
-"""The plane that most of some pixels lie on, among planes through three of them each (RANSAC [1]_).
+"""The plane that most pixels of a set lie on, among planes through three of them each (RANSAC [1]_).
 
 References
 ----------
@@ -57,5 +57,5 @@ def fitted(positions: _Doubles, values: _Doubles, plane: Plane, tolerance: float
 def residuals_of(positions: _Doubles, values: _Doubles, planes: _Doubles) -> _Doubles:
     """By how much each of N values is above each of P planes, (P, N)."""
     a, b, c = planes.T[..., None]
-    # term by term: a product of matrices rounds as the number of threads has it
+    # term by term: the rounding of a matrix product depends on the number of threads
     return np.asarray(values - (a + b * positions[:, 1] + c * positions[:, 2]))

@@ -1,8 +1,8 @@
-"""Pockets of a surface without texture: regions with nothing round them that knows their depth.
+"""Pockets of a surface without texture: regions whose border gives no evidence of their depth.
 
-Between a box and a ball before a plain wall shows a piece of the wall. All of its border is theirs, so that it supports
-no plane; and what matching makes of it is a guess. Where it has the colour of another, larger plain region close
-by, it is taken for a part of that one.
+A piece of a plain wall shows between a box and a ball before it. Its whole border belongs to these, so it supports no
+plane, and matching there is a guess. If the piece has the colour of another, larger plain region close by, it is taken
+for a part of that region.
 """
 
 from __future__ import annotations
