@@ -1,1 +1,1 @@
-"""What the views tell of the light field itself: disparity range, order of the views, sign of the disparity."""
+"""Estimates from the views alone: disparity range, order of the views, sign of the disparity."""

@@ -1,8 +1,8 @@
-"""Which grid a numbered sequence of views fills, found from the views alone.
+"""Finds the grid that a numbered sequence of views fills, from the views alone.
 
-Names that only count the views leave open how many rows and columns there are, whether they are counted row by row or
-column by column, whether the camera ran back and forth, and whether the views fill the grid at all: crosses and discs
-of views are common. Each arrangement of so many views is tried; in the right one neighbours fit together everywhere.
+Names that only count the views do not tell the number of rows and columns, whether views are counted by row or by
+column, whether the camera ran back and forth, or whether the views fill the grid: crosses and discs are common. Each
+arrangement of that many views is tried; in the right one, neighbours match everywhere.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from sepi.lightfield import LightField
 
 Positions = npt.NDArray[np.int64]
 
-# Discs of at most this radius are tried, and grids whose longer side is at most so many times the shorter
+# Largest radius of the discs that are tried, and largest ratio of a grid's longer side to its shorter
 _LARGEST_RADIUS = 24
 _MOST_SLENDER = 6
-# Views that others are matched with, from all over the sequence, how many others, and points of each; the part of these
-# views that fits worst decides: a wrong arrangement may be right but for the ends of its rows
+# Number of reference views, spread over the sequence, of neighbours matched with each, and of points in each. The worst
+# matches decide (one in so many): a wrong arrangement may be right except at the ends of its rows
 _REFERENCES = 24
 _NEIGHBOURS = 12
 _POINTS = 40
 _WORST = 3
-# Distances to the others, and reductions by which movement is searched that is too large otherwise
+# Distances to the neighbours, and image reductions that make larger movement searchable
 _DISTANCES = ((2, 1), (2, 2), (2, 4), (6, 1))
-# The rows of views may run up or down; near and far do not matter
+# The rows of views may run up or down; the sign of the disparity does not matter
 _ORDERS = ("as-given", "flip-rows")
 # What tells: the next arrangement's matching cost over the best's, and from where on no other distance is looked at;
 # the most that views have which fit together
@@ -125,7 +125,7 @@ def arrange(light_field: LightField, options: ReadOptions) -> LightField:
 
 
 def arrangements(count: int) -> Iterator[Arrangement]:
-    """The ways to put so many views into a grid that are tried; a square first."""
+    """Arrangements to try for a number of views; a square first."""
     sides = [side for side in range(math.isqrt(count), 1, -1) if count % side == 0 and count <= _MOST_SLENDER * side**2]
     for short in sides:
         long = count // short
@@ -180,7 +180,7 @@ def _as_in_the_grid(name: str, positions: Positions) -> Iterator[Arrangement]:
 
 
 def _costs(views: Views, present: npt.NDArray[np.bool_], tried: list[Arrangement]) -> list[float]:
-    """Matching cost of each arrangement, 0..1, by the views that tell them apart best; infinite without texture."""
+    """Matching cost of each arrangement, 0..1, from the views that best separate them; infinite without texture."""
     best, clearest = [math.inf] * len(tried), -1.0
     for reach, factor in _DISTANCES:
         if views.is_too_small(factor):
@@ -196,7 +196,7 @@ def _costs(views: Views, present: npt.NDArray[np.bool_], tried: list[Arrangement
 
 
 def _cost(views: Views, present: npt.NDArray[np.bool_], positions: Positions, reach: int, factor: int) -> float:
-    """How badly views fit their neighbours, where they fit worst, under the better of the orders."""
+    """Matching cost of the views that match their neighbours worst, under the better order."""
     count = len(positions)
     places = dict.fromkeys(int(count * ((n + 0.5) * _GOLDEN % 1)) for n in range(_REFERENCES))
     costs = []

@@ -1,4 +1,4 @@
-"""Which axis of an array is which, where its sizes leave it open, found from its pictures.
+"""Identifies the axes of an array from its pictures where its sizes are ambiguous.
 
 An axis of 3 or 4 beside one of views may hold colours or a row of the grid: colours show no parallax against each
 other, views do.
@@ -25,7 +25,7 @@ _COLOUR_COUNTS = (3, 4)
 
 
 def fitting_axes(readings: Mapping[str, LightField]) -> str | None:
-    """The order of an array's axes in which its pictures fit together; None where they do not tell.
+    """The order of axes in which an array's pictures match; None if ambiguous.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def _is_consistent(light_field: LightField) -> bool:
 
 
 def _parallax(pictures: npt.NDArray[np.generic]) -> float:
-    """By how much pictures fit better in a row or column of views than in one place; NaN where they do not tell.
+    """How much better pictures match as a row or column of views than in place; NaN where that is undecided.
 
     ``pictures`` are (K, M, H, W), K sequences of M.
     """

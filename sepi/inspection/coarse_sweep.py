@@ -1,8 +1,8 @@
 """Search of the range estimate: a coarse plane sweep that keeps each pixel's best candidate and how clear it is.
 
-It differs from the sweep of the initial depth in what it must withstand: candidates far outside the scene's range,
-light loss towards the outer views, noise. Truncated absolute differences of high-pass filtered views, averaged over a
-window, do; sub-pixel accuracy does not matter.
+Unlike the sweep of the initial depth, it must withstand candidates far outside the scene's range, vignetting in the
+outer views, and noise. So it averages truncated absolute differences of high-pass filtered views over a window;
+sub-pixel accuracy does not matter.
 """
 
 from __future__ import annotations

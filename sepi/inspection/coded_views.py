@@ -1,7 +1,7 @@
-"""Whether views went through a coder that lost some of them, such as JPEG's.
+"""Detects views that went through a lossy coder, such as JPEG's.
 
-It changes each block of 8x8 pixels by itself, so pixels differ more across the borders of blocks than within them. What
-it loses stands at the same pixels in every view: it matches at disparity 0, and so do surfaces with little texture.
+Such a coder changes each block of 8x8 pixels by itself, so pixels differ more across block borders than within blocks.
+The artefacts lie at the same pixels in every view: they match at disparity 0, and so do surfaces with little texture.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _MORE, _ERRORS = 0.12, 6.0
 
 
 def coded_views(light_field: LightField) -> str | None:
-    """What to say of views in which the blocks of a coder show; None where none do, or the pictures are too small.
+    """Message about views that show a coder's blocks; None if none do, or the pictures are too small.
 
     Parameters
     ----------

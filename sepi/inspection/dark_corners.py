@@ -1,7 +1,7 @@
 """Dark corners that a lens leaves in its pictures: they are no surfaces of the scene.
 
-The edge of such a corner moves from view to view as the lens has it, not as anything in the scene, and it hides what is
-behind it like something near.
+The edge of such a corner moves from view to view with the lens, not with the scene, and occludes what is behind it like
+a near surface.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _MOST_BLACK = 0.35
 
 
 def dark_corners(reference_view: FloatMap, shape: tuple[int, ...], reach: int) -> BoolMap:
-    """What the lens leaves black in the corners, and what lies so near that filters mix it in.
+    """Mask of the corners that the lens leaves black, and of pixels into which filters mix them.
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
 """Find the disparity range of a scene from its views alone.
 
-A coarse plane sweep over all disparities that a scene may have, by the nearest views, tells where the scene lies; a
-second one, about there only, by views as far away as possible, tells its range. Only disparities that can be trusted
-count: those of surfaces, patches of pixels whose best match is unambiguous and whose neighbours agree; where there are
-few views, also one that matches back. The range is that of nearly all of them, with a margin: one that is too narrow
-spoils the nearest or most distant surface, one that is too wide costs time and accuracy.
+A coarse plane sweep of the nearest views over all possible disparities locates the scene. A second sweep, around there
+only, with views as far away as possible, measures its range. Only trusted disparities count: those of surfaces, that
+is, patches of pixels whose best match is unambiguous and whose neighbours agree. Where there are few views, a match
+must also hold in reverse. The range spans nearly all of them, with a margin: too narrow a range spoils the nearest or
+most distant surface, too wide a one costs time and accuracy.
 
-A third sweep tells of any range whether the scene is in it.
+A third sweep checks whether the scene lies within a given range.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _MOST_MOVEMENT_PART = 0.25
 _SAMPLING = 0.5
 # views when there is no cross of them
 _MOST_VIEWS = 16
-# views that are much darker than the reference are not looked at
+# views much darker than the reference view are skipped
 _LEAST_BRIGHTNESS = 0.3
 # larger pictures are reduced by a whole factor; those that are searched by a larger one
 _MOST_PIXELS = 600_000
@@ -51,12 +51,12 @@ _TRUNCATION = 0.1
 # Trust: lowest cost as part of the lowest outside its valley. A limit on the cost itself would add nothing here, and
 # would have to know the noise.
 _MOST_AMBIGUITY = 0.8
-# mean above lowest cost, the brightest of the picture = 1: less is rounding; full range = 1: less is, where JPEG left
-# blocks, their edges, which match those of any other block
+# mean minus lowest cost. Below the first (the picture's brightest = 1) it is rounding. Below the second (full range =
+# 1), where JPEG left blocks, it is block edges, which match those of any other block
 _FLAT = 1e-3
 _FLAT_BLOCKS = 3e-3
-# side of these blocks; a picture has them where differences across their edges are so many times those inside; larger
-# differences than this, full range = 1, are the scene's
+# side of these blocks; least ratio of differences across their edges to those inside; differences above the last, full
+# range = 1, belong to the scene
 _BLOCK = 8
 _BLOCKINESS = 1.9
 _FAINT = 4 / 255
@@ -66,17 +66,17 @@ _LEAST_SUPPORT = 13
 # pixels of a patch, each counted by how clear its match is: as part of the picture, and at least
 _PATCH = 3e-4
 _FEWEST_PIXELS = 25
-# so few views must match back
+# with at most so many views, matches are verified in reverse
 _FEW_VIEWS = 2
 
 # Range: part of the pixels that is left out on either side, and the margin, as part of the span
 _OUTLIERS = 0.001
 _MARGIN = 0.06
-# part of the pixels that move less than what is told to keep views near enough
+# quantile of movement that limits how far away views may be
 _USUAL = 0.95
 
-# A range without the scene: mean above which there is texture, full range = 1; lowest cost of what matches nowhere, as
-# part of that mean; side of its patches, pixels; their part of the textured pixels
+# Range that misses the scene: mean above which there is texture, full range = 1; lowest cost of an unmatched pixel, as
+# part of that mean; side of unmatched patches, pixels; their share of the textured pixels
 _TEXTURE = 0.003
 _MISFIT = 0.9
 _HOLE = 5

@@ -1,9 +1,8 @@
-"""Which of two surfaces is in front, by what hides what: the sign of the disparities.
+"""Sign of the disparities from occlusion: which of two surfaces is in front.
 
-Where two surfaces meet in a view, the nearer one is seen. So of two pixels of the reference view that the disparities
-bring to the same position of a view, one matches the views on that side worse than those on the opposite side: it is
-hidden there. It must be the one of the lesser disparity; if it is the other again and again, all disparities have the
-wrong sign.
+Where two surfaces meet in a view, it shows the nearer one. Suppose the disparities move two pixels of the reference
+view to the same position in a view. The occluded one matches the views on that side worse than those on the opposite
+side. It must be the one of lesser disparity; if it is repeatedly the other, all disparities have the wrong sign.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from sepi.inspection.view_layouts import Baseline, Trial, Views, baselines_under
 from sepi.kernels import view_order as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 
-# A glance looks at bands of so many rows, one of so many; it tells little in pictures of fewer pixels
+# A quick check uses bands of so many rows, one band in so many; smaller pictures than this are unsuited to it
 _BAND_ROWS = 24
 _BANDS = 3
 _LEAST_PIXELS_TO_GLANCE = 100_000
-# Views up to this many rows or columns away are looked at: the farther, the wider the strips that are hidden
+# Farthest views used, in rows or columns: the farther the view, the wider the occluded strips
 _FARTHEST = 24
-# Movement searched at most, pixels; larger pictures are reduced by a whole factor, less than where the order of the
-# views is looked for: strips that are hidden are narrow
+# Largest movement searched, pixels. Larger pictures are reduced by a whole factor, but less than in the search for the
+# order of the views: occluded strips are narrow
 _MOST_MOVEMENT = 16
 _MOST_PIXELS = 1_200_000
 # Matching: half width of the window, pixels; largest difference of one view, and what flat areas differ by, the
@@ -40,8 +39,8 @@ _TRUNCATION = 1.5
 _FLAT = 0.02
 _MOST_AMBIGUITY = 0.6
 _NOISE_FLOOR = 0.05
-# Surfaces: pixels whose disparity this part of a window of so many pixels has too, within the sampling; noise makes
-# pixels of one surface look like two
+# Surfaces: this share of the window around a pixel has its disparity, within the sampling; noise can make one surface
+# look like two
 _SURFACE_WINDOW = 7
 _LEAST_SUPPORT = 0.6
 # What rounding to 8 bits adds to the square of a difference, full range = 1; most of it, the picture's variance = 1:
@@ -60,7 +59,7 @@ _MEETING = 0.75
 # Logarithm of the ratio of residuals: that one pair counts at most; the least that tells anything
 _MOST_EVIDENCE = 2.0
 _LEAST_EVIDENCE = 1.0
-# So many of the farthest views on each side are asked what is hidden in them
+# Number of the farthest views on each side that are tested for occlusion
 _HIDING_VIEWS = 2
 # Side of a region, pixels, at most and as part of the picture's (pairs in one region are one observation); its pairs
 _REGION = 16
@@ -71,7 +70,7 @@ _DIRECTIONS: tuple[Baseline, ...] = ((0, 1), (0, -1), (1, 0), (-1, 0))
 
 
 class Evidence(NamedTuple):
-    """What occlusion says of the sign of the disparities, by regions of the picture.
+    """Evidence of occlusion for the sign of the disparities, by regions of the picture.
 
     Attributes
     ----------
@@ -80,7 +79,7 @@ class Evidence(NamedTuple):
     errors : float
         Absolute value of the mean, in standard errors.
     regions, agreeing : int
-        How many regions have a say, and how many of them say what the mean says.
+        How many regions have evidence, and how many of them agree with the mean.
     """
 
     mean: float
@@ -174,7 +173,7 @@ def _add_pairs(
     total: npt.NDArray[np.float64],
     count: npt.NDArray[np.float64],
 ) -> None:
-    """Add what pairs of pixels that meet in a view say to the sums, and their number, of each region.
+    """Add the evidence of pixel pairs that meet in a view, and their number, to the sums of each region.
 
     ``residual`` is that of the view, ``opposite`` the mean of those on the other side, where both pixels are seen.
     """
@@ -199,7 +198,7 @@ def add_pairs(
     total: npt.NDArray[np.float64],
     count: npt.NDArray[np.float64],
 ) -> None:
-    """Add what pairs of usable pixels that meet in a view say, and their number, to regions of ``side`` pixels.
+    """Add the evidence of usable pixel pairs that meet in a view, and their number, to regions of ``side`` pixels.
 
     The nearer pixel lies 2 to ``farthest`` steps of ``direction``, each -1, 0 or 1 down and across, from the other. The
     view is ``length`` view steps away, and a pixel that is hidden in it has a greater residual than ``hidden``.

@@ -1,7 +1,7 @@
-"""Views that are none of the scene's: of another scene or turned over, black, or copied from another place.
+"""Finds views that do not belong: of another scene, turned over, black, or copied from another place.
 
-Small pictures of neighbouring views are alike where one is moved a little, whatever grid they stand in. So views fall
-into groups; where most are of one, the others fit none of these.
+Small pictures of neighbouring views are alike after a small shift, in any grid. So views form groups; where one group
+holds most views, the others do not belong.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ Places = npt.NDArray[np.int64]
 
 # Pixels of the small pictures, at most
 _MOST_PIXELS = 5_200
-# Movement to each side that is searched, as part of the shorter side; how many others from all over the grid a view is
-# compared with that is not like its neighbours
+# Movement searched to each side, as part of the shorter side; number of other views, spread over the grid, that a view
+# unlike its neighbours is compared with
 _MOVEMENT = 1 / 8
 _OTHERS = 32
-# Views are alike from this part on of the correlation that half of the views reach with another. They are not judged
-# where it is less than the least: noise or wide steps leave nothing to judge by then.
+# Views are alike if their correlation is at least this part of the one that half of the views reach with another. If
+# that one is below the least, no view is judged: noise or wide steps hide the likeness.
 _ALIKE = 0.4
 _LEAST = 0.18
 
 
 def odd_views(light_field: LightField) -> list[str]:
-    """What to say of views that fit none of the others, and of those that are the same picture.
+    """Messages about views that match none of the others, and about identical pictures.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def odd_views(light_field: LightField) -> list[str]:
 
 
 def _flags(light_field: LightField, places: Places) -> str:
-    """What leaves views out: names of their files, or their positions where they have none of their own."""
+    """Flags that leave views out: by file name, or by position where views have no files of their own."""
     files = light_field.files
     at = sorted(places.tolist())
     names = [f"{t},{s}" if files is None else shlex.quote(one_line(str(files[t, s]))) for t, s in at]

@@ -1,8 +1,7 @@
-"""How far rows of views are apart, as a multiple of the distance of columns, found from the views alone.
+"""Estimates the spacing of rows of views, as a multiple of that of columns, from the views alone.
 
-A camera gantry may move by other steps up and down than sideways. Points of one view are matched with views above,
-below and beside it under each spacing tried, in each layout of the views: in the right one each point has a disparity
-at which all views agree.
+A camera gantry may use different vertical and horizontal steps. Points of one view are matched with views above, below
+and beside it, for each spacing and layout tried: in the right one, all views agree on one disparity for each point.
 """
 
 from __future__ import annotations
@@ -42,15 +41,15 @@ _MOST_MOVEMENT = 80.0
 # Rounds of measuring, and spacings to each side of the last round's best
 _ROUNDS = 2
 _EACH_SIDE = 4
-# What is not worth a word: less than that is the error of the measurement
+# Smaller differences are not reported: they are within the measurement error
 _LEAST_DIFFERENCE = 0.04
-# Spacings up to this factor from one need a second witness: between samples noise is smoothed, and lenslet pictures are
-# decoded with shifts of a few hundredths of a pixel, both of which can make a tenth more or less fit better
+# Spacings within this factor of one need a second test: interpolation smooths noise, and decoded lenslet pictures are
+# shifted by a few hundredths of a pixel; either can favour a spacing that is a tenth off
 _DOUBTED = 1.25
 
 
 def settle_row_spacing(light_field: LightField, views: Views | None = None) -> LightField:
-    """The light field with the row spacing that its views tell, and a note; as it is where they tell none.
+    """The light field with the row spacing estimated from its views, and a note; unchanged if that fails.
 
     Nothing is done where a spacing or positions of the views are known already. ``views``: its views, where they are
     looked at otherwise, too.

@@ -1,7 +1,7 @@
-"""How well views fit together under each order of their grid, but for the sign of the disparities.
+"""Matching cost of the views under each order of their grid, regardless of the sign of the disparities.
 
-Points of one view are matched with other views under each layout, over disparities of both signs: in the right layout
-each point has a disparity at which all views agree. Layouts can also differ in how far rows of views are apart, see
+Points of one view are matched with other views under each layout, over disparities of both signs: in the right layout,
+all views agree on one disparity for each point. Layouts can also differ in the spacing of rows, see
 :mod:`sepi.inspection.row_spacing`.
 """
 
@@ -42,7 +42,7 @@ _MOST_VIEWS = 16
 MOVEMENT = 10
 SAMPLING = 0.6
 _REDUCTIONS = (2, 4, 8)
-# Views that are worth nothing: brightness and contrast as part of the reference's
+# Unusable views: those below this part of the reference's brightness or contrast
 _LEAST_BRIGHTNESS = 0.3
 _LEAST_CONTRAST = 0.4
 # Half width of a patch, pixels; points along a side of the picture
@@ -107,7 +107,7 @@ class Views:
         return min(self.shape) // factor < _LEAST_SIDE
 
     def worth_matching(self, baselines: list[Baseline]) -> list[Baseline]:
-        """Those of the views that are neither dark nor dull beside the reference; all, if those are too few.
+        """The views that are neither dark nor low in contrast beside the reference; all, if those are too few.
 
         Lenses darken and blur the views towards the edge of the grid, so that hardly more than noise is left.
         """
@@ -272,7 +272,7 @@ def matched(
     most_points: int | None = None,
     sampling: float = SAMPLING,
 ) -> tuple[FloatMap, FloatMap] | None:
-    """How badly points of a view match other views under several layouts of these.
+    """Matching costs of a view's points with other views, under several layouts of these.
 
     Parameters
     ----------
@@ -349,9 +349,9 @@ def _layouts(baselines: npt.NDArray[np.float64]) -> tuple[list[dict[str, int]], 
 
 
 def points_to_match(detail: FloatMap, most: int | None = None) -> npt.NDArray[np.int64]:
-    """Pixels ``(y, x)`` to match, shape (P, 2): the one of each cell of the picture that is most like a corner.
+    """Pixels ``(y, x)`` to match, shape (P, 2): the most corner-like pixel of each cell of the picture.
 
-    With ``most``, only so many that are it most of all, in their order in the picture.
+    With ``most``, only that many of the most corner-like, in picture order.
     """
     H, W = detail.shape
     # away from the border as far as views move, where the picture is large enough
