@@ -1,1 +1,1 @@
-"""What one makes of finished maps."""
+"""Applications of finished maps."""

@@ -1,11 +1,11 @@
-"""Disparity of every view of a light field, by maps that agree with each other.
+"""Consistent disparity maps of all views of a light field.
 
-A few maps tell what nearly all views see: that of the reference view, and those of the views that stand farthest from
-it in each diagonal direction, which see round the surfaces that hide something from it. Each of them is carried to a
-view as a surface (:mod:`sepi.applications.carried_map`), and where they differ they vote: for a surface are the
-maps that show it, against it those that see through it to what is behind, as in the fusion of [1]_. What no map shows
-takes the disparity of the farther of the surfaces beside it. At last each view decides which side its pixels at depth
-steps belong to (:mod:`sepi.boundaries.decision`), for a carried outline is only known to a pixel.
+A few source maps cover what nearly all views see: that of the reference view, and those of the views farthest from it
+in each diagonal direction, which see what is occluded in it. Each source map is warped to a view as a surface
+(:mod:`sepi.applications.carried_map`). Where source maps differ, they vote: maps that show a surface vote for it, maps
+that see through it to what is behind vote against it, as in the fusion of [1]_. Pixels that no map shows take the
+disparity of the farther adjacent surface. Last, each view decides which side its pixels at depth steps belong to
+(:mod:`sepi.boundaries.decision`), since a warped outline is only accurate to a pixel.
 
 References
 ----------
@@ -36,7 +36,7 @@ from sepi.variants import Variant
 EDGE_VIEWS = 25
 """Views that each view is compared with at its depth steps, at least."""
 
-_AT_ONCE = 8  # views that are made at a time: so many maps are held beside the sources
+_AT_ONCE = 8  # views made at a time; their maps are held beside the sources
 _CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 
 
@@ -314,7 +314,7 @@ def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int
 
 
 def _with_doubt(light_field: LightField, view: ViewMaps, decided: FloatMap) -> ViewMaps:
-    """A view's maps with the disparity that was decided on, and error bars that know of that and of what is made up."""
+    """A view's maps with the disparity decided on, and error bars that allow for that and for extended background."""
     if view.sigma is None or view.low is None or view.high is None:
         return view._replace(disparity=decided)
     # a pixel that changed sides may be of either

@@ -1,4 +1,4 @@
-"""Where the cameras of a light field stand and how they see: pinhole cameras for programs that know no light fields.
+"""Poses and intrinsics of a light field's cameras: pinhole cameras for programs that do not know light fields.
 
 All cameras look the same way. Axes are those of computer vision: x to the right, y down, z forward, the way that they
 look; the origin is the camera of the reference view. A view ``n`` view steps to the right of the reference view and

@@ -1,4 +1,4 @@
-"""Views with camera poses, depth and points: what the data sets for other programs are made of.
+"""Views with camera poses, depth and points, from which data sets for other programs are made.
 
 :mod:`sepi.io.colmap` and :mod:`sepi.io.nerfstudio` write them.
 """
@@ -32,7 +32,7 @@ _APART = 1.0
 
 @dataclass(frozen=True)
 class PosedViews:
-    """A light field as single pictures with cameras, and what is known of the scene.
+    """A light field as single pictures with cameras, and the known geometry of the scene.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ class PosedViews:
         return self.sigmas((t, s))
 
     def pixel_errors(self, sees: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
-        """How far from where they are said to be views see the points, (P,), pixels; 0 where nothing tells it.
+        """Expected reprojection error of the points, mean over views, (P,), pixels; 0 where it is not known.
 
         Parameters
         ----------
@@ -195,8 +195,8 @@ class PosedViews:
         return np.where(known, facing / np.where(known, length, 1), 0).astype(np.float32)
 
     def sees(self, view: int, carried: FloatMap) -> npt.NDArray[np.bool_]:
-        """Which of the points a view sees, (P,), given its :meth:`carried` disparity: those that it holds and that
-        nothing nearer hides.
+        """Points that a view sees, (P,), given its :meth:`carried` disparity: those inside it that nothing nearer
+        occludes.
         """
         baseline, disparity = self.poses.baselines[view], self.disparity[self.chosen].astype(np.float64)
         there = np.argwhere(self.chosen) - disparity[:, None] * baseline

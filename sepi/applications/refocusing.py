@@ -54,11 +54,11 @@ def refocus(
     aperture: float | None = None,
     progress: Progress = no_progress,
 ) -> FloatMap:
-    """The picture of the synthetic aperture, focused at one disparity.
+    """Picture of the synthetic aperture, focused at one disparity.
 
-    What lies nearer or farther is out of focus: the more so, the larger the aperture. Where neighbouring views see it
-    more than about a pixel apart, it would show as many sharp copies instead of a blur. A map tells how far apart they
-    are, and each view is taken for all those that could stand round it, half way to its neighbours.
+    Nearer and farther points are out of focus: the more so, the larger the aperture. Where they move more than about a
+    pixel between neighbouring views, they would show as sharp copies instead of a blur. A map tells this movement: each
+    view then stands for all views around it, half way to its neighbours.
 
     Parameters
     ----------
@@ -137,9 +137,9 @@ def all_in_focus(
 ) -> FloatMap:
     """The reference view, each pixel the mean of the views that see its point.
 
-    Views in which a nearer pixel of the map hides the point are left out, and views count the less, the more their
-    colour differs from that of the others: where the map is wrong, the reference view's own colour stays. N views that
-    see a point lower its noise to about 1 / sqrt(N).
+    Views in which a nearer pixel of the map occludes the point are left out. A view's weight falls as its colour
+    differs from the others: where the map is wrong, the reference view's own colour stays. N views that see a point
+    lower its noise to about 1 / sqrt(N).
 
     Parameters
     ----------
@@ -279,7 +279,9 @@ def _disparity_of(light_field: LightField, maps: StageMaps | FloatMap) -> FloatM
 
 
 def _surfaces(disparity: FloatMap) -> FloatMap | None:
-    """A map in which what is not finite hides nothing: it is as far as the farthest; None if nothing is finite."""
+    """A map whose non-finite pixels are set to the farthest disparity, so that they occlude nothing; None if none is
+    finite.
+    """
     known = np.isfinite(disparity)
     return np.where(known, disparity, disparity[known].min()).astype(np.float32) if known.any() else None
 

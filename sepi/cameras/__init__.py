@@ -1,1 +1,1 @@
-"""Calibrated cameras made a light field: their files, and the views that parallel cameras in one plane would have."""
+"""Light fields from calibrated cameras: their files, and the views of parallel cameras in one plane."""

@@ -1,4 +1,4 @@
-"""The way back: maps of a rectified view in the picture that its camera took, its turn and distortion included."""
+"""Maps a rectified view's results back to the picture that its camera took, rotation and distortion included."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sepi.camera import Camera
 from sepi.lightfield import FloatMap
 from sepi.rig import Floats, Rectified, Rig
 
-# pixels beside each other whose disparities differ by more are of two surfaces, between which there is nothing
+# adjacent pixels whose disparities differ by more belong to two surfaces, with nothing between them
 _ONE_SURFACE = 0.25
 
 
@@ -40,7 +40,7 @@ def as_taken(
     disparity : ndarray, shape (height, width of the picture), float32
         As the rectified view has it there, interpolated within a surface; NaN where the rectified view shows nothing.
     depth : ndarray, of the same shape, float32
-        Along the way that the camera looked, units of the world; infinite at and beyond infinity.
+        Along the camera's optical axis, units of the world; infinite at and beyond infinity.
     """
     view = rig.views[position]
     lens = view.shot.lens
@@ -65,7 +65,7 @@ def sigma_as_taken(
     Returns
     -------
     ndarray, shape (height, width of the picture), float32
-        That of the nearest pixel of the rectified view, for what stands between two tells of neither; NaN where the
+        That of the nearest pixel of the rectified view, since a mean of two would describe neither; NaN where the
         rectified view shows nothing.
     """
     view = rig.views[position]
@@ -76,7 +76,7 @@ def sigma_as_taken(
 
 
 def _rays(view: Rectified, rig: Rig) -> tuple[Floats, Floats]:
-    """Ways that a camera's pixels look, row by row, (N, 3): in its own axes, and in those of the rectified views."""
+    """Ray directions of a camera's pixels, row by row, (N, 3): in its own axes, and in those of the rectified views."""
     lens = view.shot.lens
     pixels = np.stack(np.meshgrid(np.arange(lens.width), np.arange(lens.height)), axis=-1).reshape(-1, 2)
     own = lens.rays(pixels.astype(np.float64))

@@ -1,9 +1,9 @@
-"""Pictures without poses become a COLMAP model that :func:`sepi.read_cameras` takes: structure from motion by pycolmap.
+"""Structure from motion by pycolmap: makes a COLMAP model for :func:`sepi.read_cameras` of pictures without poses.
 
-The sweeps that make light fields are narrow, and what structure from motion usually asks for is not there: wide angles
-between rays, and pictures that tell the focal length. So features that lie a pixel off are none, points need no more
-angle than a pixel, and lenses are as the files tell, or usual ones, until all pictures are placed; then they are freed,
-and stay so where that brings the points clearly closer.
+Sweeps that make light fields are narrow: they lack the wide ray angles and the constraints on focal length that
+structure from motion usually needs. So matches a pixel off are rejected, and a ray angle of one pixel suffices for a
+point. Lenses stay as in the files, or at usual values, until all pictures are placed. Then they are refined, and kept
+so where the points come clearly closer.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ _SIDE = 2000
 # pictures of which all pairs are matched; beyond, steps in the order of their names
 _ALL_PAIRS = 60
 _STEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
-# least angles between rays of the first two pictures, degrees, from each of which COLMAP goes down alone; the next is
-# tried where less than this part of the pictures is placed
+# least ray angles of the first two pictures, degrees; COLMAP lowers each by itself. The next is tried if less than this
+# share of the pictures is placed
 _FIRST_ANGLES, _ENOUGH = (4.0, 1.0), 0.9
 # pairs of pictures that are tried as the first at each
 _FIRST_PAIRS = 40
@@ -49,7 +49,7 @@ _FIRST_PAIRS = 40
 _FIRST_MATCHES, _PLACED_MATCHES = 40, 20
 # least angle between the rays of a point, pixels; but never more than COLMAP's own, degrees
 _POINT_ANGLE, _MOST_ANGLE = 1.0, 1.5
-# the freed lens stays where points lie closer by this part
+# the refined lens is kept if points lie closer by this share
 _CLEARLY = 0.1
 # part of the progress when pictures are matched, and placed
 _FOUND, _MATCHED = 0.4, 0.7
@@ -68,9 +68,9 @@ class Calibration:
     left_out : tuple of str
         Those of the others.
     error : float
-        Mean distance of the points in the pictures from where the model has them, pixels.
+        Mean reprojection error of the points, pixels.
     notes : tuple of str
-        What :func:`sepi.read_cameras` will say of the cameras: how flat they stand, and what it leaves out.
+        Notes that :func:`sepi.read_cameras` will give on the cameras: how flat they stand, and what it leaves out.
     unusable : str or None
         Why they make no light field; None where they do.
 

@@ -1,4 +1,4 @@
-"""What pictures without poses have in common: a database of features and matches for COLMAP; by pycolmap.
+"""Builds COLMAP's database of features and matches of pictures without poses; by pycolmap.
 
 Features are found one picture after the other and written in the order of the pictures, so that the database does not
 depend on threads.
@@ -141,7 +141,7 @@ def _write_camera(pycolmap: Any, file: Any, path: Path, lens: str) -> tuple[int,
 def match(
     pycolmap: Any, database: Path, pairs: Sequence[tuple[str, str]], size: float, threads: int, progress: Progress
 ) -> None:
-    """Match pairs of pictures, by their names, and see what of that one motion explains.
+    """Match pairs of pictures, by their names, and verify which matches one motion explains.
 
     Parameters
     ----------
@@ -168,6 +168,6 @@ def match(
 def matched_points(
     file: Any, one: int, other: int
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
-    """Where two pictures of a database show the same, by matches alone: all features of both, and pairs of them."""
+    """Unverified matches of two pictures of a database: all features of both, and pairs of them."""
     places = [np.asarray(file.read_keypoints(image)[:, :2], np.float64) for image in (one, other)]
     return places[0], places[1], np.asarray(file.read_matches(one, other), np.uint32).reshape(-1, 2)

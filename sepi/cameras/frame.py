@@ -16,7 +16,7 @@ from sepi.errors import SepiError
 from sepi.lightfield import MIN_SIZE
 from sepi.rig import Floats
 
-# places along the longer side at which it is looked who sees what, before single pixels
+# sample places along the longer side for the visibility check that precedes single pixels
 _LATTICE = 80
 # what a sample may lie outside a picture, pixels: rounding
 _OUTSIDE = 1e-3

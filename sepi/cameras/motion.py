@@ -1,7 +1,7 @@
-"""Whether pictures without poses can become a light field: a quick look at a few, small, before hours are spent.
+"""Quick check of a few small pictures, before hours are spent, whether pictures without poses can make a light field.
 
-What it says is a guess, as the focal length is one where the files do not tell it: only what is far from what
-:mod:`sepi.cameras.rectification` takes is refused here.
+The result is an estimate, since the focal length is a guess where the files do not give it. So only pictures far
+outside what :mod:`sepi.cameras.rectification` accepts are refused here.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from sepi.stage import no_progress
 _LOOKED_AT, _LOOK = 6, 640
 # features below which a picture shows next to nothing; matches below which two show different things
 _FEATURES, _MATCHES = 40, 20
-# part of the matches, of which some are false, that tells how far things move against each other; pixels of such
-# movement, in pictures of the size looked at, below which there is none, and from which its direction is sure
+# quantile of the matches, some of them false, that measures parallax; parallax in pixels, in the reduced pictures,
+# below which there is none, and from which its direction is reliable
 _MOST, _NARROW, _FIRM = 0.85, 0.8, 1.5
 # degrees: between the motion and the way the cameras look; between the ways that two of them look
 _AHEAD, _TURNED = 30.0, 60.0
@@ -40,7 +40,7 @@ class Step:
     ----------
     names : (str, str)
     parallax : float
-        How far things move against each other, pixels.
+        Parallax between near and far points, pixels.
     ahead : float or None
         Degrees from the way that the first looks to where the second stands; None where that is not known.
     turned : float
@@ -143,9 +143,7 @@ def _steps(pycolmap: Any, file: Any, size: float) -> list[Step]:
 
 
 def _parallax(here: Floats, there: Floats, size: float) -> float:
-    """Pixels by which things move against each other: what is left when one picture is laid over the other as well as a
-    camera that only turns allows.
-    """
+    """Parallax in pixels: what remains after the best alignment of the pictures by a pure camera rotation."""
     cv2.setRNGSeed(SEED)
     turned, _ = cv2.findHomography(here, there, cv2.RANSAC, size)
     if turned is None:

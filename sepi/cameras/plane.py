@@ -1,4 +1,4 @@
-"""The plane through the cameras: their common axes, positions in view steps, and what standing off it does.
+"""The plane through the cameras: their common axes, positions in view steps, and the effect of standing off it.
 
 A camera that stands ``dz`` before the reference camera, and has the focal length ``f (1 - dz / Z0)``, sees a point at
 depth ``Z`` at ``k`` times its distance from the principal point, ``k = (1 - dz / Z0) / (1 - dz / Z)``, of what it would
@@ -118,7 +118,7 @@ def zooms(plane: Plane, inverse_depths: tuple[float, float]) -> Floats:
 
 
 def disparity_errors(plane: Plane, inverse_depths: tuple[float, float], corners: Floats, focal: float) -> Floats:
-    """Greatest error of disparity that standing off the reference camera's plane makes, (N,), pixels per view step.
+    """Greatest disparity error from a camera's distance to the reference camera's plane, (N,), pixels per view step.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Calibrated cameras made a light field: views of parallel cameras in one plane.
+"""Rectifies calibrated cameras to a light field: views of parallel cameras in one plane.
 
 The steps: the plane through the cameras (:mod:`sepi.cameras.plane`), the picture of the reference view
 (:mod:`sepi.cameras.frame`), the views themselves (:mod:`sepi.cameras.resampling`), and a grid for them
@@ -23,13 +23,13 @@ from sepi.io.files import name_of
 from sepi.lightfield import DisparityRange, LightField
 from sepi.rig import Floats, Rectified, Rig
 
-# disparity errors, pixels per view step, that are told, and for which a view is left out
+# disparity errors, pixels per view step, from which one is reported, and a view is left out
 _TOLD, _TOO_MUCH = 0.1, 0.5
 # views below which nothing is made of many
 _FEWEST = 3
 # part of the points beyond each end of the range, the margin as part of it, and the least, pixels
 _BEYOND, _MARGIN, _LEAST_MARGIN = 0.005, 0.06, 0.1
-# movement from the farthest to the nearest point, pixels in the farthest view, that tells no depth
+# parallax between the farthest and the nearest point, pixels in the farthest view, too small for depth
 _NOTHING = 0.05
 
 

@@ -18,7 +18,7 @@ _ON_PIXEL = 1e-6
 
 
 def rectified_view(seeing: Seeing, frame: Frame, view: int) -> tuple[FloatMap, BoolMap]:
-    """A view's pixels (H, W, C) of float32 in 0..1, but for what interpolation overshoots, and which it does not show.
+    """A view's pixels (H, W, C), float32, in 0..1 except for overshoot, and a mask of those it does not show.
 
     The latter are 0. By splines of the fifth order: they blur less than the same number of samples weighted directly.
     """

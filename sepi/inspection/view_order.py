@@ -1,8 +1,8 @@
-"""Whether the views are in the right order, found from the views alone.
+"""Checks whether the views are in the right order, from the views alone.
 
 A grid of views can be laid out in eight ways: rows and columns of views each run one way or the other, and either comes
-first. Only in the right one do all views agree on the disparities. Turning the grid by half a turn changes nothing but
-the sign of every disparity, so this leaves two orders in which near and far are exchanged; occlusion tells those apart.
+first. Only in the right one do all views agree on the disparities. A half turn of the grid only changes the sign of
+every disparity. This leaves two orders, in which near and far are exchanged; occlusion distinguishes them.
 """
 
 from __future__ import annotations
@@ -201,9 +201,9 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views |
 
 
 def _evidence_of_sign(light_field: LightField, trial: Trial, kept: int | None, views: Views) -> tuple[Evidence, bool]:
-    """What hides what, and whether it is clear; ``kept`` is the sign of the given order, where that may be right.
+    """Evidence of occlusion, and whether it is clear; ``kept`` is the sign of the given order, where that may be right.
 
-    A glance may say that all is well. To say that it is not takes a closer look, and no closer one that denies it.
+    A quick check suffices to accept the order. To reject it takes a closer check that no still closer one contradicts.
     """
     doubt: Evidence | None = None
     for look in Look if kept is not None else (Look.AXES, Look.MANY_VIEWS):

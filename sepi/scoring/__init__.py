@@ -1,1 +1,1 @@
-"""What scores need: masks of regions, and the submission format of the HCI 4D benchmark."""
+"""Scores: masks of regions, measures, and the submission format of the HCI 4D benchmark."""

@@ -1,4 +1,4 @@
-"""What an order of the pixels by confidence is worth: sparsification curves [1]_.
+"""Sparsification curves [1]_: how well confidence ranks the pixels by error.
 
 References
 ----------

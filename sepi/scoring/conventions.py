@@ -1,4 +1,4 @@
-"""Ground truth of another convention than a map's: upside down, of the other sign or scale, or depth."""
+"""Detects ground truth in another convention than a map: upside down, other sign or scale, or depth."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sepi.rig import Floats
 
 # errors are close up to this part of the range that nearly all of a map lies within, or so many pixels per view step
 _PART, _LEAST = 0.1, 0.07
-# share of pixels with a larger error from which a fit is in doubt, and how much better another must be
+# share of pixels with a larger error from which the fit is doubted, and how much better another must be
 _POOR, _BETTER = 0.2, 0.25
 # what a factor may be from the one that it is taken for
 _EQUAL = 0.05
@@ -75,7 +75,7 @@ def misfit(estimate: FloatMap, truth: FloatMap, grid: tuple[int, int] | None = N
 
 
 def _line(values: FloatMap, wanted: FloatMap) -> tuple[float, float]:
-    """Factor and summand that bring most values closest to what is wanted, whatever the others are."""
+    """Robust linear fit: factor and summand that bring most values closest to the wanted ones."""
     from scipy.optimize import least_squares
 
     every = max(1, len(values) // _PIXELS)

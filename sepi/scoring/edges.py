@@ -1,4 +1,4 @@
-"""Depth discontinuities for evaluation, and which of two surfaces an estimate took beside them for the other.
+"""Depth discontinuities for evaluation, and the fattening and thinning of surfaces beside them.
 
 The region, and fattening and thinning, follow the idea of the measures of the HCI 4D light field benchmark [1]_ for
 discontinuities and fine structures, with definitions that need nothing but the ground truth. Estimators never see them.
@@ -28,7 +28,7 @@ REACH = 2
 
 @dataclass(frozen=True)
 class Edges:
-    """What the ground truth says of the pixels beside depth discontinuities.
+    """Ground truth of the pixels beside depth discontinuities.
 
     Attributes
     ----------

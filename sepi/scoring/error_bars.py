@@ -1,4 +1,4 @@
-"""What error bars are worth: do intervals hold the truth, how wide are they, and is doubt where errors are?
+"""Scores of error bars: coverage and width of the intervals, and whether doubt lies where errors are.
 
 An interval that always holds the truth may be as wide as the range: coverage says nothing without the width beside it.
 """
@@ -67,7 +67,7 @@ class Reliability(NamedTuple):
 
 @dataclass(frozen=True)
 class ErrorBars:
-    """Error bars of a disparity map, and what their scores need to know.
+    """Error bars of a disparity map, with what their scores need.
 
     Attributes
     ----------
@@ -240,7 +240,7 @@ def ause(doubt: FloatMap, error: FloatMap) -> float:
 
 
 def reliability(confidence: FloatMap, error: FloatMap, close: float) -> Reliability:
-    """Whether errors are as often small as a confidence says [1]_.
+    """Reliability of a confidence: how often errors are small, by stated probability [1]_.
 
     Parameters
     ----------

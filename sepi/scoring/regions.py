@@ -1,4 +1,4 @@
-"""Regions for evaluation: where the ground truth says a view is blocked, and where the reference view has no texture.
+"""Regions for evaluation: pixels occluded in some view by the ground truth, and textureless pixels.
 
 The paper names another work for its occluded region and defines no textureless one. These definitions are the same for
 every scene and method, so that rows of a table compare. Estimators never see them.
