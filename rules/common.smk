@@ -1,4 +1,4 @@
-# What all rules share: the checked configuration, and the names, threads and memory that follow from it.
+# Shared by all rules: the checked configuration, and the names, threads and memory derived from it.
 
 import atexit
 import hashlib

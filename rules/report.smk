@@ -1,4 +1,4 @@
-# What a reader looks at, below reports/: a page with everything, its numbers, tables, charts, and pictures of every scene.
+# Reports, below reports/: a page with everything, its numbers, tables, charts, and pictures of every scene.
 
 
 # Which scenes and variants the numbers are of. With thousands of scenes this is too long for a command line, and

@@ -55,7 +55,7 @@ _NO_FEATURES = Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
 
 
 def matched_disparities(light_field: LightField, low: float, high: float) -> tuple[IntArray, IntArray, FloatMap]:
-    """Pixels of the reference view whose disparity their features tell.
+    """Pixels of the reference view whose disparity follows from matched features.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From a cost volume to a map: the candidate of each pixel, a sub-candidate value, and how sure that is."""
+"""Converts a cost volume to a map: best candidate of each pixel, sub-candidate disparity, and confidence."""
 
 from __future__ import annotations
 

@@ -2,9 +2,9 @@
 
 The mean difference of the views from the reference view, the usual cost, is small at the right candidate only where all
 views see the pixel; where something hides it from some of them, their colours are the occluder's, the mean is large at
-every candidate, and edges come out blurred or widened. Here a view has a vote for a candidate if what it shows
-there differs from the reference view by less than a small threshold. How far the others differ does not matter, so what
-an occluder shows is left out without that edges are looked for or views split into groups.
+every candidate, and edges come out blurred or widened. Here a view has a vote for a candidate if what it shows there
+differs from the reference view by less than a small threshold. How far the others differ does not matter, so an
+occluder's colours are ignored without detecting edges or splitting the views into groups.
 
 With the ``N`` views other than the reference view, ``delta_n(p, d)`` the difference of view ``n``, sheared by ``d``,
 from the reference view at pixel ``p``, and ``tau(p)`` the threshold of the pixel:

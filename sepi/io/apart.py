@@ -1,4 +1,4 @@
-"""Calls that may never come back, or crash the program, tried in a process of their own."""
+"""Runs calls that may hang or crash the program in a process of their own."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ CAN_TRY = hasattr(os, "fork")
 
 
 def outcome(call: Callable[[], object], seconds: float) -> bool | None:
-    """Whether a call comes to something true rather than to an exception; None where it does not come back.
+    """Whether a call returns something true rather than raising an exception; None if it does not return.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Files that are read are sound or one clear error; files that are written appear whole or not at all.
+"""Reads files or raises one clear error; writes files whole or not at all.
 
 They are written under a temporary name in the same folder, then renamed.
 """

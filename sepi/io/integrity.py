@@ -1,4 +1,4 @@
-"""Whether an HDF5 file holds what was written: it begins with a digest of all bytes that follow.
+"""Integrity of an HDF5 file: it begins with a digest of all bytes that follow.
 
 HDF5 may read other numbers from a damaged file, crash, or hang, so a file is checked before anything is made of it. The
 digest lies in what HDF5 calls the user block, which other programs skip.

@@ -1,4 +1,4 @@
-"""Which light field a result was made from, how that was read, and whether another one is the same."""
+"""Origin of a result: its light field, how that was read, and whether another one is the same."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a picture is before it is decoded: its kind, its size, and whether all of it is there.
+"""Header of a picture, read before decoding: its kind, its size, and whether the file is complete.
 
 Decoders take memory on a header's word, and some fill with grey what a file that is cut off lacks. Pillow knows most
 kinds, but few sorts of TIFF, of which tifffile reads the tags; neither reads a PNM with 16 bit colours.

@@ -84,7 +84,7 @@ def _newest(files: Sequence[Path]) -> str:
 
 
 def _made_by(plan: Plan, parts: bool) -> tuple[list[Any], dict[str, dict[str, list[Any]]]]:
-    """What the stages themselves say: the machines that they ran on, and by stage and choice their parameters."""
+    """Provenance from the stage files: machines that the stages ran on, and parameters by stage and choice."""
     machines: list[Any] = []
     parameters: dict[str, dict[str, list[Any]]] = {stage: {} for stage in plan.stages}
     for (dataset, scene), variant, stage in itertools.product(plan.pairs, plan.collected(parts), plan.stages):
@@ -120,7 +120,7 @@ def _scene(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
 
 
 def _light_field(path: Path, truth: Path) -> dict[str, Any]:
-    """What a light field is, with digests of its pixels and its ground truth."""
+    """Facts about a light field, with digests of its pixels and its ground truth."""
     found = read_with_truth(path, truth)
     known = found.disparity_range
     return {

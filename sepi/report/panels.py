@@ -190,7 +190,7 @@ def _external_panels(results: SceneResults) -> Iterator[Panel]:
 
 
 def _change_panels(results: SceneResults) -> Iterator[Panel]:
-    """Where a variant is less accurate, and where more, than the one it is compared with.
+    """Panels that show where a variant is less or more accurate than the one it is compared with.
 
     The paper's method is compared with its reductions, the best one with the paper's.
     """

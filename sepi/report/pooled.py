@@ -1,4 +1,4 @@
-"""What no scene's scores tell of several scenes together: the error that a quarter of all their pixels stay below."""
+"""Q25 pooled over several scenes: the error that a quarter of all their pixels stay below."""
 
 from __future__ import annotations
 

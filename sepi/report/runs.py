@@ -74,7 +74,7 @@ class Runs:
         return Timing(values["seconds"], values["peak_memory_mb"])
 
     def reliability(self, dataset: str, scene: str, variant: str) -> Reliability:
-        """How right the confidence of a final map is that has error bars and scores."""
+        """Reliability of the confidence of a final map that has error bars and scores."""
         found = _with_nan(self._stage(dataset, scene, variant, self.plan.stages[-1])["reliability"])
         return Reliability(*(np.array(values, np.float64) for values in found))
 

@@ -20,8 +20,8 @@ Snakemake sees the shell command of a rule, not the modules that the command imp
 
 No stage imports another stage, so a change in one leaves the others' digests as they are.
 
-To read all of the code takes a second, a fifth of a start of Snakemake. What a source comes to is kept in Snakemake's
-own folder, by the source itself: a changed one is read, whatever its time says.
+Reading all of the code takes a second, a fifth of a start of Snakemake. So the result for each source is cached in
+Snakemake's own folder, keyed by the source itself: a changed one is read, whatever its time stamp.
 """
 
 from __future__ import annotations

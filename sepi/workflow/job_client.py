@@ -1,7 +1,7 @@
 """What stands between Python and a job's module where there is a :mod:`~sepi.workflow.job_server`.
 
 ``python -IS job_client.py -m MODULE WORD ...`` has a fork of the server do what Python would, and ends as that does. It
-imports nothing but the standard library, which is all that it saves. Where nobody answers, it becomes Python.
+imports only the standard library, which is its whole saving. If no server answers, it becomes Python.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Jobs of the workflow as forks of one process that has loaded the libraries, which takes half of a short job.
+"""Runs jobs of the workflow as forks of one process with the libraries loaded, since loading takes half of a short job.
 
 A job stays a process of its own with a command of its own, which :mod:`~sepi.workflow.job_client` hands on. For Linux:
 elsewhere some libraries do not work in a fork.
@@ -181,7 +181,7 @@ class Job(NamedTuple):
 
 
 def end_forks_at_once() -> None:
-    """Have forks of this process end without taking apart all that it has loaded, which takes longer than many a job.
+    """Let forks of this process exit without unloading its libraries, which takes longer than many jobs.
 
     To be called before anything is loaded: what is to be done at a process's end is done first.
     """

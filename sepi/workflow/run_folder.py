@@ -1,9 +1,9 @@
-"""The folder that a run of the workflow works in: what happened to the last run there does not stop the next one.
+"""The folder that a run of the workflow works in; a run that was killed there does not block the next one.
 
 Snakemake locks the folder by files, which outlive a run that ends by force; it cannot tell them from those of a run
 that goes on. A lock of the operating system ends with its process, whatever ends that.
 
-It also refuses what is made of a file of the future, as there are after a clock was ahead and was set right.
+Snakemake also refuses inputs dated in the future, as a clock leaves them that was ahead and was set right.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def put_away(made: Iterable[Path]) -> None:
 
 
 def note_run(well: bool) -> None:
-    """Write down whose run this is, and whether it leaves nothing to put away, as far as it has come."""
+    """Record the owner of this run, and whether it has so far left nothing to clean up."""
     for run in _held:
         run.truncate(0)
         run.write(f"{platform.node()}\n{_WELL if well else ''}\n")

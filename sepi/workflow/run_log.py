@@ -1,4 +1,4 @@
-"""What a run of the workflow says of itself: a progress bar on a terminal, one line for each job elsewhere.
+"""Log of a workflow run: a progress bar on a terminal, one line for each job elsewhere.
 
 Snakemake's own handler prints three lines and more for each job. :func:`show_progress` puts one in its place that
 listens to the same events; what went wrong is shown as Snakemake shows it, in full.
@@ -115,7 +115,7 @@ class _NearestNames(logging.Filter):
 
 
 def tell_nearest(logger: logging.Logger, known: Callable[[str], Iterable[str]]) -> None:
-    """Let a wrong target be told in one line.
+    """Report a wrong target in one line.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where the cameras of a light field stood: positions in steps of columns of views, from what files say of them."""
+"""Camera positions of a light field from its files, in steps of columns of views."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The chart of the error bars: is the confidence right, do intervals hold the truth, and how wide are they."""
+"""Chart of the error bars: reliability of the confidence, coverage and width of the intervals."""
 
 from __future__ import annotations
 

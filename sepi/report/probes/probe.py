@@ -1,4 +1,4 @@
-"""What the method sees at one pixel: SEPIs, cost curves over the candidates, views kept (figures 1, 3, 4 of [1]_).
+"""Data of the method at one pixel: SEPIs, cost curves over the candidates, views kept (figures 1, 3, 4 of [1]_).
 
 References
 ----------

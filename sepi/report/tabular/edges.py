@@ -1,4 +1,4 @@
-"""Scores at depth discontinuities and away from them: where a map's error lies, and to which side its edges err."""
+"""Scores at and away from depth discontinuities: where a map's error lies, and to which side its edges are shifted."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def edge_table(runs: Runs) -> Report:
 
 
 def edge_budget(whole: Scores, there: Scores) -> dict[str, float]:
-    """What of a map's errors lies beside depth discontinuities.
+    """Share of a map's errors beside depth discontinuities.
 
     Parameters
     ----------

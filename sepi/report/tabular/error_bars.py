@@ -1,4 +1,4 @@
-"""The table of the error bars: do intervals hold the truth, how wide are they, and is doubt where errors are.
+"""Table of the error bars: coverage and width of the intervals, and whether doubt lies where errors are.
 
 :mod:`sepi.scoring.error_bars` computes the scores.
 """

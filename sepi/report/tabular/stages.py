@@ -1,4 +1,4 @@
-"""What each stage of each variant contributed and took: scores after every stage, seconds and peak memory.
+"""Tables of each stage of each variant: scores after it, its seconds and peak memory.
 
 Other methods' maps stand among the scores as stage ``external``.
 """
