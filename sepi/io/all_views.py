@@ -85,7 +85,7 @@ def write_all_views(
 
 
 def read_result_at(path: Path, view: View | None = None) -> Result:
-    """What a result says about one of the views.
+    """The result of one of the views.
 
     Parameters
     ----------
@@ -135,7 +135,8 @@ def read_origin_at(path: Path, view: View | None) -> Origin | None:
 
 
 def surfaces_of(path: Path, name: str = "disparity") -> Callable[[View], FloatMap] | None:
-    """What gives a map of a view, (H, W) float32, NaN where the view is unknown; None without such maps of all views.
+    """Function that gives a map of a view, (H, W) float32, NaN where the view is unknown; None without maps of all
+    views.
 
     Parameters
     ----------

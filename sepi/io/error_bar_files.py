@@ -1,4 +1,4 @@
-"""Files of error bars: by how much each disparity of a result, and each depth, may be wrong.
+"""Files of error bars: the uncertainty of each disparity of a result, and of each depth.
 
 docs/reference/outputs.md describes them.
 """

@@ -1,4 +1,4 @@
-"""External methods' disparity maps: where they lie, and the file of one scene's maps with their scores.
+"""External methods' disparity maps: their locations, and the file of one scene's maps with their scores.
 
 Layout of that file: a group ``methods/NAME`` per method, in the order of the configuration, with the attributes
 ``source``, ``problem`` and ``sha256``. Where there is no problem it holds ``disparity (H, W)``, and what a score file

@@ -150,7 +150,7 @@ def read_views(
 
 
 def picture_header(path: Path) -> Header:
-    """What a picture of any kind that is read is, without decoding it."""
+    """Header of a picture of any supported kind, without decoding it."""
     with _opened(path) as file:
         return read_header(path, file)
 

@@ -33,8 +33,8 @@ _sound: dict[tuple[int, int, int, int], bool] = {}
 def members(group: h5py.Group | Mapping[str, Any]) -> list[tuple[str, Any]]:
     """Names and entries of a group, all at once.
 
-    Until the last is taken from h5py's own iterator, it holds its lock: where an error ends a loop before, for as long
-    as anyone keeps that error. Another thread that needs HDF5, be it to forget a file, would wait for ever.
+    h5py's own iterator holds its lock until it is exhausted. If an error ends a loop early, the lock stays as long as
+    anyone keeps that error: another thread that needs HDF5, even to release a file, would wait for ever.
     """
     return list(group.items())
 

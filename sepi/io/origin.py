@@ -27,7 +27,7 @@ _NOT_KEPT = ("view", "follow_links")
 
 @dataclass(frozen=True)
 class Origin:
-    """What a result says of the light field that it was made from.
+    """The light field that a result was made from, as the result records it.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ def digest_of(light_field: LightField) -> str:
 
 
 def reading_record(options: ReadOptions, file_format: str | None) -> str:
-    """What is not as a reader finds it by itself, as JSON; empty where all is."""
+    """Options and format that a reader does not infer by itself, as JSON; empty if none."""
     own = {field.name: getattr(options, field.name) for field in fields(options) if field.name not in _NOT_KEPT}
     given: dict[str, Any] = {name: value for name, value in own.items() if value != getattr(ReadOptions(), name)}
     if file_format is not None:

@@ -1,4 +1,4 @@
-"""What made a file: the attributes of stage files and results.
+"""Provenance of a file: the attributes of stage files and results.
 
 The entries (:func:`sepi.stage.entry`) of the stages that led to a map, in order, are its history.
 """

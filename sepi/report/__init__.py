@@ -1,1 +1,1 @@
-"""From scores, timings and stage files to what a reader looks at: tables beside the published figures, and pictures."""
+"""Makes the report from scores, timings and stage files: tables beside the published figures, and pictures."""

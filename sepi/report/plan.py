@@ -1,4 +1,4 @@
-"""Which scenes, variants and external methods a report is about, and where their files lie.
+"""Plan of a report: its scenes, variants and external methods, and the paths of their files.
 
 The workflow declares the inputs of the report's numbers from here, and they are collected from nothing else.
 """

@@ -1,4 +1,4 @@
-"""The built-in scenes: what each one contains and which difficulty it poses.
+"""The built-in scenes: contents of each one, and the difficulty that it poses.
 
 Lengths are fractions of the picture, disparities are pixels per view step.
 """

@@ -1,1 +1,1 @@
-"""What the Snakemake workflow needs: configuration, datasets, digests of the code, its log."""
+"""Support for the Snakemake workflow: configuration, datasets, digests of the code, its log."""

@@ -1,4 +1,4 @@
-"""The grid that the numbers in the names of views make, and the place of each view in it."""
+"""Grid from the numbers in the names of views, and the position of each view in it."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def widened(folder: Path, named: ViewNumbers, numbers: Numbers, others: Numbers,
     if whole.arranged:
         fits = whole.fill == 1 or 1 > layout.fill <= whole.fill / _AS_FULL
     else:
-        # whether the ends of a sequence belong to it nobody can tell, but that sequences rather fill a square
+        # the ends of a sequence are ambiguous, but sequences usually fill a square
         fits = not _is_square(layout.grid[1]) and _is_square(whole.grid[1])
     return whole if fits else layout
 

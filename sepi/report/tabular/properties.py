@@ -1,4 +1,4 @@
-"""Tables of the rendered scenes: what each method makes of what cameras meet, property by property, and by scene."""
+"""Tables of the rendered scenes: scores of each method by property that cameras meet, and by scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the page shows beside the tables, from the numbers: headline figures, ablation, times, provenance."""
+"""Contents of the page beside the tables, from the numbers: headline figures, ablation, times, provenance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the viewer in a page needs: panels that name arrays, and the arrays, packed and each there once.
+"""Data of a page's viewer: panels that refer to arrays, and the arrays, each packed once.
 
 An error is a map minus the ground truth, and a page takes that difference itself. ``templates/viewer.js`` draws them.
 """
