@@ -72,9 +72,7 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/method/best_initial.md")
     first_views: int = Field(
-        25,
-        ge=2,
-        description="views that all maps but the last compare, at least; spread evenly over the grid",
+        25, ge=2, description="views that all maps but the last compare, at least; spread evenly over the grid"
     )
     first_sampling: float = Field(
         2.0, ge=1, le=8, description="distance of their candidates; 1: as num_disparities says"

@@ -60,7 +60,9 @@ class UniformPlanesParameters(OcclusionMarginParameters, DenoisingParameters, Bo
     colour_scale: float = Field(
         0.0316, ge=1e-6, le=2, description="residual at which a view counts half in the mean; RGB distance, 0..1"
     )
-    views: int | None = Field(25, ge=2, description="views that are averaged, at least; null: all")
+    views: int | None = Field(
+        25, ge=2, description="views that are averaged, at least, and of noisy ones at least 25; null: all"
+    )
     window_radius: int = Field(4, ge=1, le=20, description="gradients are averaged over 2 r + 1 pixels")
     noise_factor: float = Field(
         4.0, gt=0, description="squared gradient, in units of what noise explains, below which a region is uniform"
