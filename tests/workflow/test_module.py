@@ -21,14 +21,13 @@ from sepi.scenes import render
 
 pytestmark = pytest.mark.workflow
 
-DOCUMENT = REPOSITORY / "docs/reproduce/workflow.md"
+DOCUMENT = REPOSITORY / "docs/reproduce/module.md"
 QUICK = "depth/results/own/flowers/quick"
 
 
 def block(language: str) -> str:
-    """The only block in a language in the section of the document."""
-    section = DOCUMENT.read_text().split("## As a module of another workflow")[1].split("\n## ")[0]
-    (found,) = re.findall(rf"```{language}\n(.+?)```", section, re.DOTALL)
+    """The only block in a language in the document."""
+    (found,) = re.findall(rf"```{language}\n(.+?)```", DOCUMENT.read_text(), re.DOTALL)
     return str(found)
 
 
