@@ -13,9 +13,8 @@ References
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Annotated, Self
+from typing import Annotated, NamedTuple, Self
 
 import cv2
 import numpy as np
@@ -43,9 +42,6 @@ BAND_BYTES = 2**24
 
 ROWS_AT_ONCE = 64
 """Rows of costs that are averaged together."""
-
-CostVolume = npt.NDArray[np.uint16]
-"""Costs of shape (H, W, K'): candidates side by side, as many as fill vectors."""
 
 # times the radius of the window, where there are few
 _MOST_WIDENED = 2
@@ -115,31 +111,51 @@ class SmoothedResult:
     confidence: FloatMap
 
 
-class CostVolumes:
-    """Memory for averaged and for smoothed costs, which the next sweep reuses.
+class Places(NamedTuple):
+    """Where in a volume the costs of each pixel's candidates are: side by side, as many as fill vectors.
 
-    Allocating new memory takes as long as filling it.
-
-    Parameters
+    Attributes
     ----------
-    candidates : int
-        Most of a sweep, ``K``.
-    shape : (int, int)
-        Height and width.
+    first, beyond : ndarray, shape (H, W), int32
+        The first candidate of a pixel, and the one after its last.
+    origin : ndarray, shape (H, W), int64
+        Where its candidate 0 is, or would be.
+    count : int
+        Candidates of a pixel that has all.
     """
 
-    def __init__(self, candidates: int, shape: tuple[int, int]) -> None:
-        self.shape = shape
-        self._rooms = np.empty((2, self._padded(candidates) * shape[0] * shape[1]), np.uint16)
+    first: npt.NDArray[np.int32]
+    beyond: npt.NDArray[np.int32]
+    origin: npt.NDArray[np.int64]
+    count: int
 
-    def _padded(self, candidates: int) -> int:
-        return -(-candidates // kernels.AT_ONCE) * kernels.AT_ONCE
+    @classmethod
+    def of_candidates(cls, first: npt.NDArray[np.int32], last: npt.NDArray[np.int32], candidates: int) -> Places:
+        """Places of the candidates from the first to the last of each pixel, (H, W), at least, of so many in all."""
+        step = kernels.AT_ONCE
+        begin, beyond, count = first // step * step, (last // step + 1) * step, -(-candidates // step) * step
+        number = beyond - begin
+        return cls(begin, beyond, (np.cumsum(number) - number.ravel()).reshape(number.shape) - begin, count)
 
-    def averaged_and_smoothed(self, candidates: int) -> tuple[CostVolume, CostVolume]:
-        """Room for averaged costs and for smoothed ones, (H, W, K')."""
-        shape = (*self.shape, self._padded(candidates))
-        averaged, smoothed = (room[: math.prod(shape)].reshape(shape) for room in self._rooms)
-        return averaged, smoothed
+    @property
+    def size(self) -> int:
+        """Costs in the volume."""
+        return int((self.beyond - self.first).sum())
+
+
+class CostVolumes:
+    """Memory for averaged and for smoothed costs, which the next sweep reuses: to fill new memory takes longer."""
+
+    def __init__(self) -> None:
+        self._rooms = np.empty((2, 0), np.uint16)
+
+    def averaged_and_smoothed(self, size: int) -> npt.NDArray[np.uint16]:
+        """Room for ``size`` averaged costs and for as many smoothed ones, (2, size)."""
+        if size > self._rooms.shape[1]:
+            # not beside the old one
+            del self._rooms
+            self._rooms = np.empty((2, size), np.uint16)
+        return self._rooms[:, :size]
 
 
 class AveragedCosts:
@@ -156,6 +172,8 @@ class AveragedCosts:
         Expected squared difference of two pixels of one surface, summed over RGB: of noise, and of texture; widens the
         window's colour weights.
     parameters : SmoothingParameters
+    likely : ndarray, shape (2, H, W), int32, optional
+        The first and the last candidate of each pixel that matter; all unless given. Others cost 1.
     """
 
     def __init__(
@@ -165,12 +183,17 @@ class AveragedCosts:
         guide: FloatMap,
         contrast: float,
         parameters: SmoothingParameters,
+        likely: npt.NDArray[np.int32] | None = None,
     ) -> None:
         self._disparities, self._parameters = disparities, parameters
+        self._height, width = guide.shape[:2]
+        if likely is None:
+            likely = np.zeros((2, self._height, width), np.int32)
+            likely[1] = len(disparities) - 1
+        self._places = Places.of_candidates(*likely, len(disparities))
         self._colours = np.stack(cv2.split(guide), dtype=np.float32)
         self._variance = parameters.window_sigma**2 + contrast
-        self._averaged, self._smoothed = volumes.averaged_and_smoothed(len(disparities))
-        self._height, width = volumes.shape
+        self._averaged, self._smoothed = volumes.averaged_and_smoothed(self._places.size)
         rows = min(self._height, ROWS_AT_ONCE) + 2 * parameters.window_radius
         # where there are none yet, nothing that is not finite
         self._costs = np.zeros((len(disparities), rows, width), np.float32)
@@ -188,7 +211,7 @@ class AveragedCosts:
         self._next += rows
         begin, end = self._done, self._next if self._next == self._height else max(self._done, self._next - radius)
         window = radius, self._variance
-        kernels.aggregate(self._costs, self._top, self._colours, *window, begin, end, self._averaged)
+        kernels.aggregate(self._costs, self._top, self._colours, self._places, *window, begin, end, self._averaged)
         # windows of the next rows reach back
         kept = slice(max(0, end - radius - self._top), self._next - self._top)
         self._costs[:, : kept.stop - kept.start] = self._costs[:, kept].copy()
@@ -198,10 +221,10 @@ class AveragedCosts:
         """Smooth the averaged costs, and take the best candidate of each pixel."""
         parameters, disparities = self._parameters, self._disparities
         penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
-        band = max(1, BAND_BYTES // (2 * self._averaged[0].nbytes))
-        kernels.semi_global(self._averaged, self._colours, *penalties, band, self._smoothed)
+        band = max(1, BAND_BYTES * self._height // (2 * self._averaged.nbytes))
+        kernels.semi_global(self._averaged, self._colours, self._places, *penalties, band, self._smoothed)
         same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))
         disparity, margin = np.empty((2, *self._colours.shape[1:]), np.float32)
-        kernels.choose(self._smoothed, self._averaged, disparities, same, disparity, margin)
+        kernels.choose(self._smoothed, self._averaged, disparities, self._places, same, disparity, margin)
         margin = np.maximum(margin, 0)
         return SmoothedResult(disparity, (margin / (margin + np.float32(HALF_CONFIDENT))).astype(np.float32))

@@ -4,13 +4,15 @@ A view sees pixel ``p`` at candidate ``d`` unless something nearer than ``d`` oc
 seen. What occludes it is known from a first depth map: each view gets a z-buffer of that map. This is the idea of the
 half-SEPI, with the part of the views chosen view by view. All maps but the last only tell what is hidden where: a few
 views, spread over the grid, and every other candidate are enough for them. A few views compare all candidates with the
-pixel, the others those near the map before, so that a wrong map can be put right. The compiled loops are in
-``kernels/visibility.cpp``.
+pixel, the others those near the map before, so that a wrong map can be put right. The last of several maps only refines
+the one before: all its views compare the candidates near it. In noise they do not, since maps of few views are wrong by
+chance. The compiled loops are in ``kernels/visibility.cpp``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import ClassVar
 
 import cv2
@@ -142,8 +144,7 @@ def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, 
         If the disparity range is unknown.
     """
     views = views_without_aliases(light_field, parameters.first_views)
-    volumes = _volumes(light_field, parameters, parameters.first_sampling)
-    return _sweep(light_field, views, parameters.first_sampling, None, None, parameters, volumes, progress)
+    return _sweep(light_field, views, parameters.first_sampling, None, None, parameters, CostVolumes(), progress)
 
 
 MeanOf = Callable[[LightField, FloatMap, BoolMap, BaseDetailParameters, float], FloatMap | None]
@@ -184,14 +185,16 @@ def depth_from_visible_views(
     few = views_without_aliases(light_field, parameters.first_views)
     if parameters.gaps:
         disparity = with_open_gaps(light_field, disparity, few, parameters)
-    volumes = _volumes(light_field, parameters, *([parameters.first_sampling] * (n > 1)), parameters.sampling)
+    volumes = CostVolumes()
+    confidence = np.ones(light_field.shape, np.float32)
     for i in range(n):
         last = i == n - 1
         present = spread_views(light_field, parameters.views) if last else few
         mean = None
         if mean_of and isinstance(light_field, DenoisedLightField) and light_field.of_views.usual >= noise:
             mean = mean_of(light_field, disparity, present, parameters, parameters.occlusion_margin)
-        result = _sweep(
+        refined = last and i > 0 and not isinstance(light_field, DenoisedLightField)
+        found = _sweep(
             light_field,
             present,
             parameters.sampling if last else parameters.first_sampling,
@@ -200,9 +203,13 @@ def depth_from_visible_views(
             parameters,
             volumes,
             lambda fraction, i=i: progress((i + fraction) / n),  # type: ignore[misc]
+            refined=refined,
         )
-        disparity = result.disparity
-    return result
+        if refined:
+            # the sweep before knows minima beyond the candidates near its map
+            found = replace(found, confidence=np.minimum(found.confidence, confidence))
+        disparity, confidence = found.disparity, found.confidence
+    return found
 
 
 def occluded_in_any_view(
@@ -236,12 +243,6 @@ def occluded_in_any_view(
     return occluded
 
 
-def _volumes(light_field: LightField, parameters: VisibilitySweepParameters, *samplings: float) -> CostVolumes:
-    """Room for sweeps of candidates so many times as far apart as usual."""
-    light_field.require_disparity_range()
-    return CostVolumes(max(parameters.fewer(light_field, sampling) for sampling in samplings), light_field.shape)
-
-
 def _sweep(
     light_field: LightField,
     present: BoolMap,
@@ -251,21 +252,28 @@ def _sweep(
     parameters: VisibilitySweepParameters,
     volumes: CostVolumes,
     progress: Progress,
+    *,
+    refined: bool = False,
 ) -> SmoothedResult:
     """A map over some of the views, of candidates ``sampling`` times as far apart as usual.
 
-    Pixels are compared with their ``mean``, where there is one, instead of the reference view.
+    Pixels are compared with their ``mean``, where there is one, instead of the reference view; only at candidates near
+    the map where that is ``refined``.
     """
     disparities = light_field.require_disparity_range().candidates(parameters.fewer(light_field, sampling))
+    likely = None if disparity is None else _likely_candidates(disparity, disparities)
     guide = guide_of(light_field, mean)
     variance = variance_of_residuals(_contrast_of_surfaces(light_field), guide.shape[2])
     shown = light_field.present
     if light_field.missing is not None:
         shown = shown & ~light_field.missing.all(axis=(2, 3))
-    costs = AveragedCosts(volumes, disparities, guide, variance, parameters.for_views(int(shown.sum())))
+    smoothing = parameters.for_views(int(shown.sum()))
+    costs = AveragedCosts(volumes, disparities, guide, variance, smoothing, likely if refined else None)
+    searched = np.zeros_like(present) if refined else _searched_views(light_field, present, parameters)
     for band in row_bands(light_field, present, float(np.abs(disparities).max()), BYTES_PER_PIXEL):
+        visibility = _visibility(light_field, present, disparity, searched, likely, parameters, band)
         # the smoothing takes about a tenth of the time
-        _add_costs(light_field, present, disparity, mean, parameters, band, disparities, costs, progress)
+        _add_costs(light_field, present, visibility, mean, parameters, band, disparities, costs, progress)
     result = costs.smoothed()
     progress(1.0)
     return result
@@ -281,7 +289,7 @@ def _contrast_of_surfaces(light_field: LightField) -> float:
 def _add_costs(
     light_field: LightField,
     present: BoolMap,
-    disparity: FloatMap | None,
+    visibility: Visibility,
     mean: FloatMap | None,
     parameters: VisibilitySweepParameters,
     band: Band,
@@ -293,7 +301,6 @@ def _add_costs(
     views = base_detail_decomposition(light_field, parameters, band.rows, present)
     if mean is not None:
         views = compared_with(views, mean, parameters, band.rows)
-    visibility = _visibility(light_field, present, disparity, disparities, parameters, band)
     scales = parameters.colour_scale, parameters.detail_scale
     scales2 = np.array([views.squared_scale(scale) for scale in scales], np.float32)
     candidates = sampled_candidates(disparities, light_field.baselines)
@@ -305,34 +312,38 @@ def _add_costs(
         progress(0.9 * end / light_field.shape[0])
 
 
+def _searched_views(light_field: LightField, present: BoolMap, parameters: VisibilitySweepParameters) -> BoolMap:
+    """The views that compare all candidates with a map."""
+    # in noise, the mean of fewer views is the lowest of many candidates' by chance
+    if isinstance(parameters, VisibleViewsParameters) and not isinstance(light_field, DenoisedLightField):
+        for chosen_by in (views_without_aliases, spread_views):
+            few = present & chosen_by(light_field, parameters.searched_views)
+            if few.sum() >= parameters.searched_views:
+                return few
+    return present
+
+
 def _visibility(
     light_field: LightField,
     present: BoolMap,
     disparity: FloatMap | None,
-    disparities: FloatMap,
+    searched: BoolMap,
+    likely: npt.NDArray[np.int32] | None,
     parameters: VisibilitySweepParameters,
     band: Band,
 ) -> Visibility:
     """In which views the pixels of a band are seen: in all of them where no map tells."""
-    if disparity is None or not isinstance(parameters, VisibleViewsParameters):
+    if disparity is None or likely is None or not isinstance(parameters, VisibleViewsParameters):
         everywhere = np.empty((*light_field.grid, band.rows.high - band.rows.low, 0), np.float32)
         if light_field.missing is not None:
             everywhere = nearest_surfaces(light_field, None, present, band.rows)
         return Visibility(everywhere, np.float32(0), np.float32(1), present, np.empty((2, 0, 0), np.int32))
-    searched = present
-    # in noise, the mean of fewer views is the lowest of many candidates' by chance
-    if not isinstance(light_field, DenoisedLightField):
-        for chosen_by in (views_without_aliases, spread_views):
-            few = present & chosen_by(light_field, parameters.searched_views)
-            if few.sum() >= parameters.searched_views:
-                searched = few
-                break
     return Visibility(
         nearest_surfaces(light_field, disparity, present, band.rows),
         np.float32(parameters.occlusion_margin),
         np.float32(parameters.occluded_view_weight),
         searched,
-        _likely_candidates(disparity, disparities),
+        likely,
     )
 
 

@@ -1,5 +1,5 @@
-// Semi-global smoothing of a cost volume, after averaging over pixels of one's own colour. Both volumes are of the shape
-// (H, W, K'), in whole numbers of 16 bits: candidates lie side by side, as many as fill vectors.
+// Semi-global smoothing of a cost volume, after averaging over pixels of one's own colour. Both volumes are whole numbers of
+// 16 bits: pixel after pixel its candidates, side by side, as many as fill vectors.
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
@@ -11,14 +11,29 @@ constexpr Index PATHS_AT_ONCE = 32;
 
 constexpr float ONE = 65535;           // a cost of 1, once averaged
 constexpr Index AT_ONCE = 2 * LANES;   // candidates
+constexpr Index ACROSS = 8 * LANES;    // columns of a row that are averaged together
 constexpr std::uint16_t MOST = 0x7FFC;  // cost of a path, in steps of its own; a quarter of eight of them fits in 16 bits
 
-// What costs are smoothed with, into out (H, W, K').
+// Where in a volume the costs of each pixel's candidates are: the fields of sepi.matching.semi_global.Places, in their order.
+struct Places {
+    Array<const std::int32_t, 2> first, beyond;  // (H, W): a pixel's first candidate, and what follows its last
+    Array<const std::int64_t, 2> origin;         // (H, W): where its candidate 0 is, or would be
+    Index count;                                 // candidates of a pixel that has all
+
+    bool fields(auto visit) { return visit(first, beyond, origin, count); }
+
+    bool has_all(Index y, Index x) const { return beyond(y, x) - first(y, x) == count; }
+};
+
+// What costs are smoothed with, into out.
 struct Smoothing {
-    Array<const std::uint16_t, 3> cost;
+    Array<const std::uint16_t, 1> cost;
+    const Places &places;
     Array<const float, 3> guide;
     double small, large, weakening;
-    Array<std::uint16_t, 3> out;
+    Array<std::uint16_t, 1> out;
+
+    const Index K = places.count, H = guide.shape[1], W = guide.shape[2];
 
     // A step of a path is so many of the averaged costs', as a power of 2: the penalty and a cost together are less than MOST.
     const int shift = [this] {
@@ -31,11 +46,12 @@ struct Smoothing {
 
     // One pixel further along a path, from (y - dy, x - dx): path[1:-1] = cost + best - least, which is added to out; the
     // least of it. The best of: before of the same candidate, of one beside it plus small, and the least of all plus what is
-    // left of large where colours change. before and path have an unreachable candidate at either end.
+    // left of large where colours change. before and path have an unreachable candidate at either end; those that
+    // a pixel has not are not reached, either.
     std::uint16_t next_pixel(Index y, Index x, Index dy, Index dx, std::uint16_t *before, std::uint16_t least, std::uint16_t *path) const {
-        const Index K = cost.shape[2], row = y - dy, column = x - dx;
+        const Index row = y - dy, column = x - dx;
         double penalty = 0;
-        if (row < 0 || row >= cost.shape[0] || column < 0 || column >= cost.shape[1]) {
+        if (row < 0 || row >= H || column < 0 || column >= W) {
             // before the first pixel all candidates cost nothing: its costs are its own
             std::fill_n(before + 1, K, 0);
             least = 0;
@@ -45,10 +61,11 @@ struct Smoothing {
             penalty = std::max(small * 1.5, large / (1 + double(change) * weakening));
         }
         const Word16 whole = Word16{} + least, jump = whole + in_steps(penalty), step = Word16{} + in_steps(small), most = Word16{} + MOST;
-        const std::uint16_t *own = cost.at(y, x);
-        std::uint16_t *sum = out.at(y, x);
+        const std::uint16_t *own = cost.data + places.origin(y, x);
+        std::uint16_t *sum = out.data + places.origin(y, x);
         Word16 lowest = most;
-        for (Index k = 0; k < K; k += AT_ONCE) {
+        if (!places.has_all(y, x)) std::fill_n(path, K + 2, MOST);
+        for (Index k = places.first(y, x); k < places.beyond(y, x); k += AT_ONCE) {
             const Word16 beside = smaller(load_words(before + k), load_words(before + k + 2)) + step;
             const Word16 best = smaller(smaller(load_words(before + k + 1), jump), beside);
             const Word16 value = smaller((load_words(own + k) >> shift) + best - whole, most);
@@ -61,8 +78,7 @@ struct Smoothing {
 
     // The paths along row y.
     void along_row(Index y) const {
-        const Index W = cost.shape[1];
-        const auto paths = Scratch<std::uint16_t, 2>(2, cost.shape[2] + 2).filled(MOST);
+        const auto paths = Scratch<std::uint16_t, 2>(2, K + 2).filled(MOST);
         for (const Index dx : {1, -1}) {
             std::uint16_t least = 0;
             for (Index i = 0; i < W; ++i) least = next_pixel(y, dx > 0 ? i : W - 1 - i, 0, dx, paths.array().at((i + 1) % 2), least, paths.array().at(i % 2));
@@ -73,7 +89,6 @@ struct Smoothing {
     // One that leaves the picture at a side goes on, as a new one, at the other: all have a pixel in each row.
     // paths (2, n, K' + 2) are their costs in the row before and here, in turn, least (n) the least of the row before.
     void along_lines(Array<std::uint16_t, 3> paths, std::uint16_t *least, Index first, Index begin, Index end, Index dy, Index dx) const {
-        const Index H = cost.shape[0], W = cost.shape[1];
         for (Index i = begin; i < end; ++i) {
             for (Index line = 0; line < std::min(PATHS_AT_ONCE, W - first); ++line) {
                 const Index y = dy > 0 ? i : H - 1 - i, x = ((first + line + dx * i) % W + W) % W;
@@ -85,12 +100,13 @@ struct Smoothing {
 
 // By how much the least cost of other candidates exceeds that of those that belong to the winner's minimum; 0 where
 // there is no other.
-float margin_of(const std::uint16_t *costs, Index K, const float *disparities, float found, Index best, float same) {
+// Of candidates begin..end, beyond which there is no other, or one of cost 1.
+float margin_of(const std::uint16_t *costs, Index begin, Index end, const float *disparities, float found, Index best, float same, bool beyond_is_one) {
     constexpr float NONE = 2 * ONE;
-    Float8 own = spread(NONE), other = own;
-    Int8 before_best = Int8{0, 1, 2, 3, 4, 5, 6, 7} - std::int32_t(best);
-    for (Index k = 0; k < K; k += LANES, before_best += LANES) {
-        const Float8 cost = first_lanes(load(costs + k), K - k, NONE), beyond = load(disparities + k) - found;
+    Float8 own = spread(NONE), other = spread(beyond_is_one ? ONE : NONE);
+    Int8 before_best = Int8{0, 1, 2, 3, 4, 5, 6, 7} + std::int32_t(begin - best);
+    for (Index k = begin; k < end; k += LANES, before_best += LANES) {
+        const Float8 cost = first_lanes(load(costs + k), end - k, NONE), beyond = load(disparities + k) - found;
         const Int8 is_own = (larger(beyond, -beyond) <= same) | (before_best == 0);
         own = smaller(own, is_own ? cost : spread(NONE));
         other = smaller(other, is_own ? spread(NONE) : cost);
@@ -99,52 +115,68 @@ float margin_of(const std::uint16_t *costs, Index K, const float *disparities, f
     return least < NONE ? (least - least_of(own)) / ONE : 0.0f;
 }
 
-// Rows begin..end of the costs' mean over a window with weights exp(-|colour difference|^2 / (2 variance)), into out (H, W, K').
+// Rows begin..end of the costs' mean over a window with weights exp(-|colour difference|^2 / (2 variance)), into out.
 // cost (K, n, W), 0..1, are of the rows from top on; those beyond the picture are its border's. guide (3, H, W).
-void aggregate(Array<const float, 3> cost, Index top, Array<const float, 3> guide, Index radius, float variance, Index begin, Index end,
-               Array<std::uint16_t, 3> out) {
-    const Index K = cost.shape[0], H = out.shape[0], W = out.shape[1], size = 2 * radius + 1;
+void aggregate(Array<const float, 3> cost, Index top, Array<const float, 3> guide, const Places &places, Index radius, float variance, Index begin,
+               Index end, Array<std::uint16_t, 1> out) {
+    const Index K = cost.shape[0], H = guide.shape[1], W = guide.shape[2], size = 2 * radius + 1;
     parallel_for(begin, end, [&](Index y) {
         const Scratch<float, 2> weights(size * size, W + LANES);
         const auto exponent = [width = 2 * double(variance)](float apart2) { return -double(apart2) / width; };
         window_weights(guide, y, 0, W, radius, weights.array(), exponent);
         // what lies beyond the picture weighs nothing: it may be other rows, but for those with no memory beside them
         const auto at_ends = zeros<float, 2>(size, W + 2 * radius + LANES);
-        const Scratch<const float *, 1> places(size * size);
+        const Scratch<const float *, 1> first_of(size * size);
         const float *first = cost.data, *last = cost.at(K - 1, cost.shape[1]);
         // a few candidates at a time: each pixel's are written together
         const Scratch<float, 2> total(LANES, W + LANES);
-        for (Index few = 0; few < out.shape[2]; few += LANES) {
+        for (Index few = 0; few < places.count; few += LANES) {
+            const auto has = [&](Index x) { return places.first(y, x) <= few && few < places.beyond(y, x); };
+            std::vector<std::pair<Index, Index>> columns;
+            for (Index x = 0; x < W; x += ACROSS) {
+                const Index across = std::min(ACROSS, W - x);
+                for (Index i = 0; i < across; ++i)
+                    if (has(x + i)) {
+                        columns.emplace_back(x, across);
+                        break;
+                    }
+            }
             if (few + LANES > K) std::fill_n(total.array().data, LANES * (W + LANES), 1.0f);
             for (Index k = few; k < std::min(K, few + LANES); ++k) {
                 for (Index i = 0; i < size; ++i) {
                     const float *row = cost.at(k, clamped(y + i - radius, H) - top);
                     if (row - first < radius || last - row < W + radius + LANES) row = std::copy_n(row, W, at_ends.array().at(i, radius)) - W;
-                    for (Index j = 0; j < size; ++j) places.array()(i * size + j) = row + j - radius;
+                    for (Index j = 0; j < size; ++j) first_of.array()(i * size + j) = row + j - radius;
                 }
-                const auto add = [weight = weights.array().data, pitch = W + LANES, place = places.array().data](Float8 sum, Index n, Index x) {
-                    return fma(load(weight + n * pitch + x), load(place[n] + x), sum);
-                };
-                float *sums = total.array().at(k - few);
-                radius == 2 ? sum_products(W, std::integral_constant<Index, 25>(), sums, add) : sum_products(W, size * size, sums, add);
+                for (const auto &[first_column, number] : columns) {
+                    const auto add = [weight = weights.array().at(0, first_column), pitch = W + LANES, place = first_of.array().data,
+                                      first_column](Float8 sum, Index n, Index x) {
+                        return fma(load(weight + n * pitch + x), load(place[n] + first_column + x), sum);
+                    };
+                    float *sums = total.array().at(k - few, first_column);
+                    radius == 2 ? sum_products(number, std::integral_constant<Index, 25>(), sums, add) : sum_products(number, size * size, sums, add);
+                }
             }
             // rows of eight candidates become those of a pixel each
-            for (Index x = 0; x < W; x += LANES) {
-                Float8 block[LANES];
-                for (Index k = 0; k < LANES; ++k) block[k] = load(total.array().at(k, x));
-                transpose(block);
-                for (Index i = 0; i < LANES && x + i < W; ++i) store(out.at(y, x + i, few), block[i] * ONE);
-            }
+            for (const auto &[first_column, number] : columns)
+                for (Index x = first_column; x < first_column + number; x += LANES) {
+                    Float8 block[LANES];
+                    for (Index k = 0; k < LANES; ++k) block[k] = load(total.array().at(k, x));
+                    transpose(block);
+                    for (Index i = 0; i < LANES && x + i < W; ++i) {
+                        if (has(x + i)) store(out.data + places.origin(y, x + i) + few, block[i] * ONE);
+                    }
+                }
         }
     });
 }
 
-// Sum of the smoothed costs along eight paths, into out; cost and out (H, W, K'), guide (3, H, W). All paths of a direction go through
+// Sum of the smoothed costs along eight paths, into out; guide (3, H, W). All paths of a direction go through
 // band rows before any goes on, so that costs and sums come from memory once for the paths down and once for those up.
-void semi_global(Array<const std::uint16_t, 3> cost, Array<const float, 3> guide, double small, double large, double weakening, Index band,
-                 Array<std::uint16_t, 3> out) {
-    const Index H = cost.shape[0], W = cost.shape[1], K = cost.shape[2];
-    const Smoothing smoothing{cost, guide, small, large, weakening, out};
+void semi_global(Array<const std::uint16_t, 1> cost, Array<const float, 3> guide, const Places &places, double small, double large, double weakening,
+                 Index band, Array<std::uint16_t, 1> out) {
+    const Index H = guide.shape[1], W = guide.shape[2], K = places.count;
+    const Smoothing smoothing{cost, places, guide, small, large, weakening, out};
     const Index pieces = (W + PATHS_AT_ONCE - 1) / PATHS_AT_ONCE;
     for (const Index dy : {1, -1}) {
         const auto paths = Scratch<std::uint16_t, 4>(3 * pieces, 2, PATHS_AT_ONCE, K + 2).filled(MOST);
@@ -152,7 +184,9 @@ void semi_global(Array<const std::uint16_t, 3> cost, Array<const float, 3> guide
         for (Index begin = 0; begin < H; begin += band) {
             const Index end = std::min(H, begin + band);
             parallel_for(begin, dy > 0 ? end : begin, [&](Index y) {
-                std::fill_n(out.at(y), W * K, 0);
+                for (Index x = 0; x < W; ++x) {
+                    std::fill(out.data + places.origin(y, x) + places.first(y, x), out.data + places.origin(y, x) + places.beyond(y, x), 0);
+                }
                 smoothing.along_row(y);
             });
             for (const Index dx : {0, 1, -1}) {
@@ -168,21 +202,21 @@ void semi_global(Array<const std::uint16_t, 3> cost, Array<const float, 3> guide
 
 // Winner of each pixel, refined by a parabola, and by how much the averaged cost of other minima exceeds its own:
 // negative where another minimum is lower before smoothing, 0 where there is no other. Candidates closer than same to
-// the winner belong to its minimum; smoothed and averaged (H, W, K'), disparities (K).
-void choose(Array<const std::uint16_t, 3> smoothed, Array<const std::uint16_t, 3> averaged, Array<const float, 1> disparities, float same,
-            Array<float, 2> disparity, Array<float, 2> margin) {
+// the winner belong to its minimum; disparities (K). Candidates that a pixel has not cost 1.
+void choose(Array<const std::uint16_t, 1> smoothed, Array<const std::uint16_t, 1> averaged, Array<const float, 1> disparities, const Places &places,
+            float same, Array<float, 2> disparity, Array<float, 2> margin) {
     const Index K = disparities.shape[0];
-    const auto of_candidates = zeros<float, 1>(smoothed.shape[2]);
+    const auto of_candidates = zeros<float, 1>(places.count);
     std::copy_n(disparities.data, K, of_candidates.array().data);
     const double spacing = double(disparities(K - 1) - disparities(0)) / double(K - 1);
     parallel_for_pixels(disparity.shape[0], disparity.shape[1], [&](Index y, Index x) {
         // the first of equal ones
-        const std::uint16_t *costs = smoothed.at(y, x);
-        const Index best = std::min_element(costs, costs + K) - costs;
-        const double offset = 0 < best && best < K - 1 ? vertex(costs + best, 1e-9) : 0;
+        const std::uint16_t *costs = smoothed.data + places.origin(y, x);
+        const Index begin = places.first(y, x), end = std::min<Index>(K, places.beyond(y, x)), best = std::min_element(costs + begin, costs + end) - costs;
+        const double offset = begin < best && best < end - 1 ? vertex(costs + best, 1e-9) : 0;
         const float found = float(disparities(best) + offset * spacing);
         disparity(y, x) = found;
-        margin(y, x) = margin_of(averaged.at(y, x), K, of_candidates.array().data, found, best, same);
+        margin(y, x) = margin_of(averaged.data + places.origin(y, x), begin, end, of_candidates.array().data, found, best, same, !places.has_all(y, x));
     });
 }
 
@@ -190,10 +224,10 @@ const Submodule submodule("semi_global", [](nb::module_ &m) {
     m.attr("AT_ONCE") = AT_ONCE;
     m.attr("ONE") = ONE;
     m.attr("PATHS_AT_ONCE") = PATHS_AT_ONCE;
-    m.def("aggregate", &aggregate, Unlocked(), "cost"_a, "top"_a, "guide"_a, "radius"_a, "variance"_a, "begin"_a, "end"_a,
+    m.def("aggregate", &aggregate, Unlocked(), "cost"_a, "top"_a, "guide"_a, "places"_a, "radius"_a, "variance"_a, "begin"_a, "end"_a,
           "out"_a);
-    m.def("semi_global", &semi_global, Unlocked(), "cost"_a, "guide"_a, "small"_a, "large"_a, "weakening"_a, "band"_a, "out"_a);
-    m.def("choose", &choose, Unlocked(), "smoothed"_a, "averaged"_a, "disparities"_a, "same"_a, "disparity"_a, "margin"_a);
+    m.def("semi_global", &semi_global, Unlocked(), "cost"_a, "guide"_a, "places"_a, "small"_a, "large"_a, "weakening"_a, "band"_a, "out"_a);
+    m.def("choose", &choose, Unlocked(), "smoothed"_a, "averaged"_a, "disparities"_a, "places"_a, "same"_a, "disparity"_a, "margin"_a);
 });
 
 }  // namespace

@@ -53,7 +53,7 @@ struct NearestInView {
     const double down, across;
     const Array<float, 2> nearest;  // its rows are those that are drawn
     const Index H = nearest.shape[0], W = nearest.shape[1];
-    const Scratch<float, 2> squares = Scratch<float, 2>(H + 1, W + 1).filled(EMPTY);
+    const Scratch<float, 2> squares = Scratch<float, 2>(H + 2, W + 1).filled(EMPTY);
     std::vector<bool> drawn = std::vector<bool>(H);
 
     // Add pixel x of a row y of the reference view, and where it is the first or last what goes on beyond it.
@@ -92,8 +92,13 @@ struct NearestInView {
                 float *place = squares.array().at(top[0], left[0]);
                 store(place, larger(load(place), load(row + begin)));
             } else {
-                for (Index n = 0; n < LANES; ++n)
-                    if (0 <= top[n] && top[n] <= H) raise(squares.array().at(top[n]), left[n], std::min<Index>(W, left[n]), row[begin + n]);
+                // those outside have a place behind the last
+                const std::int32_t pitch = std::int32_t(W + 1), height = std::int32_t(H + 1);
+                const Int8 inside = (top >= 0) & (top < height) & (left >= 0) & (left < pitch), place = inside ? top * pitch + left : Int8{} + height * pitch;
+                for (Index n = 0; n < LANES; ++n) {
+                    float &there = squares.array().data[place[n]];
+                    there = std::max(there, row[begin + n]);
+                }
             }
         }
         add(row, y, 0, true, false);
