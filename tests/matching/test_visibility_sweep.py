@@ -10,6 +10,7 @@ from sepi.kernels import semi_global, visibility
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.nearest_surfaces import EMPTY, z_buffers
+from sepi.matching.semi_global import Places
 from sepi.matching.sweep_arrays import Visibility, sampled_candidates
 from sepi.matching.view_subsets import spread_views, views_without_aliases
 from sepi.matching.visibility_sweep import (
@@ -245,32 +246,61 @@ def path_twin(cost, guide, dy, dx, small, large, weakening):
     return path
 
 
-def averaged_by_kernel(cost, guide, radius, variance):
+def averaged_by_kernel(cost, guide, radius, variance, places):
     """By the kernel, in two parts; what was there before must not matter."""
-    K, H, W = cost.shape
+    H = len(guide)
     colours = np.moveaxis(guide, 2, 0).copy()
-    out = np.full((H, W, -(-K // semi_global.AT_ONCE) * semi_global.AT_ONCE), 7, np.uint16)
+    out = np.full(places.size, 7, np.uint16)
     half, top = H // 2, max(0, H // 2 - radius)
-    semi_global.aggregate(cost[:, : half + radius].copy(), 0, colours, radius, variance, 0, half, out)
-    semi_global.aggregate(cost[:, top:].copy(), top, colours, radius, variance, half, H, out)
+    semi_global.aggregate(cost[:, : half + radius].copy(), 0, colours, places, radius, variance, 0, half, out)
+    semi_global.aggregate(cost[:, top:].copy(), top, colours, places, radius, variance, half, H, out)
     return out
 
 
-@pytest.mark.parametrize(("large", "scale"), [(0.5, 2**2), (12.5, 2**5)])
-def test_smoothing_equals_a_plain_twin(large: float, scale: int) -> None:
-    """Paths are sums of whole numbers, of costs cut to fewer bits; with larger penalties of fewer."""
+def candidates_of(cost):
+    """First and last of all candidates (K, H, W)."""
+    return np.stack([np.zeros(cost.shape[1:], np.int32), np.full(cost.shape[1:], len(cost) - 1, np.int32)])
+
+
+def laid_out(volume, places):
+    """A volume as an array (H, W, K'), NaN where a pixel has no candidate."""
+    out = np.full((*places.first.shape, places.count), np.nan)
+    for y, x in np.ndindex(*places.first.shape):
+        first, beyond, origin = (int(each[y, x]) for each in places[:3])
+        out[y, x, first:beyond] = volume[origin + first : origin + beyond]
+    return out
+
+
+@pytest.mark.parametrize(
+    ("large", "scale", "K", "some"), [(0.5, 2**2, 6, False), (12.5, 2**5, 6, False), (0.5, 2**2, 70, True)]
+)
+def test_smoothing_equals_a_plain_twin(large: float, scale: int, K: int, some: bool) -> None:
+    """Paths are sums of whole numbers, of costs cut to fewer bits; with larger penalties of fewer.
+
+    Where pixels have ``some`` of the candidates, others are not reached.
+    """
     random = np.random.default_rng(3)
-    K, H, W = 6, 8, semi_global.PATHS_AT_ONCE + 5
+    H, W = 8, semi_global.PATHS_AT_ONCE + 5
     cost, guide = random.random((K, H, W)).astype(np.float32), random.random((H, W, 3)).astype(np.float32) * 0.1
-    volume = averaged_by_kernel(cost, guide, 2, 0.01)
-    averaged = volume[:, :, :K] / semi_global.ONE
-    np.testing.assert_allclose(averaged, aggregate_twin(cost, guide, 2, 0.01), atol=2e-5)
+    likely = np.sort(random.integers(0, K, (2, H, W), np.int32), axis=0) if some else candidates_of(cost)
+    places = Places.of_candidates(*likely, K)
+    volume = averaged_by_kernel(cost, guide, 2, 0.01, places)
+    averaged = laid_out(volume, places)[:, :, :K]
+    told = np.isfinite(averaged)
+    assert told.all() != some
+    assert all(
+        told[y, x, first : last + 1].all()
+        for (y, x), first, last in zip(np.ndindex(H, W), *likely.reshape(2, -1), strict=True)
+    )
+    np.testing.assert_allclose(
+        (averaged / semi_global.ONE)[told], aggregate_twin(cost, guide, 2, 0.01)[told], atol=2e-5
+    )
     smoothed = np.full_like(volume, 7)
-    semi_global.semi_global(volume, np.moveaxis(guide, 2, 0).copy(), 0.1, large, 5, 3, smoothed)
+    semi_global.semi_global(volume, np.moveaxis(guide, 2, 0).copy(), places, 0.1, large, 5, 3, smoothed)
     directions = [(0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
-    steps, one = volume[:, :, :K] // scale, semi_global.ONE / scale
+    steps, one = np.where(told, averaged // scale, np.inf), semi_global.ONE / scale
     expected = sum(path_twin(steps / one, guide, *d, 0.1, large, 5) for d in directions)
-    np.testing.assert_allclose(smoothed[:, :, :K] / (one / 4), expected, atol=40 / one)
+    np.testing.assert_allclose((laid_out(smoothed, places)[:, :, :K] / (one / 4))[told], expected[told], atol=40 / one)
 
 
 @pytest.mark.parametrize(("shape", "radius"), [((2, 2), 4), ((3, 1), 2), ((9, 3), 4)])
@@ -278,7 +308,8 @@ def test_a_window_may_be_wider_than_the_picture(shape: tuple[int, int], radius: 
     """What is beyond the picture's ends is no part of it: a sliver of a picture had another depth in each run."""
     random = np.random.default_rng(4)
     cost, guide = random.random((5, *shape)).astype(np.float32), random.random((*shape, 3)).astype(np.float32) * 0.1
-    averaged = averaged_by_kernel(cost, guide, radius, 0.01)[:, :, :5] / semi_global.ONE
+    places = Places.of_candidates(*candidates_of(cost), 5)
+    averaged = laid_out(averaged_by_kernel(cost, guide, radius, 0.01, places), places)[:, :, :5] / semi_global.ONE
     np.testing.assert_allclose(averaged, aggregate_twin(cost, guide, radius, 0.01), atol=2e-5)
 
 
@@ -287,13 +318,20 @@ def test_margin_tells_one_minimum_from_two() -> None:
     disparities = np.linspace(-1, 1, 21).astype(np.float32)
     one = np.minimum(1, np.abs(disparities - 0.5))
     two = np.minimum(one, np.abs(disparities + 0.5))
+    costs = np.stack([one, two, np.full(21, 0.3)])
     volume = np.full((1, 3, 2 * semi_global.AT_ONCE), semi_global.ONE, np.uint16)
-    volume[0, :, :21] = np.rint(np.stack([one, two, np.full(21, 0.3)]) * semi_global.ONE)
+    volume[0, :, :21] = np.rint(costs * semi_global.ONE)
+    places, volume = Places.of_candidates(*candidates_of(np.empty((21, 1, 3))), 21), volume.ravel()
     disparity, margin = np.empty((2, 1, 3), np.float32)
-    semi_global.choose(volume, volume, disparities, 0.25, disparity, margin)
+    semi_global.choose(volume, volume, disparities, places, 0.25, disparity, margin)
     assert disparity[0, 0] == pytest.approx(0.5, abs=1e-5)
     assert margin[0, 0] == pytest.approx(0.3, abs=1e-4)
     np.testing.assert_allclose(margin[0, 1:], 0, atol=1e-4)
     # what fills vectors behind the last candidate is no other minimum
-    semi_global.choose(volume, volume, disparities + 20, 3, disparity, margin)
+    semi_global.choose(volume, volume, disparities + 20, places, 3, disparity, margin)
     np.testing.assert_array_equal(margin, 0)
+    # a minimum at a candidate that no pixel has is none
+    some = Places.of_candidates(np.full((1, 3), 16, np.int32), np.full((1, 3), 20, np.int32), 21)
+    semi_global.choose(volume, volume, disparities, some._replace(origin=places.origin), 0.5, disparity, margin)
+    assert disparity[0, 1] == pytest.approx(0.6, abs=1e-5)
+    assert margin[0, 1] == pytest.approx(0.9, abs=1e-4)

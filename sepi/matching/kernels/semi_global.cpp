@@ -126,46 +126,38 @@ void aggregate(Array<const float, 3> cost, Index top, Array<const float, 3> guid
         window_weights(guide, y, 0, W, radius, weights.array(), exponent);
         // what lies beyond the picture weighs nothing: it may be other rows, but for those with no memory beside them
         const auto at_ends = zeros<float, 2>(size, W + 2 * radius + LANES);
-        const Scratch<const float *, 1> first_of(size * size);
+        const Scratch<const float *, 1> places_of_row(size * size);
         const float *first = cost.data, *last = cost.at(K - 1, cost.shape[1]);
         // a few candidates at a time: each pixel's are written together
         const Scratch<float, 2> total(LANES, W + LANES);
         for (Index few = 0; few < places.count; few += LANES) {
             const auto has = [&](Index x) { return places.first(y, x) <= few && few < places.beyond(y, x); };
-            std::vector<std::pair<Index, Index>> columns;
-            for (Index x = 0; x < W; x += ACROSS) {
-                const Index across = std::min(ACROSS, W - x);
-                for (Index i = 0; i < across; ++i)
-                    if (has(x + i)) {
-                        columns.emplace_back(x, across);
-                        break;
-                    }
-            }
+            std::vector<Index> blocks;
+            for (Index x = 0; x < W; ++x)
+                if (has(x) && (blocks.empty() || x >= blocks.back() + ACROSS)) blocks.push_back(x / ACROSS * ACROSS);
             if (few + LANES > K) std::fill_n(total.array().data, LANES * (W + LANES), 1.0f);
             for (Index k = few; k < std::min(K, few + LANES); ++k) {
                 for (Index i = 0; i < size; ++i) {
                     const float *row = cost.at(k, clamped(y + i - radius, H) - top);
                     if (row - first < radius || last - row < W + radius + LANES) row = std::copy_n(row, W, at_ends.array().at(i, radius)) - W;
-                    for (Index j = 0; j < size; ++j) first_of.array()(i * size + j) = row + j - radius;
+                    for (Index j = 0; j < size; ++j) places_of_row.array()(i * size + j) = row + j - radius;
                 }
-                for (const auto &[first_column, number] : columns) {
-                    const auto add = [weight = weights.array().at(0, first_column), pitch = W + LANES, place = first_of.array().data,
-                                      first_column](Float8 sum, Index n, Index x) {
-                        return fma(load(weight + n * pitch + x), load(place[n] + first_column + x), sum);
-                    };
-                    float *sums = total.array().at(k - few, first_column);
+                for (const Index block : blocks) {
+                    const auto add = [weight = weights.array().at(0, block), pitch = W + LANES, place = places_of_row.array().data, block](
+                                         Float8 sum, Index n, Index x) { return fma(load(weight + n * pitch + x), load(place[n] + block + x), sum); };
+                    const Index number = std::min(ACROSS, W - block);
+                    float *sums = total.array().at(k - few, block);
                     radius == 2 ? sum_products(number, std::integral_constant<Index, 25>(), sums, add) : sum_products(number, size * size, sums, add);
                 }
             }
             // rows of eight candidates become those of a pixel each
-            for (const auto &[first_column, number] : columns)
-                for (Index x = first_column; x < first_column + number; x += LANES) {
+            for (const Index begin_of_block : blocks)
+                for (Index x = begin_of_block; x < std::min(W, begin_of_block + ACROSS); x += LANES) {
                     Float8 block[LANES];
                     for (Index k = 0; k < LANES; ++k) block[k] = load(total.array().at(k, x));
                     transpose(block);
-                    for (Index i = 0; i < LANES && x + i < W; ++i) {
+                    for (Index i = 0; i < LANES && x + i < W; ++i)
                         if (has(x + i)) store(out.data + places.origin(y, x + i) + few, block[i] * ONE);
-                    }
                 }
         }
     });
@@ -184,9 +176,8 @@ void semi_global(Array<const std::uint16_t, 1> cost, Array<const float, 3> guide
         for (Index begin = 0; begin < H; begin += band) {
             const Index end = std::min(H, begin + band);
             parallel_for(begin, dy > 0 ? end : begin, [&](Index y) {
-                for (Index x = 0; x < W; ++x) {
+                for (Index x = 0; x < W; ++x)
                     std::fill(out.data + places.origin(y, x) + places.first(y, x), out.data + places.origin(y, x) + places.beyond(y, x), 0);
-                }
                 smoothing.along_row(y);
             });
             for (const Index dx : {0, 1, -1}) {
