@@ -88,6 +88,7 @@ def compared_depths(
     others: BoolMap,
     occlusion_margin: float,
     most: float = np.inf,
+    occluders: FloatMap | None = None,
 ) -> FloatMap:
     """Squared residuals at two depths, in the views in which nothing occludes the second.
 
@@ -99,9 +100,11 @@ def compared_depths(
     others : ndarray, shape (T, S), bool
         The views that are asked; not the reference view.
     occlusion_margin : float
-        By how much an occluder in the map ``other`` must be nearer, pixels per view step.
+        By how much an occluder must be nearer, pixels per view step.
     most : float
         That the squared residual of one view counts.
+    occluders : ndarray, shape (H, W), float32, optional
+        The map of what may occlude the second; ``other`` unless given.
 
     Returns
     -------
@@ -113,7 +116,7 @@ def compared_depths(
     depths, unit = (disparity, other, guide_of(light_field)), 1 / full_scale(views.dtype)
     sums = np.zeros((3, *disparity.shape), np.float32)
     for begin, end, rows in row_bands(light_field, others, float(np.abs(disparity).max()), _BYTES_PER_PIXEL):
-        nearest = nearest_surfaces(light_field, other, others, rows)
+        nearest = nearest_surfaces(light_field, other if occluders is None else occluders, others, rows)
         asked = (others, light_field.baselines, nearest, rows.low, occlusion_margin)
         kernels.compare_depths(views, unit, *depths, asked, most, begin, end, sums)
     return sums

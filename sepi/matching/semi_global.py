@@ -120,14 +120,14 @@ class Places(NamedTuple):
         The first candidate of a pixel, and the one after its last.
     origin : ndarray, shape (H, W), int64
         Where its candidate 0 is, or would be.
-    count : int
-        Candidates of a pixel that has all.
+    candidates : int
+        Of a pixel that has all.
     """
 
     first: npt.NDArray[np.int32]
     beyond: npt.NDArray[np.int32]
     origin: npt.NDArray[np.int64]
-    count: int
+    candidates: int
 
     @classmethod
     def of_candidates(cls, first: npt.NDArray[np.int32], last: npt.NDArray[np.int32], candidates: int) -> Places:
@@ -190,7 +190,7 @@ class AveragedCosts:
         if likely is None:
             likely = np.zeros((2, self._height, width), np.int32)
             likely[1] = len(disparities) - 1
-        self._places = Places.of_candidates(*likely, len(disparities))
+        self._places = Places.of_candidates(likely[0], likely[1], len(disparities))
         self._colours = np.stack(cv2.split(guide), dtype=np.float32)
         self._variance = parameters.window_sigma**2 + contrast
         self._averaged, self._smoothed = volumes.averaged_and_smoothed(self._places.size)

@@ -56,7 +56,10 @@ def contradicted(
     others = present.copy()
     others[light_field.reference_position] = False
     inside = cv2.erode(regions.astype(np.uint8), _RIM, borderValue=1) > 0
-    sums = compared_depths(light_field, before, after, others, occlusion_margin, _MOST * variance) * inside
+    # beside an occluder a view shows both
+    occluders = np.asarray(cv2.dilate(after, np.ones((3, 3), np.uint8)), np.float32)
+    compared = compared_depths(light_field, before, after, others, occlusion_margin, _MOST * variance, occluders)
+    sums = compared * inside
     there, here, views = (cv2.boxFilter(each, cv2.CV_64F, _WINDOW, normalize=False) for each in sums)
     # of white noise the ratio of both sums is about one, with a deviation of one over the root of how many they are of
     return np.asarray(regions & (there > here * (1 + _CLEAR / np.sqrt(np.maximum(views, 1)))))

@@ -264,7 +264,7 @@ def candidates_of(cost):
 
 def laid_out(volume, places):
     """A volume as an array (H, W, K'), NaN where a pixel has no candidate."""
-    out = np.full((*places.first.shape, places.count), np.nan)
+    out = np.full((*places.first.shape, places.candidates), np.nan)
     for y, x in np.ndindex(*places.first.shape):
         first, beyond, origin = (int(each[y, x]) for each in places[:3])
         out[y, x, first:beyond] = volume[origin + first : origin + beyond]
