@@ -7,7 +7,7 @@
 #   snakemake rendered    path-traced scenes in several levels of noise: rendered, computed, scored by property
 #   snakemake -- FILE     one file: results/DATASET/SCENE/VARIANT/disparity.pfm
 #
-# docs/reproduce/workflow.md explains targets, configuration and what makes a job run again.
+# docs/reproduce/workflow.md explains targets and what makes a job run again, docs/reproduce/configure.md the configuration.
 
 
 configfile: f"{workflow.current_basedir}/config.yaml"

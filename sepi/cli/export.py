@@ -44,7 +44,7 @@ def export(
     OUT is one HDF5 file, if its name ends with .h5, or a folder with a picture for each view, named by row and column:
     PNG of 8 or 16 bit, TIFF where views are floats. Both keep where the views stand, the disparity range, the camera,
     the view whose depth is made, ground truth and masks; the folder in light_field.json, which may be edited
-    (docs/reference/formats.md).
+    (docs/reference/folders.md).
 
     \b
     Examples:

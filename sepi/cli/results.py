@@ -50,7 +50,7 @@ def points(
 
     RESULT is a folder that 'sepi depth' wrote, its result.h5 or its all_views.h5. Points are in metres where the
     scene's files or the flags give the camera; otherwise they are a relief with x and y in pixels. Each has a sigma
-    where RESULT has error bars, in metres or in pixels per view step. docs/reference/outputs.md describes both.
+    where RESULT has error bars, in metres or in pixels per view step. docs/depth/metric_depth.md describes both.
 
     \b
     Examples:

@@ -28,7 +28,7 @@ def default_yaml() -> str:
     A line ``#NAME: VALUE`` is what holds without it; prose has a space after the ``#``.
     """
     lines = [
-        "# Configuration of the workflow (docs/reproduce/workflow.md). Every key may be left out; these are defaults.",
+        "# Configuration of the workflow (docs/reproduce/configure.md). Every key may be left out; these are defaults.",
         "# To change a value, here or in your own file (--configfile FILE): take the # from its line and from those",
         "# that it lies below. Or give --config KEY=VALUE.",
         "# This file is made from the code: python -m sepi.workflow.config_file > config.yaml",

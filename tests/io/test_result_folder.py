@@ -118,7 +118,7 @@ def test_pictures_of_masks_and_confidence(tmp_path: Path, light_field: LightFiel
 
 
 def test_depth_in_metres(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
-    """Metres by the formula of docs/reference/outputs.md; nothing claims metres where the camera is unknown."""
+    """Metres by the formula of docs/depth/metric_depth.md; nothing claims metres where the camera is unknown."""
     disparity = maps.disparity.copy()
     disparity[1, :2] = -8, -9  # at and beyond infinity
     write_result(tmp_path / "known", light_field, replace(maps, disparity=disparity), {})
