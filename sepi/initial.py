@@ -20,8 +20,8 @@ References
 from __future__ import annotations
 
 from sepi.lightfield import LightField
-from sepi.matching.denoising import denoised
 from sepi.matching.plane_sweep import SweepParameters, sweep
+from sepi.matching.softening import compared_views
 from sepi.matching.structure_tensor import StructureTensorParameters, structure_tensor_depth
 from sepi.matching.visibility_sweep import (
     FirstDepthParameters,
@@ -89,7 +89,7 @@ def semi_global(
     >>> bool(np.median(np.abs(maps.disparity - light_field.ground_truth)) < 0.05)
     True
     """
-    result = first_depth(denoised(light_field, parameters.denoising), parameters, progress)
+    result = first_depth(compared_views(light_field, parameters), parameters, progress)
     return StageMaps(result.disparity, result.confidence)
 
 

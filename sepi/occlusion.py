@@ -40,9 +40,9 @@ from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.specks import without_specks
 from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.matching.denoising import denoised
 from sepi.matching.mean_reference import mean_reference
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
+from sepi.matching.softening import compared_views
 from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters, spread_views
 from sepi.matching.visibility_sweep import VisibleViewsParameters, depth_from_visible_views, occluded_in_any_view
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_previous
@@ -225,7 +225,7 @@ def visibility(
     True
     """
     before, given = require_previous(previous), light_field
-    light_field = denoised(light_field, parameters.denoising)
+    light_field = compared_views(light_field, parameters)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress, mean_reference)
     # at a rim denoising would mix the colours that have to be told apart
     disparity = assigned_to_surfaces(given, result.disparity, parameters)

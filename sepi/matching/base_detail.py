@@ -23,8 +23,9 @@ from pydantic import Field
 from sepi.image.noise import noise_of_reference_view, variance_of_residuals
 from sepi.kernels import base_detail as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
-from sepi.matching.denoising import LEFT, DenoisedLightField, DenoisingParameters
+from sepi.matching.denoising import LEFT, DenoisedLightField
 from sepi.matching.row_bands import Rows
+from sepi.matching.softening import SofteningParameters
 from sepi.workspace import OfViews, kept_of
 
 DETAIL_UNIT = 1 / 32000
@@ -41,7 +42,7 @@ ColourScale = Annotated[
 """A parameter whose default is not the same for every sweep."""
 
 
-class BaseDetailParameters(DenoisingParameters):
+class BaseDetailParameters(SofteningParameters):
     """Parameters of the decomposition, and of how well colours and detail must fit."""
 
     colour_scale: ColourScale = 0.0316

@@ -12,9 +12,10 @@ from collections.abc import Iterable
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
 from sepi.matching.base_detail import BaseDetailParameters
-from sepi.matching.denoising import DenoisingParameters, denoised
+from sepi.matching.denoising import denoised
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.row_bands import least_band_bytes
+from sepi.matching.softening import SofteningParameters, compared_views
 from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, VisibilitySweepParameters
 from sepi.memory import require_memory
 from sepi.stage import OcclusionMarginParameters, Parameters
@@ -91,9 +92,12 @@ def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple
     pixels, samples = height * width, height * width * int(light_field.present.sum())
     own = max((p.needs.bytes_per_sample * samples + p.needs.bytes_per_pixel * pixels for p in stages), default=0)
     ours = _BYTES_OF_MAPS * pixels + max(bytes_of_volumes(light_field, stages), *rings, 0)
-    least = max((p.denoising for p in stages if isinstance(p, DenoisingParameters)), default=0.0)
-    copy = denoised(light_field, least)
-    ours += 0 if copy is light_field else copy.views.nbytes
+    copies = {id(light_field.views): 0}
+    for p in stages:
+        if isinstance(p, SofteningParameters):
+            for views in (denoised(light_field, p.denoising).views, compared_views(light_field, p).views):
+                copies.setdefault(id(views), views.nbytes)
+    ours += sum(copies.values())
     whole = _LIBRARIES + light_field.views.nbytes + round(max(ours, own))
     in_bands = any(isinstance(p, (BaseDetailParameters, OcclusionMarginParameters)) for p in stages)
     if not in_bands:

@@ -23,7 +23,8 @@ from pydantic import Field
 from sepi.image.noise import noise_of_reference_view
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.base_detail import BaseDetailParameters
-from sepi.matching.denoising import DenoisedLightField, DenoisingParameters, denoised
+from sepi.matching.denoising import DenoisedLightField
+from sepi.matching.softening import SofteningParameters, compared_views
 from sepi.matching.view_noise import variance_map
 from sepi.matching.view_subsets import spread_views
 from sepi.memory import take_blas_buffer
@@ -54,7 +55,7 @@ LIT_SHARE = 0.01
 """Of the picture, below which nothing is asked: it takes as long as a round of the optimisation."""
 
 
-class UniformPlanesParameters(OcclusionMarginParameters, DenoisingParameters, BorderPlaneParameters):
+class UniformPlanesParameters(OcclusionMarginParameters, SofteningParameters, BorderPlaneParameters):
     """Parameters of uniform regions and their planes."""
 
     colour_scale: float = Field(
@@ -108,7 +109,7 @@ def fill_uniform_regions(
 
     # planes need it, where views have taken what memory there is
     take_blas_buffer()
-    field = denoised(light_field, parameters.denoising)
+    field = compared_views(light_field, parameters)
     noisy = isinstance(field, DenoisedLightField)
     averaged = parameters.views if parameters.views is None or not noisy else max(parameters.views, NOISY_VIEWS)
     compared = spread_views(light_field, averaged)

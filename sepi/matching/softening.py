@@ -1,0 +1,147 @@
+"""Views as matching compares them: denoised, and soft where their texture is too sharp to be interpolated.
+
+Matching interpolates between the pixels of a view, and interpolation loses frequencies above about 0.3 cycles a pixel.
+Renderings, print and pictures that were made smaller have them. Their views then differ at the true disparity by more
+than the robust scale tolerates, and a disparity wins at which views fall on whole pixels. A slight blur of all views
+removes what interpolation loses. It would cost detail elsewhere, so only dense texture of such frequencies is blurred;
+a single edge stays sharp.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from sepi.lightfield import FloatMap, LightField, as_unit_float, full_scale
+from sepi.matching.denoising import DenoisingParameters, denoised, measured_noise
+from sepi.threads import threads_used
+from sepi.workspace import OfViews, kept_of
+
+SHARP, SHARPEST = 0.295, 0.32
+"""Sharpness from which texture is blurred a little, and wholly. Dots averaged over each pixel have 0.33; most texture
+that a lens made soft has 0.2 to 0.27."""
+
+LEAST_SHARE = 0.1
+"""Of the reference view that is too sharp, below which no view is blurred."""
+
+_WINDOW = 2.5
+_DENSE = 21
+"""Pixels: width of the Gaussian over which frequencies are told, and of the window of which all must be sharp."""
+
+_NOISE = 3.0
+"""Times the noise's own energy that a texture's must exceed."""
+
+_OF_GREY = 0.67
+"""Of the noise of a channel, that of OpenCV's grey. Views of one channel count as three equal ones."""
+
+_LEAST_CONTRAST = 3e-3
+"""Of differences of neighbours that counts as texture; colours in 0..1."""
+
+
+class SofteningParameters(DenoisingParameters):
+    """Parameters of the views that are compared."""
+
+    softening: float = Field(
+        0.7, ge=0, le=3, description="blur of texture too sharp for interpolation, in pixels; 0 keeps it"
+    )
+
+
+@dataclass
+class _Kept(OfViews):
+    """Softened views; None if they stay unchanged."""
+
+    blur: float = 0.0
+    made: npt.NDArray[Any] | None = None
+
+
+def compared_views(light_field: LightField, parameters: SofteningParameters, least_noise: float = 0.0) -> LightField:
+    """The light field with denoised views where they are noisy, soft where they are too sharp.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    parameters : SofteningParameters
+    least_noise : float
+        As in :func:`sepi.matching.denoising.denoised`.
+
+    Returns
+    -------
+    LightField
+        A :class:`sepi.matching.denoising.DenoisedLightField` if there is noise; the light field itself if there is
+        neither.
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
+    """
+    found = denoised(light_field, parameters.denoising, least_noise)
+    if parameters.softening == 0:
+        return found
+    kept = kept_of(found, _Kept)
+    if kept.blur != parameters.softening:
+        kept.blur = parameters.softening
+        kept.made = _softened(found, measured_noise(light_field).usual, kept.blur)
+    return found if kept.made is None else replace(found, views=kept.made)
+
+
+def sharpness(picture: FloatMap, noise: float) -> FloatMap:
+    """Share of second differences in the differences of neighbours, over dense texture.
+
+    Parameters
+    ----------
+    picture : ndarray, shape (H, W), float32
+        Grey, 0..1.
+    noise : float
+        Standard deviation.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        0..1; 0 where there is no texture beyond the noise.
+    """
+    first, second = np.array([-0.5, 0, 0.5], np.float32), np.array([0.25, -0.5, 0.25], np.float32)
+    along = np.ones(1, np.float32)
+    strength = []
+    for difference in (first, second):
+        squares = [
+            np.square(cv2.sepFilter2D(picture, -1, across, down, borderType=cv2.BORDER_REFLECT_101))
+            for across, down in ((difference, along), (along, difference))
+        ]
+        energy = cv2.GaussianBlur(squares[0] + squares[1], (0, 0), _WINDOW)
+        of_noise = 2 * float(np.square(difference).sum()) * noise**2 * (1.0 if difference is first else _NOISE)
+        strength.append(np.sqrt(np.maximum(energy - np.float32(of_noise), 0)))
+    share = strength[1] / (strength[0] + strength[1] + np.float32(_LEAST_CONTRAST))
+    return np.asarray(cv2.blur(share, (_DENSE, _DENSE)), np.float32)
+
+
+def _softened(light_field: LightField, noise: float, blur: float) -> npt.NDArray[Any] | None:
+    """The views, blurred where they are too sharp; None if hardly any place is."""
+    views = light_field.views
+    if np.mean(_too_sharp(views[light_field.reference_position], noise) > 0) < LEAST_SHARE:
+        return None
+    out = np.zeros_like(views)
+
+    def soften(place: tuple[int, int]) -> None:
+        view = as_unit_float(views[place])
+        blurred = cv2.GaussianBlur(view, (0, 0), blur).reshape(view.shape)
+        soft = view + _too_sharp(views[place], noise)[..., None] * (blurred - view)
+        out[place] = soft if views.dtype == np.float32 else np.rint(soft * full_scale(views.dtype))
+
+    # OpenCV and NumPy work outside Python's lock
+    with ThreadPoolExecutor(threads_used()) as pool:
+        list(pool.map(soften, map(tuple, np.argwhere(light_field.present).tolist())))
+    return out
+
+
+def _too_sharp(view: npt.NDArray[Any], noise: float) -> FloatMap:
+    """How far each pixel of a view (H, W, C) is too sharp, 0..1."""
+    grey = as_unit_float(cv2.cvtColor(view, cv2.COLOR_RGB2GRAY) if view.shape[2] == 3 else view[..., 0])
+    return np.asarray(np.clip((sharpness(grey, _OF_GREY * noise) - SHARP) / (SHARPEST - SHARP), 0, 1), np.float32)
