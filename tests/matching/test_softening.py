@@ -23,7 +23,7 @@ def dotted(disparity: float, blur: float = 0.0) -> LightField:
     views = np.empty((9, 9, SIZE, SIZE, 1), np.float32)
     for t, s in np.ndindex(9, 9):
         v, u = y + disparity * (t - 4), x + disparity * (s - 4)
-        front = cv2.remap(dots, u * FINE, v * FINE, cv2.INTER_LINEAR)
+        front = cv2.remap(dots, (u + 0.5) * FINE, (v + 0.5) * FINE, cv2.INTER_LINEAR)
         behind = cv2.remap(ground, x - 0.8 * (s - 4) + SIZE / 2, y - 0.8 * (t - 4) + SIZE / 2, cv2.INTER_CUBIC)
         inside = np.maximum(abs(u - SIZE / 2), abs(v - SIZE / 2)) < 0.36 * SIZE
         views[t, s, ..., 0] = np.where(inside, 0.7 * front + 0.15, behind)
