@@ -15,7 +15,7 @@ from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.denoising import denoised
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.row_bands import least_band_bytes
-from sepi.matching.softening import SofteningParameters, compared_views
+from sepi.matching.softening import SofteningParameters, compared_views, softened
 from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, VisibilitySweepParameters
 from sepi.memory import require_memory
 from sepi.stage import OcclusionMarginParameters, Parameters
@@ -94,9 +94,13 @@ def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple
     ours = _BYTES_OF_MAPS * pixels + max(bytes_of_volumes(light_field, stages), *rings, 0)
     copies = {id(light_field.views): 0}
     for p in stages:
+        made: tuple[LightField, ...] = ()
         if isinstance(p, SofteningParameters):
-            for views in (denoised(light_field, p.denoising).views, compared_views(light_field, p).views):
-                copies.setdefault(id(views), views.nbytes)
+            made = denoised(light_field, p.denoising), compared_views(light_field, p)
+        elif isinstance(p, SweepParameters):
+            made = (softened(light_field, p.softening),)
+        for field in made:
+            copies.setdefault(id(field.views), field.views.nbytes)
     ours += sum(copies.values())
     whole = _LIBRARIES + light_field.views.nbytes + round(max(ours, own))
     in_bands = any(isinstance(p, (BaseDetailParameters, OcclusionMarginParameters)) for p in stages)

@@ -30,6 +30,7 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.matching.denoising import sure_noise
 from sepi.matching.expected_costs import expected_costs
 from sepi.matching.nearest_surfaces import shown_columns
+from sepi.matching.softening import Softening, softened
 from sepi.matching.sweep_arrays import ViewStack, Window, sampled_candidates
 from sepi.matching.view_noise import ViewNoise
 from sepi.stage import Progress, no_progress
@@ -72,6 +73,7 @@ class SweepParameters(CandidateParameters):
         description="whether costs are without what noise makes of interpolation, and confidence without most of what "
         "noise alone costs",
     )
+    softening: Softening = 0.7
 
     @property
     def groups(self) -> int:
@@ -182,7 +184,7 @@ def sweep(
     subsets = np.eye(groups.max() + 1, dtype=bool) if subsets is None else subsets
     groups, subsets = _without_empty(groups, subsets)
     mask = np.ones((H, W), bool) if mask is None else mask
-    colours = planar(light_field)
+    colours = planar(softened(light_field, parameters.softening))
     noise = residual_variance(light_field.reference_view)
     squared_scale = parameters.scale**2 + noise
     scale2 = np.float32(squared_scale * full_scale(colours.dtype) ** 2)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
@@ -44,12 +44,16 @@ _LEAST_CONTRAST = 3e-3
 """Of differences of neighbours that counts as texture; colours in 0..1."""
 
 
+Softening = Annotated[
+    float, Field(ge=0, le=3, description="blur of texture too sharp for interpolation, in pixels; 0 keeps it")
+]
+"""A parameter of every choice that compares views."""
+
+
 class SofteningParameters(DenoisingParameters):
     """Parameters of the views that are compared."""
 
-    softening: float = Field(
-        0.7, ge=0, le=3, description="blur of texture too sharp for interpolation, in pixels; 0 keeps it"
-    )
+    softening: Softening = 0.7
 
 
 @dataclass
@@ -83,13 +87,32 @@ def compared_views(light_field: LightField, parameters: SofteningParameters, lea
         If the disparity range is unknown.
     """
     found = denoised(light_field, parameters.denoising, least_noise)
-    if parameters.softening == 0:
-        return found
-    kept = kept_of(found, _Kept)
-    if kept.blur != parameters.softening:
-        kept.blur = parameters.softening
-        kept.made = _softened(found, measured_noise(light_field).usual, kept.blur)
-    return found if kept.made is None else replace(found, views=kept.made)
+    return softened(found, parameters.softening, measured_noise(light_field).usual)
+
+
+def softened(light_field: LightField, blur: float, noise: float | None = None) -> LightField:
+    """The light field with views that are soft where they are too sharp.
+
+    Parameters
+    ----------
+    light_field : LightField
+    blur : float
+        Pixels; 0 keeps all sharp.
+    noise : float, optional
+        Standard deviation in one channel of a view, colours in 0..1; that of these views unless given.
+
+    Returns
+    -------
+    LightField
+        Of the same kind; itself if hardly any place is too sharp.
+    """
+    if blur == 0:
+        return light_field
+    kept = kept_of(light_field, _Kept)
+    if kept.blur != blur:
+        kept.blur = blur
+        kept.made = _softened_views(light_field, measured_noise(light_field).usual if noise is None else noise, blur)
+    return light_field if kept.made is None else replace(light_field, views=kept.made)
 
 
 def sharpness(picture: FloatMap, noise: float) -> FloatMap:
@@ -122,7 +145,7 @@ def sharpness(picture: FloatMap, noise: float) -> FloatMap:
     return np.asarray(cv2.blur(share, (_DENSE, _DENSE)), np.float32)
 
 
-def _softened(light_field: LightField, noise: float, blur: float) -> npt.NDArray[Any] | None:
+def _softened_views(light_field: LightField, noise: float, blur: float) -> npt.NDArray[Any] | None:
     """The views, blurred where they are too sharp; None if hardly any place is."""
     views = light_field.views
     if np.mean(_too_sharp(views[light_field.reference_position], noise) > 0) < LEAST_SHARE:

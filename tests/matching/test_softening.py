@@ -32,7 +32,7 @@ def dotted(disparity: float, blur: float = 0.0) -> LightField:
     return LightField(eight_bit, "dotted", disparity_range=DisparityRange(-2, 2, "given"))
 
 
-@pytest.mark.parametrize("variant", ["best", "fast"])
+@pytest.mark.parametrize("variant", ["best", "fast", "paper"])
 @pytest.mark.parametrize("disparity", [0.25, 0.1])
 def test_sharp_texture_is_drawn_to_no_whole_pixel(disparity: float, variant: str) -> None:
     """Interpolation loses its frequencies: all of it came out a fourth of a pixel off, with confidence 1."""
