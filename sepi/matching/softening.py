@@ -20,6 +20,7 @@ from pydantic import Field
 
 from sepi.lightfield import FloatMap, LightField, as_unit_float, full_scale
 from sepi.matching.denoising import DenoisingParameters, denoised, measured_noise
+from sepi.matching.view_noise import ViewNoise, expected_variance
 from sepi.threads import threads_used
 from sepi.workspace import OfViews, kept_of
 
@@ -87,10 +88,10 @@ def compared_views(light_field: LightField, parameters: SofteningParameters, lea
         If the disparity range is unknown.
     """
     found = denoised(light_field, parameters.denoising, least_noise)
-    return softened(found, parameters.softening, measured_noise(light_field).usual)
+    return softened(found, parameters.softening, measured_noise(light_field))
 
 
-def softened(light_field: LightField, blur: float, noise: float | None = None) -> LightField:
+def softened(light_field: LightField, blur: float, noise: ViewNoise | None = None) -> LightField:
     """The light field with views that are soft where they are too sharp.
 
     Parameters
@@ -98,8 +99,8 @@ def softened(light_field: LightField, blur: float, noise: float | None = None) -
     light_field : LightField
     blur : float
         Pixels; 0 keeps all sharp.
-    noise : float, optional
-        Standard deviation in one channel of a view, colours in 0..1; that of these views unless given.
+    noise : ViewNoise, optional
+        That of these views unless given.
 
     Returns
     -------
@@ -111,19 +112,19 @@ def softened(light_field: LightField, blur: float, noise: float | None = None) -
     kept = kept_of(light_field, _Kept)
     if kept.blur != blur:
         kept.blur = blur
-        kept.made = _softened_views(light_field, measured_noise(light_field).usual if noise is None else noise, blur)
+        kept.made = _softened_views(light_field, measured_noise(light_field) if noise is None else noise, blur)
     return light_field if kept.made is None else replace(light_field, views=kept.made)
 
 
-def sharpness(picture: FloatMap, noise: float) -> FloatMap:
+def sharpness(picture: FloatMap, variance: FloatMap) -> FloatMap:
     """Share of second differences in the differences of neighbours, over dense texture.
 
     Parameters
     ----------
     picture : ndarray, shape (H, W), float32
         Grey, 0..1.
-    noise : float
-        Standard deviation.
+    variance : ndarray, shape (H, W), float32
+        Of its noise.
 
     Returns
     -------
@@ -139,23 +140,25 @@ def sharpness(picture: FloatMap, noise: float) -> FloatMap:
             for across, down in ((difference, along), (along, difference))
         ]
         energy = cv2.GaussianBlur(squares[0] + squares[1], (0, 0), _WINDOW)
-        of_noise = 2 * float(np.square(difference).sum()) * noise**2 * (1.0 if difference is first else _NOISE)
-        strength.append(np.sqrt(np.maximum(energy - np.float32(of_noise), 0)))
+        times = 2 * float(np.square(difference).sum()) * (1.0 if difference is first else _NOISE)
+        strength.append(np.sqrt(np.maximum(energy - np.float32(times) * variance, 0)))
     share = strength[1] / (strength[0] + strength[1] + np.float32(_LEAST_CONTRAST))
     return np.asarray(cv2.blur(share, (_DENSE, _DENSE)), np.float32)
 
 
-def _softened_views(light_field: LightField, noise: float, blur: float) -> npt.NDArray[Any] | None:
+def _softened_views(light_field: LightField, noise: ViewNoise, blur: float) -> npt.NDArray[Any] | None:
     """The views, blurred where they are too sharp; None if hardly any place is."""
     views = light_field.views
-    if np.mean(_too_sharp(views[light_field.reference_position], noise) > 0) < LEAST_SHARE:
+    # views are as bright as the reference view within the window
+    variance = (_OF_GREY**2 * expected_variance(light_field, noise)).astype(np.float32)
+    if np.mean(_too_sharp(views[light_field.reference_position], variance) > 0) < LEAST_SHARE:
         return None
     out = np.zeros_like(views)
 
     def soften(place: tuple[int, int]) -> None:
         view = as_unit_float(views[place])
         blurred = cv2.GaussianBlur(view, (0, 0), blur).reshape(view.shape)
-        soft = view + _too_sharp(views[place], noise)[..., None] * (blurred - view)
+        soft = view + _too_sharp(views[place], variance)[..., None] * (blurred - view)
         out[place] = soft if views.dtype == np.float32 else np.rint(soft * full_scale(views.dtype))
 
     # OpenCV and NumPy work outside Python's lock
@@ -164,7 +167,7 @@ def _softened_views(light_field: LightField, noise: float, blur: float) -> npt.N
     return out
 
 
-def _too_sharp(view: npt.NDArray[Any], noise: float) -> FloatMap:
+def _too_sharp(view: npt.NDArray[Any], variance: FloatMap) -> FloatMap:
     """How far each pixel of a view (H, W, C) is too sharp, 0..1."""
     grey = as_unit_float(cv2.cvtColor(view, cv2.COLOR_RGB2GRAY) if view.shape[2] == 3 else view[..., 0])
-    return np.asarray(np.clip((sharpness(grey, _OF_GREY * noise) - SHARP) / (SHARPEST - SHARP), 0, 1), np.float32)
+    return np.asarray(np.clip((sharpness(grey, variance) - SHARP) / (SHARPEST - SHARP), 0, 1), np.float32)

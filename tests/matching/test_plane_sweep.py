@@ -107,7 +107,7 @@ def sweep_and_twin(light_field, parameters, numbers):
 def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
     """Wrong sampling, borders, counts or weights would show as a wrong depth map."""
     light_field = random_light_field(channels=channels, dtype=dtype)
-    parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=radius, window_sigma=0.5)
+    parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=radius, window_sigma=0.5, softening=0)
     for own, of_twin in sweep_and_twin(light_field, parameters, (0, 1, 4, 6)):
         # two candidates may tie within rounding
         assert np.mean(np.abs(own - of_twin) > 2e-3) < 0.01
@@ -118,7 +118,7 @@ def test_sweep_of_sure_noise_equals_its_numpy_twin(channels):
     """What noise costs one half of the views, taken from another, would give bare walls the depth of neither."""
     light_field = random_light_field((3, 4), (40, 44), channels=channels).seen_from((0, 1))
     assert sure_noise(light_field) is not None
-    parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=1, window_sigma=0.5)
+    parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=1, window_sigma=0.5, softening=0)
     sweep_and_twin(light_field, parameters, (0, 1, 4, 6))
 
 
@@ -127,7 +127,7 @@ def test_sweep_of_sure_noise_equals_its_numpy_twin(channels):
 def test_depth_of_another_view_than_the_centre(view, geometry):
     """Steps counted from the wrong view, or on a grid where there is none, would shift every sample of the map."""
     light_field = random_light_field(geometry=geometry).seen_from(view)
-    parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=1, window_sigma=0.5)
+    parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=1, window_sigma=0.5, softening=0)
     sweep_and_twin(light_field, parameters, range(len(HALVES_AND_QUARTERS)))
 
 
@@ -149,7 +149,7 @@ def test_sweep_visits_the_samples_of_the_stitched_epi(disparity, geometry):
     """The fast sweep and the paper's construction (shift, concatenate, follow the line) are the same cost (Eq. 1-3)."""
     light_field = random_light_field(shape=(12, 15), geometry=geometry)
     light_field = light_field.with_range(DisparityRange(disparity - 0.5, disparity + 0.5, "given"))
-    parameters = SweepParameters(num_disparities=3, scale=0.3, window_radius=0)
+    parameters = SweepParameters(num_disparities=3, scale=0.3, window_radius=0, softening=0)
     scale = float(np.sqrt(parameters.scale**2 + residual_variance(light_field.reference_view)))
     result = sweep(light_field, parameters)
     for y, x in [(6, 7), (0, 3), (11, 14), (5, 1)]:
@@ -215,7 +215,7 @@ def test_subset_without_views_matches_nothing():
     """Seen from a corner of the grid, some parts hold no view: their cost is the worst there is, and is a number."""
     light_field = random_light_field(grid=(3, 3), shape=(40, 44)).seen_from((0, 0))
     views = halves_and_quarters(light_field)
-    parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=1, window_sigma=0.5)
+    parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=1, window_sigma=0.5, softening=0)
     result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
     empty = views.names.index("left-up")
     assert (result.cost[empty] == 1).all()

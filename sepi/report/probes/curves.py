@@ -20,6 +20,7 @@ from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.expected_costs import expected_costs
 from sepi.matching.plane_sweep import SweepParameters
+from sepi.matching.softening import softened
 from sepi.matching.sweep_arrays import sample_offsets, sampled_candidates
 from sepi.matching.view_subsets import halves_and_quarters
 
@@ -148,6 +149,8 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     weights = np.exp(-0.5 * (difference**2).sum(axis=0) / np.float32(parameters.window_sigma**2 + noise))
     weights = (weights / weights.sum()).astype(np.float32)
     scale2 = np.float32(parameters.scale**2 + noise)
+    compared = softened(light_field, parameters.softening).rgb_views
+    reference_view = as_unit_float(compared[t0, s0][np.ix_(rows, columns)]).transpose(2, 0, 1)
     views = halves_and_quarters(light_field)
     sums, counts = np.zeros((2, views.subsets.shape[1], len(disparities)), np.float32)
     baselines = light_field.baselines
@@ -160,7 +163,7 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
         # as the sweep counts: a sample on the last row or column needs none beyond it
         inside_y = (top >= 0) & ((top < H - 1) | ((top == H - 1) & (fy[t, s] == 0)[:, None]))
         inside_x = (left >= 0) & ((left < W - 1) | ((left == W - 1) & (fx[t, s] == 0)[:, None]))
-        squared = _squared_residuals(light_field.rgb_views[t, s], reference_view, top, left, fy[t, s], fx[t, s])
+        squared = _squared_residuals(compared[t, s], reference_view, top, left, fy[t, s], fx[t, s])
         residual = squared / (squared + scale2)
         if not (inside_y.all() and inside_x.all()):
             residual *= inside_y[:, :, None] & inside_x[:, None]
