@@ -1,8 +1,8 @@
-"""Error bars of a final map: from cues of how far it may be wrong, by a calibrated model.
+"""Error bars of a final map, from cues of error by a calibrated model.
 
-The error of a pixel has the distribution of :mod:`sepi.error_bars.mixture`. Its parameters follow from the cues of
-:mod:`sepi.error_bars.cues`: scales, and odds of the probabilities, are products of their powers, which are those of
-:mod:`sepi.error_bars.calibration`. docs/method/error_bars.md derives the model and says what it does not know.
+The error of a pixel has the distribution of :mod:`sepi.error_bars.mixture`. Its scales and the odds of its
+probabilities are products of powers of the cues (:mod:`sepi.error_bars.cues`), with the exponents of
+:mod:`sepi.error_bars.calibration`. docs/method/error_bars.md derives the model and states its limits.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from sepi.lightfield import DisparityRange, FloatMap
 from sepi.stage import CLOSE
 
 TAIL = 0.05
-"""Probability beyond either bound."""
+"""Probability beyond each bound."""
 
 _LOGARITHMS = (-9.0, 9.0)
-"""Of scales, in pixels per view step, and odds."""
+"""Limits of the logarithms of scales, in pixels per view step, and odds."""
 
 
 class ErrorBars(NamedTuple):
@@ -31,9 +31,9 @@ class ErrorBars(NamedTuple):
     Attributes
     ----------
     sigma : ndarray
-        Standard deviation, pixels per view step (:mod:`sepi.error_bars.mixture` says of what).
+        Standard deviation, pixels per view step, as :mod:`sepi.error_bars.mixture` defines it.
     low, high : ndarray
-        Interval that holds the disparity with a probability of 90 %.
+        Interval that holds the disparity with a probability of 90 %, pixels per view step.
     confidence : ndarray
         Probability that the error is at most :data:`sepi.stage.CLOSE`.
     """
@@ -50,11 +50,11 @@ def error_bars(disparity: FloatMap, cues: Cues, known: DisparityRange, calibrati
     Parameters
     ----------
     disparity : ndarray, shape (H, W), float32
-        Pixels per view step of which the farthest view is four away.
+        Pixels per view step; the farthest view is four view steps away.
     cues : mapping of str to ndarray, shape (H, W), float32
-        Of :mod:`sepi.error_bars.cues`, with those that the calibration asks for.
+        Cues of :mod:`sepi.error_bars.cues`, at least those of the calibration.
     known : DisparityRange
-        Which the interval does not leave.
+        The interval stays within it.
     calibration : Calibration
 
     Returns

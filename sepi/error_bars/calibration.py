@@ -1,7 +1,7 @@
-"""The numbers of the error model, as ``python -m bench errors`` fits them.
+"""Constants of the error model, fitted by ``python -m bench errors``.
 
-One set for all scenes and levels of noise, for each way of smoothing: docs/method/error_bars.md has the scenes that
-they are fitted on, and what they are worth on scenes that are left out.
+Each way of smoothing has one set for all scenes and levels of noise. docs/method/error_bars.md lists the scenes of the
+fit, and the results on scenes left out.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ CONSTANT = "constant"
 
 @dataclass(frozen=True)
 class Calibration:
-    """Powers of the cues (:mod:`sepi.error_bars.cues`) in the error distribution (:mod:`sepi.error_bars.mixture`).
+    """Exponents of the cues (:mod:`sepi.error_bars.cues`) in the error distribution (:mod:`sepi.error_bars.mixture`).
 
     Attributes
     ----------
-    scale, outlier_scale, outlier, rim : mapping of str to float
-        Cue to its power, in two scales, and in the odds of two probabilities against all being about right; of
-        ``constant`` the logarithm itself.
+    scale, outlier_scale : mapping of str to float
+        Cue to its exponent in a scale; ``constant`` is the logarithm of the factor.
+    outlier, rim : mapping of str to float
+        The same of the odds of outlier and rim, against the map being about right.
     """
 
     scale: Mapping[str, float]

@@ -1,6 +1,6 @@
-"""Cues of how far a disparity map may be wrong: in the map, in what the views say of it, of the stage before.
+"""Cues of error of a disparity map: from the map, from the views, and from the stage before.
 
-All are in view steps of which the farthest view is four away, as stages have them.
+Their unit is the stages' view step, with the farthest view four view steps away.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ HALF_CONFIDENT_DIFFERENCE = 0.01
 """Second difference that halves the smooth confidence, pixels per view step."""
 
 IGNORANCE = 0.01
-"""What a view's information of 1 / px^2 adds to the second difference there; pixels per view step."""
+"""Amount added to the second difference for an information of 1 / (pixels per view step)^2; pixels per view step."""
 
 STEP_REACH = 2
-"""Distance within which a neighbour's surface may be the pixel's own, pixels."""
+"""Distance within which a pixel may belong to a neighbour's surface, pixels."""
 
 _LONG = 8
-"""Distance of pixels between which smoothing flattens what curves, pixels."""
+"""Distance over which smoothing flattens a curved surface, pixels."""
 
 _LEAST_NOISE = 3e-4
 _LEAST = np.float32(1e-6)
@@ -52,26 +52,26 @@ FLOORS: Mapping[str, float] = {
     "range": 1e-3,
     "plane": 0.1,
 }
-"""Cue to the value below which it says no more."""
+"""Cue to its least value; smaller values count as this one."""
 
 
 def cues_of_map(disparity: FloatMap, curvature: FloatMap, known: DisparityRange) -> dict[str, FloatMap]:
-    """Cues in the map itself.
+    """Cues from the map itself.
 
     Parameters
     ----------
     disparity : ndarray, shape (H, W), float32
     curvature : ndarray, shape (H, W), float32
-        Information on the disparity by the views, before any window, 1 / (pixels per view step)^2.
+        Information of the views on each pixel's disparity, 1 / (pixels per view step)^2.
     known : DisparityRange
 
     Returns
     -------
     dict of str to ndarray, shape (H, W), float32
-        ``second_difference`` and ``point_second_difference``, absolute ones about the pixel and of it;
-        ``long_second_difference``, over distances of eight pixels, along the axis along which it is less;
-        ``smooth_confidence``, 1 for a plane that the views know and 0 beside steps; ``above`` and ``below``, how much
-        nearer and farther the nearest and the farthest neighbour are; ``range``, the width of the disparity range.
+        ``second_difference`` and ``point_second_difference``: absolute second difference, mean over 5x5 pixels and of
+        the pixel; ``long_second_difference``: over distances of eight pixels, the lesser of the two axes;
+        ``smooth_confidence``: 1 on a plane with information, 0 beside steps; ``above`` and ``below``: how much nearer
+        the nearest neighbour is, and how much farther the farthest; ``range``: width of the disparity range.
     """
     difference = np.abs(cv2.Laplacian(disparity, cv2.CV_32F))
     mean = np.maximum(_mean(difference, 5), 0)
@@ -93,24 +93,23 @@ def cues_of_map(disparity: FloatMap, curvature: FloatMap, known: DisparityRange)
 
 
 def cues_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, noise: float) -> dict[str, FloatMap]:
-    """Cues in what the views say about a map.
+    """Cues from the comparison of the views at the map's disparities.
 
     Parameters
     ----------
     gradient, curvature : ndarray, shape (H, W), float32
-        Of the cost of each pixel, before any window.
+        From :meth:`sepi.matching.gauss_newton.GaussNewton.gradient_and_hessian`.
     evidence : Evidence
     noise : float
-        Standard deviation in one channel of a view, colours in 0..1.
+        Standard deviation of the noise in one channel of a view, colours in 0..1.
 
     Returns
     -------
     dict of str to ndarray, shape (H, W), float32
-        ``deviation`` and ``wide_deviation``, the standard deviation that the information over 3x3 and 7x7 pixels
-        leaves; ``step`` and
-        ``wide_step``, by how much the cost would have the map move, over 3x3 and 15x15 pixels; ``disagreement``,
-        between the views on opposite sides about that; ``misfit``, residuals in units of the noise; ``agreement`` and
-        ``detail_agreement``, the mean robust weight of the views.
+        ``deviation`` and ``wide_deviation``: standard deviation by the information over 3x3 and 7x7 pixels; ``step``
+        and ``wide_step``: change of disparity that the cost asks for, over 3x3 and 15x15 pixels; ``disagreement``:
+        difference of this change between views on opposite sides; ``misfit``: residuals in units of the noise;
+        ``agreement`` and ``detail_agreement``: mean robust weight of the views by colours and by detail.
     """
     seeing = _mean(evidence.seeing, 3) + _LEAST
     residual = np.maximum(_mean(evidence.misfit, 3) / (_mean(evidence.agreement, 3) + _LEAST), 0)
@@ -127,7 +126,7 @@ def cues_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, n
 
 
 def cues_of_stage_before(confidence: FloatMap, plane: BoolMap) -> dict[str, FloatMap]:
-    """Cues of the stage before: its ``confidence``, the same over 15x15 pixels, and where a ``plane`` was put in."""
+    """Cues from the stage before: ``confidence``, ``wide_confidence`` over 15x15 pixels, and ``plane``, 1 on planes."""
     return {
         "confidence": confidence,
         "wide_confidence": _mean(confidence, 15),
@@ -136,19 +135,19 @@ def cues_of_stage_before(confidence: FloatMap, plane: BoolMap) -> dict[str, Floa
 
 
 def _deviation(information: FloatMap) -> FloatMap:
-    """Standard deviation that an information leaves, of which a little is always there."""
+    """Standard deviation by an information, to which a small constant is added."""
     return np.asarray(1 / np.sqrt(np.maximum(information, 0) + np.float32(1e-2)), np.float32)
 
 
 def _disagreement(evidence: Evidence, curvature: FloatMap) -> FloatMap:
-    """Standard deviation by how the updates of opposite halves of the views differ."""
+    """Standard deviation by the difference between the changes that opposite halves of the views ask for."""
     halves = [[_mean(values, 3) for values in half] for half in evidence.halves]
     whole = _mean(curvature, 3)
     least = np.float32(1e-3) * whole + np.float32(1e-2)
     total, pairs = np.zeros_like(whole), 0
     for one, other in (halves[:2], halves[2:]):
         if not (one[1].any() and other[1].any()):
-            # views of one row say nothing of up and down
+            # without views on both sides there is no difference
             continue
         difference = one[0] / (one[1] + least) - other[0] / (other[1] + least)
         total += one[1] * other[1] / (one[1] + other[1] + _LEAST) * difference**2

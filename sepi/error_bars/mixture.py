@@ -1,15 +1,15 @@
-"""Distribution of a pixel's error: mostly about the map, sometimes anywhere, and beside a step the other surface's.
+"""Distribution of a pixel's error: a mixture of small errors, outliers and, beside a step, the other surface.
 
-The true disparity differs from the map's by
+The true disparity is distributed around
 
-- noise and smoothing: a Laplace distribution of mean absolute value ``scale``;
-- with probability ``outlier``, something that the map does not know of, such as another texture that looks alike, or
-  what a glossy surface mirrors: a Laplace distribution of mean absolute value ``outlier_scale``;
-- with probability ``rim``, the surface next to it: the nearest or the farthest disparity of the neighbours, ``above``
-  or ``below``, whichever differs more being likelier, with a Laplace distribution of a fifth of that distance about it.
+- the map's, by noise and smoothing: a Laplace distribution of mean absolute error ``scale``;
+- the map's, with probability ``outlier``, where similar texture or a specular surface misleads the matching: a Laplace
+  distribution of mean absolute error ``outlier_scale``;
+- that of the surface beside the pixel, with probability ``rim``: the nearest or the farthest neighbour, at the distance
+  ``above`` or ``below``; the larger distance is more likely, and the mean absolute error is a fifth of it.
 
-The bounds leave out a probability ``tail`` on either side. The standard deviation is that of a normal distribution of
-the same expected absolute error: that of the mixture itself is decided by rare outliers.
+The bounds leave out a probability ``tail`` on each side. ``sigma`` is the standard deviation of a normal distribution
+with the same expected absolute error, since rare outliers dominate the standard deviation of the mixture itself.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from sepi.kernels import mixture as kernels
 from sepi.lightfield import FloatMap
 
 RIM_WIDTH: float = kernels.RIM_WIDTH
-"""Mean absolute deviation of the other surface's disparity, as part of its distance."""
+"""Mean absolute error about the other surface's disparity, as a share of its distance."""
 
 LEAST_RIM: float = kernels.LEAST_RIM
-"""The least of it, pixels per view step."""
+"""Least mean absolute error about the other surface's disparity, pixels per view step."""
 
 
 class Mixture(NamedTuple):
@@ -40,7 +40,7 @@ class Mixture(NamedTuple):
     outlier, rim : ndarray
         Probabilities.
     above, below : ndarray
-        Distance of the other surface, pixels per view step, at least 0.
+        Distance to the nearest and to the farthest neighbour, pixels per view step, at least 0.
     """
 
     scale: FloatMap
@@ -52,7 +52,7 @@ class Mixture(NamedTuple):
 
 
 class Described(NamedTuple):
-    """What a mixture comes to; all of shape (H, W), float32.
+    """Summary of a mixture; all of shape (H, W), float32.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Described(NamedTuple):
     below, above : ndarray
         Distances of the lower and of the upper bound, pixels per view step, at least 0.
     probability : ndarray
-        That the error is at most ``close``.
+        Probability that the error is at most ``close``.
     """
 
     sigma: FloatMap
@@ -71,7 +71,7 @@ class Described(NamedTuple):
 
 
 def described(mixture: Mixture, tail: float, close: float) -> Described:
-    """Standard deviation, interval, and probability of a small error.
+    """Standard deviation, bounds, and probability of a small error.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def described(mixture: Mixture, tail: float, close: float) -> Described:
     tail : float
         Probability beyond each bound.
     close : float
-        Pixels per view step.
+        Error that counts as small, pixels per view step.
 
     Returns
     -------

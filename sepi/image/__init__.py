@@ -1,1 +1,1 @@
-"""What is computed from one view alone: noise, edges, colours, superpixels."""
+"""Computations on one view: noise, edges, mean shift, superpixels."""

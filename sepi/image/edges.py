@@ -15,11 +15,9 @@ class CannyParameters(Parameters):
     """Parameters of the Canny edges."""
 
     canny_sigma: float = Field(1.0, gt=0, le=10, description="smoothing before the edges, in pixels")
-    canny_low: float = Field(
-        0.01, gt=0, le=1, description="gradient to which an edge is followed, grey values 0..1 per px"
-    )
+    canny_low: float = Field(0.01, gt=0, le=1, description="least gradient along an edge, grey values 0..1 per px")
     canny_high: float = Field(
-        0.025, gt=0, le=1, description="gradient at which an edge starts, grey values 0..1 per px"
+        0.025, gt=0, le=1, description="least gradient at which an edge starts, grey values 0..1 per px"
     )
 
 
@@ -65,7 +63,7 @@ def edge_angle(reference_view: FloatMap, parameters: CannyParameters) -> FloatMa
     """
     smooth = _smooth_grey(reference_view, parameters.canny_sigma)
     dx, dy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((1, 0), (0, 1)))
-    # double angles let opposite normals add up
+    # at double angles, opposite normals add up
     wide = 4 * parameters.canny_sigma
     along = cv2.GaussianBlur(dx * dx - dy * dy, (0, 0), wide)
     across = cv2.GaussianBlur(2 * dx * dy, (0, 0), wide)

@@ -1,8 +1,8 @@
-"""Mean shift [2]_, which climbs from a point to the mode of the distribution round it.
+"""Mean shift [2]_: the mode of a distribution near a point.
 
-On a patch of the image and of the depth map it confirms occlusion (section IV-B of [1]_): started at a pixel, it ends
-at the disparity of the surface that the pixel belongs to, free of the outliers that stand between two surfaces. On the
-colours of superpixels it finds those that belong together (section IV-C).
+On colour and disparity of a patch, it confirms occlusion (section IV-B of [1]_): started at a pixel, it ends at the
+disparity of that pixel's surface, free of outliers between two surfaces. On the mean colours of superpixels, it finds
+those that look alike (section IV-C).
 
 References
 ----------
@@ -29,7 +29,7 @@ _UNLIKE = np.float32(1e4)
 def patch_modes(
     image: FloatMap, disparity: FloatMap, mask: BoolMap, *, radius: int, sigma_colour: float, sigma_disparity: float
 ) -> FloatMap:
-    """Disparity of the colour-and-disparity mode that each pixel of the mask belongs to.
+    """Disparity of each masked pixel's mode in colour and disparity.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def patch_modes(
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
     mask : ndarray, shape (H, W), bool
-        The others keep their disparity.
+        Other pixels keep their disparity.
     radius : int
         The patch is ``2 radius + 1`` pixels wide and high.
     sigma_colour, sigma_disparity : float
@@ -49,7 +49,7 @@ def patch_modes(
     ndarray, shape (H, W), float32
     """
     H, W, C = image.shape
-    # the last of them is disparity; beyond the picture nothing is alike
+    # channels and disparity; values beyond the picture are like no others
     planes = np.full((4, H + 2 * radius, W + 2 * radius + _ROOM), _UNLIKE, np.float32)
     within = planes[:, radius : radius + H, radius : radius + W]
     within[:3] = 0
@@ -61,7 +61,7 @@ def patch_modes(
 
 
 def sample_modes(samples: npt.NDArray[np.float64], bandwidth: float) -> npt.NDArray[np.float64]:
-    """Mode that each of a few thousand samples belongs to, by a Gaussian kernel.
+    """Mode of each of a few thousand samples, by a Gaussian kernel.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def sample_modes(samples: npt.NDArray[np.float64], bandwidth: float) -> npt.NDAr
     Returns
     -------
     ndarray, shape (N, D), float64
-        Samples of one cluster get the same point but for the tolerance.
+        Samples of one cluster get the same mode, up to a tolerance.
     """
     modes = np.array(samples, np.float64, order="C")
     kernels.sample_modes(modes.copy(), bandwidth, modes)

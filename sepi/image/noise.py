@@ -1,4 +1,4 @@
-"""Noise of the reference view: what a residual of two equal surfaces looks like before anything else goes wrong."""
+"""Noise of the reference view, and the residuals that it causes between views of the same surface."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.workspace import OfViews, kept_of
 
 BLACK, SATURATED = 0.01, 254 / 255
-"""As dark and as bright as can be told: beyond, noise is cut off."""
+"""Values beyond which a pixel counts as black or overexposed: the limits of the range cut its noise off."""
 
 _LEAST_SHARE = 0.01
-"""Of the samples that must hold a signal; with fewer, all are measured."""
+"""Least share of samples with a signal; with fewer, all samples are measured."""
 
-# a second difference along both axes: blind to planes and to straight edges along the axes (Immerkaer 1996,
-# doi:10.1006/cviu.1996.0060); its response to white noise of standard deviation 1 has standard deviation 6
+# second difference along both axes, 0 on planes and on straight edges along the axes (Immerkaer 1996,
+# doi:10.1006/cviu.1996.0060); white noise of standard deviation 1 gives a response of standard deviation 6
 _MASK = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
 _MEDIAN_TO_SIGMA: float = 1 / 0.6745
 
 
 def noise_level(image: FloatMap, region: BoolMap | None = None) -> float:
-    """Standard deviation of the noise in one channel, by the median of the mask's response.
+    """Standard deviation of the noise in one channel, by the median response of a second difference.
 
-    The median, where Immerkaer takes the mean, leaves out edges and most texture. What is black, saturated or exactly
-    flat has none of the noise that the rest has, and would drag the median to nothing.
+    Unlike Immerkaer's mean, the median leaves out edges and most texture. Black, overexposed and exactly flat samples
+    have no noise and are left out.
 
     Parameters
     ----------
     image : ndarray, shape (H, W, C), float32
         Values in 0..1.
     region : ndarray, shape (H, W), bool, optional
-        Where to measure, whatever is there; where there is a signal unless given.
+        Pixels that are measured, with or without a signal; default: all that have a signal.
 
     Returns
     -------
     float
-        In the image's units, 0..1; 0 over no pixels.
+        Colours in 0..1; 0 without pixels.
     """
     response = np.abs(_response(image))
     if region is None:
@@ -51,13 +51,13 @@ def noise_level(image: FloatMap, region: BoolMap | None = None) -> float:
 
 @dataclass
 class _Kept(OfViews):
-    """The noise of the reference view."""
+    """Noise of the reference view, kept in a workspace."""
 
     noise: float | None = None
 
 
 def noise_of_reference_view(light_field: LightField) -> float:
-    """:func:`noise_level` of the reference view; in a workspace found once."""
+    """:func:`noise_level` of the reference view; a workspace keeps it."""
     kept = kept_of(light_field, _Kept)
     if kept.noise is None:
         kept.noise = noise_level(light_field.reference_view)
@@ -65,7 +65,7 @@ def noise_of_reference_view(light_field: LightField) -> float:
 
 
 def mask_energy(image: FloatMap) -> FloatMap:
-    """Squared response of the mask (H, W), mean over the channels: of white noise its variance, on average."""
+    """Squared response of the second difference, mean over channels; in white noise its mean is the variance."""
     return np.asarray(np.square(_response(image).reshape(image.shape) / 6).mean(axis=2), np.float32)
 
 
@@ -74,7 +74,7 @@ def _response(image: FloatMap) -> FloatMap:
 
 
 def _with_signal(image: FloatMap) -> BoolMap:
-    """Samples (H, W, C) whose 3x3 neighbourhood is neither cut off as a whole nor flat; all where these are few."""
+    """Samples (H, W, C) whose 3x3 neighbourhood is not all black, all overexposed or flat; all if these are few."""
     box = np.ones((3, 3), np.uint8)
     lowest, highest = (change(image, box).reshape(image.shape) for change in (cv2.erode, cv2.dilate))
     found = (highest > BLACK) & (lowest < SATURATED) & (lowest < highest)
@@ -82,15 +82,15 @@ def _with_signal(image: FloatMap) -> BoolMap:
 
 
 def residual_variance(image: FloatMap) -> float:
-    """Expected squared residual, summed over channels, between two views of the same surface: noise of both views."""
+    """Expected squared residual, summed over channels, of two views of the same surface by the noise of both."""
     return variance_of_residuals(noise_level(image), image.shape[2])
 
 
 def reference_residual_variance(light_field: LightField) -> float:
-    """:func:`residual_variance` of the reference view; in a workspace its noise is found once."""
+    """:func:`residual_variance` of the reference view; a workspace keeps its noise."""
     return variance_of_residuals(noise_of_reference_view(light_field), light_field.reference_view.shape[2])
 
 
 def variance_of_residuals(noise: float, channels: int) -> float:
-    """The same of views with this noise and so many channels."""
+    """Expected squared residual, summed over channels, of two views with this noise."""
     return float(2 * channels * noise**2)

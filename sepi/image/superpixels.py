@@ -1,4 +1,4 @@
-"""Superpixels of the reference view: their geometry, neighbours, and which of them look alike (section IV-C of [1]_).
+"""Superpixels of the reference view: geometry, neighbours, and likeness of colour (section IV-C of [1]_).
 
 References
 ----------
@@ -24,7 +24,7 @@ IntArray = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Superpixels:
-    """A partition of the image.
+    """A partition of an image into superpixels.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Superpixels:
 
 @dataclass(frozen=True)
 class Adjacency:
-    """Pairs of superpixels that touch.
+    """Pairs of superpixels with a common border.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Adjacency:
     midpoints: FloatArray
 
     def subset(self, keep: BoolMap) -> Adjacency:
-        """Some of the pairs."""
+        """The pairs for which ``keep``, shape (E,), is set."""
         return Adjacency(self.first[keep], self.second[keep], self.lengths[keep], self.midpoints[keep])
 
 
@@ -97,13 +97,13 @@ def superpixels(reference_view: FloatMap, size: int, compactness: float) -> Supe
     size : int
         Pixels.
     compactness : float
-        Weight of nearness against likeness of colour, as in scikit-image.
+        Weight of distance relative to colour, as in scikit-image.
     """
     from skimage.segmentation import slic
 
     H, W = reference_view.shape[:2]
     turned, turned_back = _upright(reference_view)
-    # an odd step and as much beyond either side: seeds lie about the centre alike, and no pixel midway between two
+    # an odd step and equal padding: seeds are symmetric about the centre, and no pixel lies midway between two
     step = size | 1
     beyond = [(n + step * (n % 2)) // 2 for n in (-turned.shape[0] % step, -turned.shape[1] % step)]
     padded = np.pad(turned, [(n, n) for n in (*beyond, 0)], "edge")
@@ -124,9 +124,9 @@ def superpixels(reference_view: FloatMap, size: int, compactness: float) -> Supe
 
 
 def _upright(view: FloatMap) -> tuple[FloatMap, Callable[[IntArray], IntArray]]:
-    """A view turned so that it gets brighter downwards, less so to the right; and what turns a map back.
+    """A view turned so that it gets brighter mostly downwards, then to the right, and the function that turns back.
 
-    SLIC begins at the upper left and goes on row by row: so it finds the same superpixels whichever way is up.
+    SLIC depends on the order of rows and columns; this way it finds the same superpixels in a turned view.
     """
     grey = view.sum(axis=2, dtype=np.float64)
     down, across = (
@@ -141,7 +141,7 @@ def _upright(view: FloatMap) -> tuple[FloatMap, Callable[[IntArray], IntArray]]:
 
 
 def adjacency(segments: Superpixels) -> Adjacency:
-    """Which superpixels touch, along how many pixel sides, and where."""
+    """Pairs of superpixels that touch, with the length and the middle of their border."""
     labels = segments.labels
     pieces = []
     for a, b, offset in (
@@ -179,7 +179,7 @@ def colour_modes(reference_view: FloatMap, segments: Superpixels, bandwidth: flo
     from sepi.image.mean_shift import sample_modes
 
     hue, saturation, value = np.moveaxis(cv2.cvtColor(reference_view, cv2.COLOR_RGB2HSV), 2, 0)
-    # hue is an angle that means little where colour is weak, so it goes into a cone
+    # hue is an angle, unreliable for weak colours: in a cone, both are right
     chroma = saturation * value
     cone = (chroma * np.cos(np.radians(hue)), chroma * np.sin(np.radians(hue)), value)
     samples = np.stack([segments.means(axis) for axis in cone], axis=1)

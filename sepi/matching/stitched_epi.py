@@ -4,8 +4,8 @@ An EPI ``E_{y,t}(x, s)`` stacks row ``y`` of the views of grid row ``t``. A scen
 line ``x = x0 - d (s - s0)`` into it, and a parallel line into each corresponding EPI ``E_{y_j,t_j}`` with
 ``y_j = y0 - d (t_j - t0)``. Shifting the EPI of ``j = t_j - t0`` by ``-d N_s j`` (Eq. 2; the paper writes ``j N_s /
 k`` with the slope ``k = 1/d`` and the opposite sign convention) puts all lines onto one, and concatenating them (Eq.
-1) gives an image with ``N_t N_s`` rows. Where views stand off the grid, or rows another distance apart, their baselines
-take the place of ``t - t0`` and ``s - s0``, so that lines stay straight.
+1) gives an image with ``N_t N_s`` rows. If views stand off the grid, or rows another distance apart, their baselines
+replace ``t - t0`` and ``s - s0``, so that lines stay straight.
 
 The estimator does not build these images: :mod:`sepi.matching.plane_sweep` visits the same samples directly.
 
@@ -30,8 +30,7 @@ from sepi.validation import described, is_finite, require_type
 class StitchedEpi:
     """A SEPI through one row of the reference view for one candidate disparity.
 
-    The rows keep their own samples; ``offsets`` says how far each is shifted. Only drawing resamples them, so samples
-    along the line are as exact as the views.
+    Rows are not resampled: ``offsets`` holds their shifts. Only :meth:`image` resamples them.
 
     Attributes
     ----------
@@ -114,7 +113,7 @@ class StitchedEpi:
 
 
 def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedEpi:
-    """Build the SEPI through one row of the reference view for one candidate (section III, Eq. 1-2 of [1]_).
+    """The SEPI through one row of the reference view for one candidate (section III, Eq. 1-2 of [1]_).
 
     Parameters
     ----------
@@ -181,7 +180,7 @@ def line_cost(light_field: LightField, y: int, x: int, disparity: float, scale: 
     disparity : float
         Candidate, pixels per view step.
     scale : float
-        Residual at which ``r^2 / (r^2 + scale^2)`` is one half; colours in 0..1.
+        Residual ``r`` at which the cost ``r^2 / (r^2 + scale^2)`` is one half; colours in 0..1.
 
     Returns
     -------

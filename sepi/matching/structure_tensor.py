@@ -1,13 +1,13 @@
-"""Slope of single EPIs by the structure tensor, the initial depth that the paper's ablation compares with.
+"""Disparity and coherence from the structure tensor of single EPIs, the initial depth of the paper's ablation.
 
-On the horizontal EPI through a pixel (fixed ``y`` and ``t0``) and on the vertical one (fixed ``x`` and ``s0``), the
-structure tensor gives the direction along which the image does not change, hence the disparity, and a coherence. The
-more coherent of the two EPIs decides [1]_. Only the views of the centre row and column take part.
+The structure tensor gives the direction in which an EPI does not change, and so a disparity, and a coherence. It is
+computed on the horizontal EPI through a pixel (fixed ``y`` and ``t0``) and on the vertical one (fixed ``x`` and
+``s0``); the more coherent EPI decides [1]_. Only the views of the centre row and column take part.
 
-Finite differences between neighbouring views are right for disparities below about half a pixel, so the EPIs are first
-sheared by every whole disparity of the range, and the most coherent estimate that stays within its shear is kept. Where
-rows are further apart than columns, it is every whole disparity per row. Views that stand off the grid are sheared by
-where they really stand, along and across their EPI, and those less than a tenth of a step from another are left out.
+Finite differences between neighbouring views are right for disparities below about half a pixel. So the EPIs are
+sheared by every whole disparity of the range, or every whole disparity per row if rows are farther apart than columns.
+The most coherent estimate within ``shear_reach`` of its shear wins. Views off the grid are sheared by their baselines,
+along and across the EPI; views less than a tenth of a step from another are left out.
 
 References
 ----------
@@ -43,7 +43,7 @@ class StructureTensorParameters(Parameters):
 
 
 def structure_tensor_depth(light_field: LightField, parameters: StructureTensorParameters) -> tuple[FloatMap, FloatMap]:
-    """Disparity and coherence of the more coherent of the horizontal and the vertical EPI.
+    """Disparity and coherence of the more coherent EPI, horizontal or vertical.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
     Raises
     ------
     SepiError
-        If the reference view is alone in its row and in its column.
+        If the reference view is the only view of its row and of its column.
     """
     t0, s0 = light_field.reference_position
     known = light_field.require_disparity_range()
@@ -71,9 +71,9 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
         raise SepiError(
             f"{light_field.name}: the structure tensor needs a second view in the row or the column of view {t0},{s0}"
         )
-    # closer together, the same shears are finer than they need to be
+    # steps below 1 would need no finer shears
     steps = np.maximum(grid_steps(light_field), 1).tolist()
-    # along rows first: where both EPIs are equally coherent, the horizontal one decides
+    # rows first: the horizontal EPI decides where both are equally coherent
     for axis in (1, 0):
         baselines, images = _of_one_line(light_field, axis, steps[axis])
         if len(images) < 2:
@@ -93,7 +93,7 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
 def _of_one_line(light_field: LightField, axis: int, step: float) -> tuple[npt.NDArray[np.float64], list[FloatMap]]:
     """Views of the reference view's row (``axis`` 1) or column (0): baselines (N, 2) in ``step``, and pictures.
 
-    A vertical EPI is the horizontal one of the transposed views, so all about a column is transposed.
+    For a column, pictures and baselines are transposed, so that its EPI is a horizontal one.
     """
     t0, s0 = light_field.reference_position
     line = np.s_[t0] if axis else np.s_[:, s0]
@@ -108,7 +108,7 @@ def _sheared(
     baselines: npt.NDArray[np.float64], images: list[FloatMap], shear: int, parameters: StructureTensorParameters
 ) -> tuple[FloatMap, FloatMap]:
     """Disparity and coherence at the reference view from horizontal EPIs sheared by a whole disparity."""
-    # after the shear a surface of disparity `shear` stands still from view to view
+    # after the shear, a surface of disparity `shear` has the same position in all views
     moved = np.stack([_shifted(image, shear * baseline) for baseline, image in zip(baselines, images, strict=True)])
     smooth = np.stack([_blurred(view, parameters.inner_sigma) for view in moved])
     along_x = np.stack([cv2.Sobel(view, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8) for view in smooth])
@@ -130,7 +130,7 @@ def _sheared(
 
 
 def _shifted(image: FloatMap, pixels: npt.NDArray[np.float64]) -> FloatMap:
-    """Image moved so many pixels down and to the right, edges repeated; by cubic convolution between pixels [2]_."""
+    """Image moved by ``pixels`` down and to the right, by cubic convolution [2]_; its borders are repeated."""
     for axis, distance in enumerate(pixels.round(6)):
         if not distance:
             continue

@@ -1,6 +1,6 @@
-"""Arrays that plane sweeps work on, in named groups: what their kernels take.
+"""Arguments of the plane sweeps' kernels: arrays in named groups.
 
-In C++ each is a struct of the same fields in the same order.
+In C++ each group is a struct of the same fields in the same order.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from sepi.lightfield import BoolMap, FloatMap
 
 
 class ViewStack(NamedTuple):
-    """The views that are compared.
+    """Views of a sweep.
 
     Attributes
     ----------
@@ -25,11 +25,11 @@ class ViewStack(NamedTuple):
     groups : ndarray, shape (T, S), int64
         Group of each view, 0..G-1; -1 leaves a view out.
     subsets : ndarray, shape (N, G), bool
-        Which groups make up each subset.
+        Groups of each subset.
     scale2 : float32
         Square of the robust scale, in the units of the colours.
     shown : ndarray, shape (T, S, H, 2) or (T, S, 0, 2), int64
-        First column that each row of a view shows, and the one after the last; empty: all views show all.
+        First column with pixels in each row of a view, and the column after the last; empty: all columns have pixels.
     """
 
     colours: npt.NDArray[Any]
@@ -42,9 +42,9 @@ class ViewStack(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """Candidate disparities, and where the samples of a reference pixel lie in each view.
+    """Candidate disparities, and the positions of a reference pixel's samples in each view.
 
-    Views equally far down, as those of a row of the grid are, share an entry; likewise across.
+    Views with the same baseline down, such as those of one row of the grid, share an entry; likewise across.
 
     Attributes
     ----------
@@ -53,13 +53,13 @@ class Candidates(NamedTuple):
     row, column : ndarray, shape (T, S), int64
         Number of each view's entry down, 0..V-1, and across, 0..U-1.
     down, across : ndarray, shape (V, K) and (U, K), int64
-        Whole pixels from a reference pixel to its sample; an entry never falls, or never rises, along the candidates.
+        Whole pixels from a reference pixel to its sample; monotonic along the candidates.
     fy, fx : ndarray, shape (V, K) and (U, K), float32
         Fractional pixels beyond, 0..1.
     sy, sx : ndarray, shape (V,) and (U,), float32
-        By how many pixels the sample moves as the disparity rises by one.
+        Shift of the sample in pixels per unit of disparity.
     reach : float
-        Pixels to the farthest sample, along either axis.
+        Distance to the farthest sample along either axis, pixels.
     """
 
     disparities: FloatMap
@@ -75,7 +75,7 @@ class Candidates(NamedTuple):
 
 
 class Window(NamedTuple):
-    """Aggregation window: ``2 radius + 1`` pixels wide, its weights narrow in colour.
+    """Aggregation window, ``2 radius + 1`` pixels wide, with weights by colour.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Window(NamedTuple):
         Reference view.
     radius : int
     variance : float32
-        Squared colour distance at which the weights fall off.
+        Squared colour distance that scales the weights.
     """
 
     guide: FloatMap
@@ -92,17 +92,18 @@ class Window(NamedTuple):
 
 
 class ExpectedCosts(NamedTuple):
-    """What noise makes of costs: see :mod:`sepi.matching.expected_costs`.
+    """Expected costs of noise; :mod:`sepi.matching.expected_costs` derives them.
 
     Attributes
     ----------
     moments : ndarray, shape (2, N, K'), float32
-        Of each subset of the views, and candidate, means of the sum of squared weights, and of its square, less what
-        they are anywhere. ``K'`` is the number of candidates, rounded up to whole vectors.
+        Means of the sum of squared interpolation weights, and of its square, for each subset of the views and
+        candidate, minus their means over all positions. ``K'`` is the number of candidates, rounded up to whole
+        vectors.
     weights : ndarray, shape (2, H, W), float32
-        Times them, of each pixel, and summed: the part of a match that noise takes more than anywhere.
+        Factors of the two moments at each pixel; the sum of the products is the correction of the cost.
     anywhere : ndarray, shape (H, W), float32
-        Cost that noise alone makes anywhere.
+        Expected cost of noise alone, over all positions.
     """
 
     moments: FloatMap
@@ -111,21 +112,21 @@ class ExpectedCosts(NamedTuple):
 
 
 class Visibility(NamedTuple):
-    """In which views a pixel is seen, and in which it is looked for at which candidates.
+    """Which views see a pixel, and which candidates each view compares.
 
     Attributes
     ----------
     nearest : ndarray, shape (T, S, n, W) or (T, S, n, 0), float32
-        From :func:`sepi.matching.nearest_surfaces.nearest_surfaces`, of the rows that the views' detail has; empty: all
-        views see all pixels. In memory there are :data:`sepi.kernels.LANES` numbers more behind it.
+        From :func:`sepi.matching.nearest_surfaces.nearest_surfaces`, for the rows of the views' detail; empty: all
+        views see all pixels. The memory goes on for :data:`sepi.kernels.LANES` numbers after its end.
     occlusion_margin : float32
         By how much an occluder must be nearer, pixels per view step.
     occluded_view_weight : float32
-        Weight of a view in which the pixel is occluded; none where the view has no pixel.
+        Weight of a view in which the pixel is occluded; 0 where the view has no pixel.
     searched : ndarray, shape (T, S), bool
-        The views that compare all candidates. Others compare the likely ones.
+        Views that compare all candidates; the others compare the likely ones.
     likely : ndarray, shape (2, H, W) or (2, 0, 0), int32
-        The first and the last of these, 0..K-1; empty where all views compare all candidates.
+        First and last of the likely candidates, 0..K-1; empty if all views compare all candidates.
     """
 
     nearest: FloatMap
@@ -136,7 +137,7 @@ class Visibility(NamedTuple):
 
 
 def sampled_candidates(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> Candidates:
-    """Candidates ``(K,)`` and where views of these baselines ``(T, S, 2)`` have the samples of a reference pixel."""
+    """Candidates ``(K,)`` and their sample positions in views of these baselines ``(T, S, 2)``."""
     (down, row), (across, column) = (np.unique(baselines[..., axis], return_inverse=True) for axis in (0, 1))
     entries = (*sample_offsets(disparities, down), *sample_offsets(disparities, across))
     moves = (-down).astype(np.float32), (-across).astype(np.float32)

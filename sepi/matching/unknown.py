@@ -1,14 +1,13 @@
-"""Pixels that no view knows anything about, and what becomes of them in the final maps.
+"""Pixels for whose depth no view has evidence, and their mask in the final maps.
 
-A depth map has a value everywhere. At some pixels it is a guess for which there is no evidence at all:
+A depth map has a value everywhere. It is a mere guess in
 
-- regions without a signal, where the view is as dark as nothing, or at full scale, and varies no more than its noise: a
-  black background, what is overexposed;
+- regions without a signal: black or overexposed, and varying no more than their noise;
 - the dark corners that a lens leaves (vignettes), which stray light may lift above black;
-- pixels that hardly any other view holds: at their disparity they lie outside the others' pictures; and those that the
-  reference view itself does not show.
+- pixels that lie, at their disparity, outside nearly all other views;
+- pixels that the reference view itself does not show.
 
-A bare wall is none of these: it is neither black nor overexposed, and what it borders on tells its depth.
+A bare wall is none of these: its border tells its depth.
 """
 
 from __future__ import annotations
@@ -26,44 +25,45 @@ from sepi.stage import HIGH, LOW, SIGMA, StageMaps
 from sepi.validation import require_map
 
 UNKNOWN = "unknown"
-"""Name of the map."""
+"""Name of the mask."""
 
 BLACK = 0.01
-"""As dark as nothing: brightness as part of the brightest there is..."""
+"""Highest brightness of a black region, as a share of the picture's brightest value."""
 
 LENS_CORNER = 0.05
-"""...and where a region holds a corner of the picture, which stray light may have lifted."""
+"""The same of a region that holds a corner of the picture: stray light may lift it above black."""
 
 LEAST_SHARE = 2e-3
-"""Part of the picture below which a region without a signal belongs to what surrounds it..."""
+"""Least share of the picture that a region without a signal takes; a smaller one belongs to its surroundings."""
 
 LEAST_AREA = 100
-"""...and so does one of fewer pixels."""
+"""Least number of pixels of such a region."""
 
 LEAST_VIEWS = 2
-"""Other views that must hold a pixel, where there are as many."""
+"""Number of other views that must hold a pixel; all of them if there are fewer."""
 
-# squared gradients are averaged over so many pixels each way; more than so many times what noise explains is a signal
+# pixels across and down over which squared gradients are averaged
 _WINDOW = 5
+# a mean beyond this multiple of what noise explains is a signal
 _NOISE_FACTOR = 4.0
-# white noise hardly ever exceeds so many of its standard deviations
+# white noise hardly ever exceeds this multiple of its standard deviation
 _NOISE_REACH = 4.0
-# views whose mean tells faint texture from noise
+# number of views whose mean tells faint texture from noise
 _MOST_AVERAGED = 16
-# share of a view's squared gradients that stays in the mean of many views where it is texture; of noise less stays,
-# though neighbours from one sensor have some of it in common
+# share of the squared gradients of texture that stays in the mean of many views; less stays of noise, although
+# neighbouring views of one sensor have some noise in common
 _SHARED = 0.5
-# noise beyond this part of the brightest there is would be texture
+# noise beyond this share of the brightest value would be texture
 _MOST_NOISE = 0.03
-# least noise: rounding of integers, in levels; of floats
+# least noise: rounding of integers, in levels, and of floats
 _ROUNDING = 0.3
 _FLOAT_ROUNDING = 1e-5
 
 
 def with_unknown(light_field: LightField, maps: StageMaps) -> StageMaps:
-    """A variant's final maps with the mask ``unknown``; the disparity there stays as it is, but may be any.
+    """A variant's final maps with the mask ``unknown``.
 
-    The confidence is 0 there, and where there are error bars, the interval is the whole range.
+    Unknown pixels keep their disparity. Their confidence is 0; error bars, if there are any, cover the whole range.
 
     Parameters
     ----------
@@ -79,17 +79,17 @@ def with_unknown(light_field: LightField, maps: StageMaps) -> StageMaps:
     extra = {UNKNOWN: unknown}
     if maps.sigma is not None:
         lowest, highest = light_field.require_disparity_range().candidates(2)
-        # of all disparities being as likely
+        # standard deviation of a uniform distribution over the range
         anywhere = {SIGMA: (highest - lowest) / np.float32(12) ** 0.5, LOW: lowest, HIGH: highest}
         extra |= {name: np.where(unknown, np.float32(value), maps.extra[name]) for name, value in anywhere.items()}
     return maps.updated(maps.disparity, np.where(unknown, np.float32(0), maps.confidence), **extra)
 
 
 def unknown_pixels(light_field: LightField, disparity: FloatMap) -> BoolMap:
-    """Pixels that no view knows anything about: black, overexposed, in a lens's dark corner, or held by few views.
+    """Pixels for whose depth no view has evidence: black, overexposed, in a lens's dark corner, or held by few views.
 
-    :func:`sepi.estimate_depth` gives them as the mask ``unknown``; this is for the maps of other programs.
-    docs/reference/outputs.md says what counts.
+    :func:`sepi.estimate_depth` returns them as the mask ``unknown``. Use this function for maps of other programs.
+    docs/reference/outputs.md has the thresholds.
 
     Parameters
     ----------
@@ -122,13 +122,13 @@ def unknown_pixels(light_field: LightField, disparity: FloatMap) -> BoolMap:
 
 
 def without_signal(light_field: LightField, disparity: FloatMap) -> BoolMap:
-    """Regions that are black, or at full scale, with nothing above the noise.
+    """Regions that are black or overexposed, and vary no more than their noise.
 
     Parameters
     ----------
     light_field : LightField
     disparity : ndarray, shape (H, W), float32
-        Pixels per view step. What views agree about at these disparities is no noise.
+        Pixels per view step. Detail on which the views agree at these disparities is texture, not noise.
 
     Returns
     -------
@@ -136,21 +136,21 @@ def without_signal(light_field: LightField, disparity: FloatMap) -> BoolMap:
     """
     view, dtype = light_field.reference_view, light_field.views.dtype
     rounding = _FLOAT_ROUNDING if dtype == np.float32 else _ROUNDING / full_scale(dtype)
-    # plane by plane: along the channels, NumPy is slow
+    # NumPy is slow along the channels
     channels = cv2.split(view)
     energy, brightness = _energy(view), np.maximum.reduce(channels)
     bright = np.minimum.reduce(channels) >= SATURATED
     found = _large(_beside(bright & (energy < _of_noise(rounding)), bright))
     white = float(np.quantile(brightness, 0.999))
-    # without the noise of single pixels
+    # brightness with less noise
     level = np.maximum.reduce(cv2.split(cv2.blur(view, (3, 3))))
     most = min(noise_of_reference_view(light_field), _MOST_NOISE * white)
     for share, at_corners in ((BLACK, False), (LENS_CORNER, True)):
         limit = share * white
-        # texture passes for noise; where it is dark there may be less of both
+        # texture counts as noise; a dark region may have less of both than the whole view
         noise = max(min(most, noise_level(view, level <= limit + most)), rounding)
         even = level <= limit + noise
-        # a single bright pixel in the dark is noise, too
+        # single brighter pixels in the dark are noise, too
         dark = even | (brightness <= limit + _NOISE_REACH * noise)
         core = even & (energy < _of_noise(noise))
         if _large(_beside(core, dark), at_corners).any():
@@ -169,7 +169,7 @@ def held_by_few(light_field: LightField, disparity: FloatMap) -> BoolMap:
     y, x = (side.ravel() for side in np.mgrid[:H, :W])
     finite = np.isfinite(disparity)
     d, held = np.where(finite, disparity, np.nan).ravel().astype(np.float64), np.zeros(H * W, np.int64)
-    # the nearest views hold all that lies farther from the border than it moves in them
+    # the nearest views hold every pixel that lies farther from the border than its shift in them
     baselines = light_field.baselines
     nearest = [baselines[t, s] for t, s in others[:least]]
     moved = math.ceil(float(np.abs(disparity[finite]).max(initial=0)) * float(np.abs(nearest).max(initial=0)))
@@ -199,7 +199,7 @@ def _nearest_first(light_field: LightField) -> npt.NDArray[np.int64]:
 
 
 def _mean_of_dark(light_field: LightField, disparity: FloatMap, limit: float) -> tuple[FloatMap, FloatMap]:
-    """Mean of the views that are no brighter than ``limit`` where they see a pixel, and their number.
+    """Mean over the views in which a pixel is no brighter than ``limit``, and the number of these views.
 
     Returns
     -------
@@ -225,9 +225,9 @@ def _mean_of_dark(light_field: LightField, disparity: FloatMap, limit: float) ->
 
 
 def _energy(image: FloatMap) -> FloatMap:
-    """Squared gradients of an image (H, W, 3), summed over channels, mean over a window; shape (H, W)."""
+    """Squared gradients of an image (H, W, 3), summed over channels and averaged over a window; shape (H, W)."""
     squares: Any = 0
-    # plane by plane: along the channels, NumPy is slow
+    # NumPy is slow along the channels
     for channel in cv2.split(image):
         down, across = np.gradient(channel)
         squares = squares + (down**2 + across**2)
@@ -235,20 +235,20 @@ def _energy(image: FloatMap) -> FloatMap:
 
 
 def _of_noise(noise: float) -> float:
-    """Energy up to which there is nothing but noise of this standard deviation."""
-    # central differences halve the noise along each of the two axes; three channels
+    """Highest energy (:func:`_energy`) that noise of this standard deviation explains."""
+    # central differences halve the variance; two axes, three channels
     return _NOISE_FACTOR * 3 * noise**2
 
 
 def _beside(core: BoolMap, region: BoolMap) -> BoolMap:
-    """The pixels of a region whose window, or that of a neighbour, reaches into its core."""
-    # a window that reaches beyond the region is not flat, nor are its outermost pixels
+    """The pixels of a region whose window, or that of a neighbour, touches the core."""
+    # windows at the region's border reach beyond it and so are not flat
     reach = np.ones((_WINDOW + 2, _WINDOW + 2), np.uint8)
     return np.asarray(region & (cv2.dilate(core.astype(np.uint8), reach) > 0))
 
 
 def _large(region: BoolMap, at_corners: bool = False) -> BoolMap:
-    """The connected parts of a region that are large enough for a background, and hold a corner of the picture."""
+    """Connected parts of a region that are large enough; ``at_corners`` keeps those at the picture's corners only."""
     _, labels, figures, _ = cv2.connectedComponentsWithStats(region.astype(np.uint8), connectivity=4)
     kept = figures[:, cv2.CC_STAT_AREA] >= max(LEAST_AREA, LEAST_SHARE * region.size)
     if at_corners:

@@ -1,13 +1,15 @@
-"""Noise of the views by brightness and by place, from the views themselves.
+"""Noise of the views by brightness and by place, measured in the views themselves.
 
-Two bounds from above, of which the lower one holds. Within a view, what the flattest blocks of a brightness vary by:
-texture adds to it. Between views, by what a block differs from others at whole pixels from it, nothing being
-interpolated: where texture fits, however strong, the noise of two pixels is left; where no whole pixel fits, or a
-surface is hidden or shines, or the cameras' pictures are not alike, more is left. So the best tenth of blocks tells.
-The mean of a block does not count, which exposure may change from view to view.
+Two measurements give upper bounds, and the lower bound counts:
 
-Where texture is all over a brightness, both are too high. Photons that a tone curve of a power makes into values have
-noise that is a power of brightness, too; what lies far above the line of the lower brightnesses' noise is none.
+- within a view: how much the flattest blocks of a brightness vary. Texture adds to this;
+- between views: the least difference of a block from blocks of other views, moved by whole pixels and so without
+  interpolation. Where texture matches, only the noise of two pixels is left. More is left where no whole pixel fits,
+  the surface is hidden or specular, or the cameras differ, so the best tenth of the blocks counts. The mean of a block
+  is taken off, since the exposure may change from view to view.
+
+Both bounds are too high for a brightness that has texture everywhere. Photon noise behind a power-law tone curve is a
+power of brightness, so a bound far above the line through the lower ones is cut down to this line.
 """
 
 from __future__ import annotations
@@ -24,74 +26,71 @@ from sepi.kernels import view_noise as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 
 VIEWS = 12
-"""Nearest other views that are compared, at least: of those equally far away all."""
+"""Least number of other views that are compared, nearest first; equally distant views all take part."""
 
 MOST_MOVES = 400
-"""Beyond so many whole pixels of all of them no other view is compared: where disparities are large, few will do."""
+"""Number of whole-pixel moves, over all views, after which no other view is added."""
 
 LEVELS = 8
-"""Of brightness, each with as many blocks as the next."""
+"""Number of brightness levels; each has as many blocks as the next."""
 
 PARTS = 4
-"""Of the picture, down and across."""
+"""Number of parts of the picture, down and across."""
 
 BEST_SHARE = 0.1
-"""Of the blocks of a brightness, or of a part, that tell its noise."""
+"""Share of the blocks of a brightness, or of a part of the picture, that tell its noise."""
 
-# the best tenth of blocks of nothing but noise has so much less of it than all: measured on white noise
+# variance of all blocks divided by that of the best tenth, measured on white noise
 _OF_ONE_VIEW, _OF_VIEWS = 1.23, 1.25
 
 _ROUNDING = 0.29
-"""Standard deviation of what rounding to whole levels adds."""
+"""Standard deviation of rounding to whole levels."""
 
 _LEAST = 1e-5
-"""The same of single precision."""
+"""Standard deviation of rounding to single precision."""
 
 _LOWER_SHARE = 0.25
-"""Of the brightnesses, those whose noise may be below the line."""
+"""Share of the brightness levels whose noise lies below the line."""
 
 _BENT = 2.0
-"""Times the line that a variance may be: real tone curves are bent, and reading adds noise to the photons'."""
+"""Highest variance as a multiple of the line's: real tone curves are bent, and read noise adds to photon noise."""
 
 _SLOPES = np.linspace(-1.5, 1.5, 13)
-"""Powers of brightness that a variance may go with: photons' noise and that of reading, seen through a camera's tone
-curve or as it is."""
+"""Powers of brightness that are tried for the variance: photon noise and read noise, with or without a tone curve."""
 
 _TRUSTED = 0.85
-"""Agreement of the two bounds from which on a brightness may have more noise than the line, and a part of the picture
-more than its brightness."""
+"""Least agreement of the two bounds at which they count even above the line, or above the noise of the brightness."""
 
 _ENOUGH = 25
-"""Blocks of a brightness, or of a part of the picture, from which on it is told that they may not have more noise: the
-best tenth of fewer scatters by itself."""
+"""Least number of blocks for which these limits apply: the best tenth of fewer blocks scatters too much."""
 
 WINDOW = (9, 9)
-"""Of a pixel's own noise, and of its brightness, pixels."""
+"""Pixels over which a pixel's own noise and its brightness are averaged."""
 
 _MOST_OF_USUAL = 4.0
-"""Times the noise of its brightness and place that a pixel may have: beyond, it is texture."""
+"""Highest variance of a pixel as a multiple of that of its brightness and place; more is texture."""
 
 _MOST_UNEVEN = 16.0
-"""Most that a part's noise may differ from the picture's, as a factor of its variance."""
+"""Largest factor between the variances of a part and of the picture."""
 
 
 @dataclass(frozen=True)
 class ViewNoise:
-    """Noise at several brightnesses.
+    """Variance of the noise by brightness and by part of the picture.
 
     Attributes
     ----------
     brightness : ndarray, shape (N,), float32
         Rising, 0..1.
     variance : ndarray, shape (N,), float32
-        Of one channel, colours in 0..1.
+        Variance in one channel at each brightness, colours in 0..1.
     by_place : ndarray, shape (PARTS, PARTS), float32
-        What that is multiplied with in parts of the picture, where a lens darkens it or its light is uneven.
+        Factor of the variance in each part of the picture; a lens or uneven light changes it.
     share : float
-        Of the variance by which views differ, at most, what is noise of each view.
+        Upper bound of the share that noise has in the variance between views.
     agreement : float
-        Ratio, at most 1, of the two standard deviations that are told within a view and between views, at the
-        brightness where they agree least: 1 where nothing but noise can be what both see.
+        Ratio, at most 1, of the standard deviations measured within a view and between views, at the brightness of
+        least agreement. 1: both measure noise only.
     """
 
     brightness: FloatMap
@@ -102,12 +101,12 @@ class ViewNoise:
 
     @property
     def usual(self) -> float:
-        """Standard deviation at the brightness in the middle."""
+        """Median of the standard deviation over the brightness levels."""
         return float(np.sqrt(np.median(self.variance)))
 
 
 def view_noise(light_field: LightField) -> ViewNoise:
-    """Noise of the views of a light field.
+    """Noise of a light field's views.
 
     Parameters
     ----------
@@ -126,16 +125,15 @@ def view_noise(light_field: LightField) -> ViewNoise:
     views, image = light_field.views, light_field.reference_view
     unit, least = 1 / full_scale(views.dtype), _least_variance(views.dtype)
     place, moves = light_field.reference_position, whole_pixel_moves(light_field)
-    # beyond the picture nothing is known
     height, width = light_field.shape
-    # as many from the one end as from the other: a picture that is turned has the same blocks
+    # as many blocks from either end, so that a rotated picture has the same blocks
     rows, columns = (2 * (size // (2 * kernels.BLOCK)) or size // kernels.BLOCK for size in (height, width))
     differences = np.empty((rows, columns), np.float32)
     kernels.least_differences(views, *place, moves, differences)
     between = np.minimum(differences * unit**2 / 2, 1)
     brightness = np.mean(cv2.split(image), axis=0)
     within, level = (_of_blocks(values, between.shape, kernels.BLOCK) for values in (mask_energy(image), brightness))
-    # what is black, overexposed or flat has none of the noise that the rest has
+    # black, overexposed and flat blocks have no noise
     tells = (within > 0) & (level > BLACK) & (level < SATURATED)
     even = np.ones((PARTS, PARTS), np.float32)
     if tells.sum() < LEVELS:
@@ -156,7 +154,7 @@ def view_noise(light_field: LightField) -> ViewNoise:
 
 
 def _lower_line(brightness: FloatMap, variance: FloatMap) -> FloatMap:
-    """Power of brightness that a quarter of the variances lie below: the best of those through one of them each."""
+    """Variance as a power of brightness, fitted so that a quarter of the variances lie below it; shape (N,)."""
     x, y = np.log(np.float64(brightness)), np.log(np.float64(variance))
     lines = y[:, None, None] + _SLOPES[:, None] * (x - x[:, None, None])
     above = y - lines
@@ -165,12 +163,12 @@ def _lower_line(brightness: FloatMap, variance: FloatMap) -> FloatMap:
 
 
 def _least_variance(dtype: npt.DTypeLike) -> float:
-    """Of what views hold, however little noise there is; colours in 0..1."""
+    """Variance of the rounding of values of this type; colours in 0..1."""
     return (_LEAST if dtype == np.float32 else _ROUNDING / full_scale(np.dtype(dtype))) ** 2
 
 
 def expected_variance(light_field: LightField, noise: ViewNoise) -> npt.NDArray[np.float64]:
-    """Variance of the noise of one channel that each pixel's brightness and place have.
+    """Variance of the noise of one channel at each pixel, by its brightness and place.
 
     Parameters
     ----------
@@ -189,18 +187,18 @@ def expected_variance(light_field: LightField, noise: ViewNoise) -> npt.NDArray[
 
 
 def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> FloatMap:
-    """Variance of the noise of one channel of a view, pixel by pixel.
+    """Variance of the noise of one channel of a view at each pixel, measured in a window.
 
-    What the views vary by from pixel to pixel there, which texture adds to; at most so many times what their brightness
-    and place have, at least what rounding adds.
+    Texture adds to the measurement, so a multiple of the variance by brightness and place limits it from above, and the
+    variance of rounding from below.
 
     Parameters
     ----------
     light_field : LightField
-        Whose noise it is, not denoised.
+        The views as they are, not denoised.
     noise : ViewNoise
     views : ndarray, shape (T, S), bool
-        That are looked at.
+        The views in which the noise is measured.
 
     Returns
     -------
@@ -216,7 +214,7 @@ def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> F
 
 
 def _by_place(within: FloatMap, between: FloatMap, tells: BoolMap) -> FloatMap:
-    """Noise of each part of the picture, from energies of blocks in units of what their brightness has."""
+    """Factor of the variance in each part of the picture, from blocks' variances relative to their brightness'."""
     factors = np.ones((PARTS, PARTS), np.float32)
     for number in np.ndindex(PARTS, PARTS):
         part = part_of_picture(number, tells.shape)
@@ -231,12 +229,12 @@ def _by_place(within: FloatMap, between: FloatMap, tells: BoolMap) -> FloatMap:
 
 
 def part_of_picture(number: tuple[int, ...], shape: tuple[int, ...]) -> tuple[slice, ...]:
-    """One of ``PARTS`` x ``PARTS`` parts of a picture; what lies across a border of two belongs to both."""
+    """One of ``PARTS`` x ``PARTS`` parts of a picture; a block on the border of two parts belongs to both."""
     return tuple(slice(i * n // PARTS, -(-(i + 1) * n // PARTS)) for i, n in zip(number, shape, strict=True))
 
 
 def _bounds(within: FloatMap, between: FloatMap) -> tuple[float, float]:
-    """What the best blocks tell of the noise, within a view and between views."""
+    """Upper bounds of the variance, from the best blocks within a view and between views."""
     of_one, of_two = (float(np.quantile(energy, BEST_SHARE)) for energy in (within, between))
     return _OF_ONE_VIEW * of_one, _OF_VIEWS * of_two
 
@@ -247,7 +245,7 @@ def _agreement(of_one: float, of_two: float) -> float:
 
 
 def whole_pixel_moves(light_field: LightField) -> npt.NDArray[np.int64]:
-    """Where the nearest views may have a pixel of the reference view, in whole pixels from it.
+    """Whole-pixel shifts of a reference pixel in the nearest views, over the disparity range.
 
     Parameters
     ----------
@@ -277,7 +275,7 @@ def whole_pixel_moves(light_field: LightField) -> npt.NDArray[np.int64]:
 
 
 def _of_blocks(values: FloatMap, shape: tuple[int, ...], size: int) -> FloatMap:
-    """Means over blocks of ``size`` pixels that lie side by side from all borders."""
+    """Means over blocks of ``size`` pixels, laid from opposite borders; pixels left over in the middle are left out."""
     rows, columns = shape
     for axis, number in enumerate(shape):
         beyond = values.shape[axis] - number * size

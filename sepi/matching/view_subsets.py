@@ -1,7 +1,7 @@
-"""Parts of the view grid: those from which half-SEPIs are put together, and few views that stand for all.
+"""Subsets of the views: halves and quarters of the grid for half-SEPIs, and a few views that represent all.
 
-A sweep sums the costs of groups of views; a subset is a union of groups. Occlusion at a straight edge hides the views
-on one side of a line through the reference view, so the subsets worth asking for are halves and quarters.
+A sweep sums the costs of groups of views; a subset is a union of groups. A straight edge hides a pixel from the views
+on one side of a line through the reference view, so halves and quarters are enough.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from sepi.lightfield import BoolMap, LightField
 
 @dataclass(frozen=True)
 class ViewSubsets:
-    """Subsets of the views.
+    """Subsets of the views as unions of groups.
 
     Attributes
     ----------
     groups : ndarray, shape (T, S), int
         Group of each view, 0..G-1.
     subsets : ndarray, shape (N, G), bool
-        Which groups make up each subset.
+        Groups of each subset.
     names : tuple of str, length N
     """
 
@@ -33,12 +33,13 @@ class ViewSubsets:
 
 
 SIDES = {"left": (0, -1), "right": (0, 1), "up": (-1, 0), "down": (1, 0)}
-"""Direction ``(dt, ds)`` from the reference view towards the views that a half keeps."""
+"""Direction ``(dt, ds)`` from the reference view to the views of a half."""
 
 QUARTERS = (("left", "up"), ("left", "down"), ("right", "up"), ("right", "down"))
 
-# of a number of views, times; of views to one side of the reference view, all are of use
+# most views, as a multiple of the number asked for
 _HARDLY_MORE = 1.1
+# reach from the reference view up to which no view is left out
 _SHORT = 2
 
 HALVES_AND_QUARTERS = ("full", *SIDES, *(f"{a}-{b}" for a, b in QUARTERS))
@@ -46,15 +47,15 @@ HALVES_AND_QUARTERS = ("full", *SIDES, *(f"{a}-{b}" for a, b in QUARTERS))
 
 
 def halves_and_quarters(light_field: LightField) -> ViewSubsets:
-    """All views, the four halves of the paper, and their four overlaps; the dividing line belongs to both sides.
+    """All views, the paper's four halves, and the four quarters in which these overlap.
 
-    Where a pixel is occluded horizontally and vertically at once, as at any slanted edge, the views it keeps are those
-    of both halves. A view less than half a row or column from the dividing line stands on it.
+    A slanted edge occludes a pixel both horizontally and vertically; a quarter holds the views left. Views within half
+    a row or column of the dividing line belong to both sides.
 
     Parameters
     ----------
     light_field : LightField
-        Sides are seen from its reference view.
+        Its reference view divides the grid.
 
     Returns
     -------
@@ -72,19 +73,19 @@ def halves_and_quarters(light_field: LightField) -> ViewSubsets:
 
 
 def half_planes(light_field: LightField, directions: int) -> ViewSubsets:
-    """All views, then for each of ``directions`` edge orientations the views on its one and on its other side.
+    """All views, then for each of ``directions`` edge orientations the views on either side.
 
     Parameters
     ----------
     light_field : LightField
-        Sides are seen from its reference view.
+        Its reference view divides the grid.
     directions : int
         Number of edge orientations over half a turn.
 
     Returns
     -------
     ViewSubsets
-        Subset ``1 + n`` for ``n`` in ``0..2 directions - 1`` keeps the views within a quarter turn of the angle
+        Subset ``1 + n`` for ``n`` in ``0..2 directions - 1`` has the views within a quarter turn of the angle
         ``(n + 1/2) pi / directions``, measured from ``+s`` towards ``+t``.
     """
     sectors = 2 * directions
@@ -98,21 +99,21 @@ def half_planes(light_field: LightField, directions: int) -> ViewSubsets:
 
 
 def spread_views(light_field: LightField, at_least: int | None) -> BoolMap:
-    """Few views that are spread evenly over the grid and reach as far as all, or nearly so.
+    """A few views, spread evenly over the grid, that reach nearly as far as all views.
 
-    Every second, fourth, ... row and column from the reference view, or of these every other view as on a chess board;
-    the fewest that are ``at_least`` so many, and all views where there are not more.
+    These are the views of every second, fourth, ... row and column, counted from the reference view, or every other one
+    of those, as on a chess board. The result is the smallest such set of ``at_least`` views, or else all views.
 
     Parameters
     ----------
     light_field : LightField
     at_least : int or None
-        None: all views.
+        Least number of views; None: all views.
 
     Returns
     -------
     ndarray, shape (T, S), bool
-        Views that are present; the reference view is among them.
+        Present views, the reference view among them.
     """
     if at_least is None:
         return light_field.present
@@ -132,21 +133,22 @@ def spread_views(light_field: LightField, at_least: int | None) -> BoolMap:
 
 
 def views_without_aliases(light_field: LightField, at_least: int) -> BoolMap:
-    """As few views as :func:`spread_views`, or hardly more, that repeat fewer aliases of a texture.
+    """About as many views as :func:`spread_views`, arranged so that a regular texture has fewer aliases.
 
-    Those on every second row and column have aliases twice as often as all views do. A third of the views, with
-    ``s + t`` divisible by three, does not; nor do 13 views: the reference view, the corners, and eight that stand one
-    step from the border along one axis and one step from the reference view along the other.
+    Views of every second row and column give twice as many aliases as all views. Two arrangements avoid this: a third
+    of the views, with ``s + t`` divisible by three, and 13 views: the reference view, the corners, and eight that stand
+    one step from the border along one axis and one step from the reference view along the other.
 
     Parameters
     ----------
     light_field : LightField
     at_least : int
+        Least number of views.
 
     Returns
     -------
     ndarray, shape (T, S), bool
-        Views that are present; the reference view is among them.
+        Present views, the reference view among them. :func:`spread_views` where neither arrangement fits.
     """
     t0, s0 = light_field.reference_position
     reach = min(t0, s0, light_field.grid[0] - 1 - t0, light_field.grid[1] - 1 - s0)
@@ -164,7 +166,7 @@ def views_without_aliases(light_field: LightField, at_least: int) -> BoolMap:
 def grid_steps(light_field: LightField) -> npt.NDArray[np.float64]:
     """Mean distance from row to row and from column to column, in view steps; shape (2,).
 
-    By least squares where views stand off the grid; 1 along an axis on which all views stand at one place.
+    By least squares if views stand off the grid; 1 along an axis without extent.
     """
     if light_field.positions is None:
         return np.array([light_field.row_spacing, 1.0])

@@ -1,11 +1,12 @@
-"""Plane sweep over colours and detail of the views, with the views left out in which a pixel is occluded.
+"""Plane sweep over colours and detail of the views that see a pixel.
 
-A view sees pixel ``p`` at candidate ``d`` unless something nearer than ``d`` occludes the position where ``p`` would be
-seen. What occludes it is known from a first depth map: each view gets a z-buffer of that map. This is the idea of the
-half-SEPI, with the part of the views chosen view by view. All maps but the last only tell what is hidden where: a few
-views, spread over the grid, and every other candidate are enough for them. A few views compare all candidates with the
-pixel, the others those near the map before, so that a wrong map can be put right. The last of several maps only refines
-the one before: all its views compare the candidates near it. In noise they do not, since maps of few views are wrong by
+A view sees pixel ``p`` at candidate ``d`` unless something nearer than ``d`` lies where the view would show ``p``. A
+z-buffer of an earlier depth map in each view tells this. It is the half-SEPI's idea, decided view by view.
+
+Several passes compute visibility and depth in turn. All maps but the last only serve the visibility, so a few views,
+spread over the grid, and fewer candidates are enough for them. Some views compare all candidates, so that errors of the
+earlier map can be corrected; the others compare those near the earlier map. The last of several passes only refines
+the map: all its views compare the candidates near it. In noise they compare all, since maps from few views are wrong by
 chance. The compiled loops are in ``kernels/visibility.cpp``.
 """
 
@@ -48,84 +49,84 @@ from sepi.matching.view_subsets import spread_views, views_without_aliases
 from sepi.stage import Needs, Progress
 
 CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**30)
-"""The optimisation goes back to the views, so these need not be as fine as the paper's."""
+"""Coarser than the paper's: the optimisation refines the disparity with the views."""
 
 TEXTURE = 1.85
-"""Times what the noise mask sees of the reference view: by so much colours of one surface may differ in a window.
+"""Factor from the reference view's measured noise to the colour difference within one surface.
 
-In views without noise the mask sees texture, and of strong texture few pixels of a window have nearly the same colour.
+In views without noise the measurement is of texture. In strong texture few pixels of a window have similar colours.
 """
 
 LIKELY_RADIUS, LIKELY_CANDIDATES = 8, 5
-"""Pixels around, and candidates beyond, within which those of a map make candidates likely."""
+"""Radius of the window whose disparities are likely candidates, pixels, and the number of candidates beyond them."""
 
 BYTES_PER_CANDIDATE = 5
-"""Of each pixel: averages of the costs, these smoothed, and costs of a few rows."""
+"""Per pixel: averaged costs, smoothed costs, and costs of a few rows."""
 
 BYTES_PER_PIXEL = 2 + 4
-"""Of a pixel of a view: the detail, and the z-buffer."""
+"""Per pixel of a view: the detail, and the z-buffer."""
 
 
 class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, SmoothingParameters):
-    """Parameters of a visibility sweep and of the choice among its candidates."""
+    """Parameters of a visibility sweep and its smoothing."""
 
     rule: ClassVar[CandidateRule] = CANDIDATES
     needs: ClassVar[Needs] = Needs(bytes_per_candidate=BYTES_PER_CANDIDATE)
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/method/best_initial.md")
     first_views: int = Field(
-        25, ge=2, description="views that all maps but the last compare, at least; spread evenly over the grid"
+        25, ge=2, description="least number of views for all maps but the last; spread evenly over the grid"
     )
     first_sampling: float = Field(
-        2.0, ge=1, le=8, description="distance of their candidates; 1: as num_disparities says"
+        2.0, ge=1, le=8, description="distance of their candidates, in steps of num_disparities"
     )
 
     @property
     def finest_sampling(self) -> float:
-        """Least distance of the candidates of any map; 1: as ``num_disparities`` says."""
+        """Least distance of the candidates of any map, in steps of ``num_disparities``."""
         return self.first_sampling
 
     def fewer(self, light_field: LightField, sampling: float) -> int:
-        """How many candidates, so many times as far apart as usual."""
+        """Number of candidates that are ``sampling`` times as far apart as ``num_disparities`` says."""
         return max(2, round((self.number(light_field) - 1) / sampling) + 1)
 
 
 class VisibleViewsParameters(VisibilitySweepParameters, GapParameters):
     """Parameters of the sweep over the views that see a pixel."""
 
-    views: int = Field(41, ge=2, description="views that the last map compares, at least")
-    sampling: float = Field(1.0, ge=1, le=8, description="distance of its candidates; 1: as num_disparities says")
-    passes: int = Field(3, ge=1, le=10, description="how often visibility and depth are computed anew")
+    views: int = Field(41, ge=2, description="least number of views for the last map")
+    sampling: float = Field(1.0, ge=1, le=8, description="distance of its candidates, in steps of num_disparities")
+    passes: int = Field(3, ge=1, le=10, description="number of times that visibility and depth are computed in turn")
     mean_noise: float = Field(
         0.02,
         ge=0,
         le=1,
-        description="noise of one channel from which on views are compared with the mean of others, instead of the "
-        "reference view, colours in 0..1",
+        description="least noise at which views are compared with the mean of the views instead of the reference "
+        "view; standard deviation of one channel, colours in 0..1",
     )
     searched_views: int = Field(
         13,
         ge=2,
-        description="views that compare all candidates, at least, and all where there is noise; others compare those "
-        "near the map before",
+        description="least number of views that compare all candidates; the others compare those near the earlier "
+        "map. All views if they are noisy",
     )
     occluded_view_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is occluded")
 
     @property
     def finest_sampling(self) -> float:
-        """Least distance of the candidates of any map; 1: as ``num_disparities`` says."""
+        """Least distance of the candidates of any map, in steps of ``num_disparities``."""
         return min(self.sampling, self.first_sampling) if self.passes > 1 else self.sampling
 
 
 class FirstDepthParameters(VisibilitySweepParameters):
-    """Parameters of the first depth map: a narrow scale of the colours bears with views that do not see the pixel."""
+    """Parameters of the first depth map; a small colour scale limits the cost of views that do not see the pixel."""
 
     colour_scale: ColourScale = 0.0077
     small_penalty: SmallPenalty = 0.04
 
 
 def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, progress: Progress) -> SmoothedResult:
-    """Depth by a few views, as if each saw every pixel.
+    """Depth from a few views, as if each saw every pixel.
 
     Parameters
     ----------
@@ -158,7 +159,7 @@ def depth_from_visible_views(
     progress: Progress,
     mean_of: MeanOf | None = None,
 ) -> SmoothedResult:
-    """Depth over the views that see a pixel, as a first map tells, in several passes.
+    """Depth from the views that see a pixel, computed in several passes.
 
     Parameters
     ----------
@@ -169,7 +170,7 @@ def depth_from_visible_views(
     parameters : VisibleViewsParameters
     progress : callable
     mean_of : callable, optional
-        :func:`sepi.matching.mean_reference.mean_reference`, for noisy views; without it they are compared with the
+        :func:`sepi.matching.mean_reference.mean_reference`, for noisy views; default: views are compared with the
         reference view.
 
     Returns
@@ -215,7 +216,7 @@ def depth_from_visible_views(
 def occluded_in_any_view(
     light_field: LightField, disparity: FloatMap, occlusion_margin: float, present: BoolMap
 ) -> BoolMap:
-    """Pixels that something nearer occludes in one of the views that could see them.
+    """Pixels that something nearer occludes in at least one view.
 
     Parameters
     ----------
@@ -225,7 +226,7 @@ def occluded_in_any_view(
     occlusion_margin : float
         By how much an occluder must be nearer, pixels per view step.
     present : ndarray, shape (T, S), bool
-        The views that are looked at.
+        The views that are examined.
 
     Returns
     -------
@@ -236,7 +237,7 @@ def occluded_in_any_view(
     for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()), BYTES_PER_PIXEL):
         nearest = z_buffers(disparity, present, baselines, *rows)
         if light_field.missing is not None:
-            # a view that does not show a place cannot see a pixel there
+            # where a view has no pixels, nothing in it can occlude
             nearest[light_field.missing[:, :, rows.low : rows.high]] = EMPTY
         asked = (present, baselines, nearest, rows.low, occlusion_margin)
         kernels.occluded_in_any_view(disparity, asked, begin, end, occluded)
@@ -255,7 +256,7 @@ def _sweep(
     *,
     refined: bool = False,
 ) -> SmoothedResult:
-    """A map over some of the views, of candidates ``sampling`` times as far apart as usual.
+    """Smoothed map from some of the views, with candidates ``sampling`` times as far apart as usual.
 
     Pixels are compared with their ``mean``, where there is one, instead of the reference view; only at candidates near
     the map where that is ``refined``.
@@ -280,9 +281,9 @@ def _sweep(
 
 
 def _contrast_of_surfaces(light_field: LightField) -> float:
-    """Standard deviation of one channel by which colours of a surface differ: what is left of noise, or texture."""
+    """Standard deviation of one channel's colours within a surface."""
     noise = reference_noise(light_field)
-    # the guide of denoised views is freed of both
+    # denoising has taken noise and faint texture out of the guide
     return noise if isinstance(light_field, DenoisedLightField) else TEXTURE * noise
 
 
@@ -348,7 +349,7 @@ def _visibility(
 
 
 def _likely_candidates(disparity: FloatMap, candidates: FloatMap) -> npt.NDArray[np.int32]:
-    """The first and the last candidate near those of a map around each pixel; shape (2, H, W)."""
+    """First and last of the candidates near the map's disparities around each pixel; shape (2, H, W)."""
     window = np.ones((2 * LIKELY_RADIUS + 1, 2 * LIKELY_RADIUS + 1), np.uint8)
     numbers = (disparity - candidates[0]) / (candidates[1] - candidates[0])
     first = np.ceil(cv2.erode(numbers, window) - LIKELY_CANDIDATES)

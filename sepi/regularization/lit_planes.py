@@ -1,14 +1,13 @@
-"""Planes of regions without texture, from how their light changes.
+"""Planes of regions without texture, from the gradient of their light.
 
-What no window of some pixels tells, a whole region may: where light falls off along a wall by a tenth of a level per
-pixel, views that are shifted against each other by a wrong disparity differ by as little everywhere, and tens of
-thousands of pixels of all views add up to hundredths of a pixel. The sums are those of Gauss-Newton
-(:mod:`sepi.matching.gauss_newton`), for the three coefficients of a plane in place of each pixel's disparity, and with
-the slopes of the light fitted in windows within the region: slopes between neighbours would be noise.
+Light may fall off along a wall by a tenth of a level per pixel. A window of some pixels cannot match this in noise, but
+the tens of thousands of pixels of a region, over all views, give its disparity to hundredths of a pixel. The sums are
+those of Gauss-Newton (:mod:`sepi.matching.gauss_newton`), with the three coefficients of a plane as unknowns. Slopes of
+the light are fitted in windows within the region, since differences of neighbours are mostly noise.
 
-How sure a plane is follows from the noise and from what is left between whole views: that one is brighter than another
-looks like a shift of a slope. Whether a region is a plane at all, parts of it tell, which must not ask for another
-disparity by more than noise explains.
+The plane's covariance follows from the noise and from the differences of brightness between whole views, which look
+like a shift of a slope. A misfit tells whether the region is a plane: on a plane, the parts of the region ask for the
+same disparity within their noise.
 """
 
 from __future__ import annotations
@@ -27,34 +26,34 @@ if TYPE_CHECKING:
     from sepi.matching.gauss_newton import GaussNewton
 
 UNLIKE = 0.01 / 255
-"""Standard deviation by which a whole view is brighter than another, at least; colours in 0..1."""
+"""Least standard deviation of the brightness of whole views; colours in 0..1."""
 
 _STEPS = 4
-"""Gauss-Newton steps: light changes so slowly that few are enough from anywhere in the range."""
+"""Number of Gauss-Newton steps; light changes slowly, so a few reach any disparity of the range."""
 
 _SLOPE_RADIUS = 8
-"""Slopes are fitted in windows of 2 r + 1 pixels."""
+"""Radius r of the windows in which slopes are fitted: 2 r + 1 pixels."""
 
 _BEYOND = 0.1
-"""Distance by which a plane may leave the range, on average, pixels per view step."""
+"""Largest mean distance of a plane beyond the range, pixels per view step."""
 
 _MOST_SQUEEZED = 0.5
-"""Of its width, by which a view may see a plane narrower than the reference does: at 1 it is seen from behind."""
+"""Largest share of a plane's width that it may lose in a view; beyond 1, the view would see it from behind."""
 
 _PART = 24
-"""Width of the parts that are asked, pixels."""
+"""Width of the region's parts for the misfit, pixels."""
 
 
 @dataclass(frozen=True)
 class LitPlane:
-    """A plane and how well the views know it.
+    """A plane, its covariance and its misfit.
 
     Attributes
     ----------
     plane : Plane
     covariance : ndarray, shape (3, 3), float64
     misfit : float
-        Mean square of what parts of the region ask for, in units of its variance by noise: 1 on a plane.
+        Mean squared change that parts of the region ask for, divided by its variance by noise: 1 on a plane.
     """
 
     plane: Plane
@@ -62,12 +61,12 @@ class LitPlane:
     misfit: float
 
     def deviation(self, basis: npt.NDArray[np.float64]) -> float:
-        """Standard deviation of the disparity over points ``basis`` (N, 3), root mean square."""
+        """Root mean square of the disparity's standard deviation over points ``basis`` (N, 3)."""
         mean = _weighted(basis, np.full(len(basis), 1 / len(basis)))
         return float(np.sqrt(np.maximum(np.sum(self.covariance * mean), 0)))
 
     def distance(self, plane: Plane) -> float:
-        """Standard deviations that another plane is away, over the three coefficients."""
+        """Mahalanobis distance of another plane, in standard deviations."""
         difference = plane - self.plane
         return float(np.sqrt(np.maximum(difference @ np.linalg.solve(self.covariance, difference), 0)))
 
@@ -80,27 +79,27 @@ def lit_planes(
     starts: list[Plane],
     variance: FloatMap,
 ) -> list[LitPlane | None]:
-    """Planes of some regions, by all views.
+    """Planes of regions from the light in all views.
 
     Parameters
     ----------
     light_field : LightField
         With a known disparity range.
     matching : GaussNewton
-        Of its views, colours alone.
+        Comparison of its views by colours alone.
     disparity : ndarray, shape (H, W), float32
-        Outside the regions, what hides them in some views.
+        Outside the regions, it tells what occludes them in some views.
     regions : list of Region
-        That no pixel belongs to twice.
+        No two of them share a pixel.
     starts : list of Plane
-        To begin with.
+        Initial planes.
     variance : ndarray, shape (H, W), float32
-        Of the noise of one channel of a view, colours in 0..1.
+        Variance of the noise of one channel of a view, colours in 0..1.
 
     Returns
     -------
     list of LitPlane or None
-        None where nothing can be told, or what is told lies beyond the range or is no surface that all views see.
+        None if the light tells no plane, or one beyond the range, or one that not all views can see.
     """
     known = light_field.require_disparity_range()
     planes: list[Plane | None] = [start.copy() for start in starts]
@@ -135,7 +134,7 @@ def lit_planes(
 
 
 def _within(region: Region, plane: Plane, known: DisparityRange) -> tuple[Plane, npt.NDArray[np.float64]]:
-    """A plane whose middle is brought back into the range, where the next step begins, and its disparities there."""
+    """A plane moved so that its mean disparity lies in the range, and its disparities, cut to the range."""
     basis = region.basis
     middle = float(np.mean(basis @ plane))
     plane = plane + np.array([np.clip(middle, known.minimum, known.maximum) - middle, 0, 0])
@@ -143,7 +142,7 @@ def _within(region: Region, plane: Plane, known: DisparityRange) -> tuple[Plane,
 
 
 def _squeezed(plane: Plane, light_field: LightField) -> float:
-    """Largest share of its width by which a view sees a plane narrower than the reference does, by ``p - d(p) v``."""
+    """Largest share of a plane's width that it loses or gains in a view, by ``p - d(p) v``."""
     _, across, down = plane
     return float(np.abs(light_field.baselines[light_field.present] @ np.array([down, across])).max())
 
@@ -157,7 +156,7 @@ def _unlike(
     mean: FloatMap,
     variance: FloatMap,
 ) -> float:
-    """Variance by which whole views are brighter than others, over a region where noise has the rest to itself."""
+    """Variance of the mean brightness of whole views over a region, beyond what noise explains."""
     y, x = (
         axis + np.float32(side.start) for axis, side in zip(np.indices(region.shape, np.float32), place, strict=True)
     )
@@ -190,7 +189,7 @@ class _Sums:
 
     @classmethod
     def of(cls, region: BoolMap, gradient: FloatMap, curvature: FloatMap) -> _Sums | None:
-        """Of the pixels ``region`` (h, w); None where there are too few."""
+        """Sums over the pixels ``region`` (h, w); None if there are too few."""
         terms = basis_of(region)
         if len(terms) < _PART**2 // 4:
             return None
@@ -198,7 +197,7 @@ class _Sums:
         return cls(region, terms, gradient[region].astype(np.float64), h, _weighted(terms, h))
 
     def plane(self) -> Plane | None:
-        """By how much the plane changes; None where the views say nothing of one of its coefficients."""
+        """Change of the plane; None if the views do not determine one of its coefficients."""
         if np.linalg.cond(_scaled(self.information)) > 1e6:
             return None
         return np.asarray(np.linalg.solve(self.information, np.einsum("ni,n->i", self.basis, self.gradient)))
@@ -209,7 +208,7 @@ class _Sums:
         """Covariance of the plane, and its misfit; ``unlike`` is the variance between whole views."""
         varied = self.curvature * variance[self.region] / matching.colour_variance
         sums = _weighted(self.basis, varied)
-        # a view's offset changes each gradient by itself times the slope that is seen from there
+        # an offset of a view changes each gradient by the offset times the slope along the view's baseline
         down, across = (np.einsum("ni,nc->ic", self.basis, slope[self.region][:, :3]) for slope in slopes)
         for v, u in field.baselines[matching.present]:
             pull = (v * down + u * across) / matching.colour_variance
@@ -218,7 +217,7 @@ class _Sums:
         return inverse @ sums @ inverse, self._misfit(varied)
 
     def _misfit(self, varied: npt.NDArray[np.float64]) -> float:
-        # squares side by side from the middle of the region: it lies in the same ones when it is turned
+        # squares are laid from the middle of the region, so that a rotated region has the same ones
         down, across = (
             (2 * at + 1 - size) // (2 * _PART) + size
             for at, size in zip(np.nonzero(self.region), self.region.shape, strict=True)
@@ -232,7 +231,10 @@ class _Sums:
 
 
 def _weighted(terms: npt.NDArray[np.float64], weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Sum of the products of terms (N, 3) with each other, (3, 3); a product of matrices rounds as threads have it."""
+    """Weighted sum of the outer products of terms (N, 3); shape (3, 3).
+
+    einsum, not a matrix product: BLAS rounds depending on the number of threads.
+    """
     return np.asarray(np.einsum("ni,n,nj->ij", terms, weights, terms))
 
 
@@ -242,7 +244,7 @@ def _scaled(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 
 def _slopes(region: BoolMap, mean: FloatMap, slopes: FloatMap) -> BoolMap:
-    """Smooth colours of a region in place of ``mean`` (h, w, 4), their slopes down and across, and where they hold."""
+    """Fit smooth colours in a region, into ``mean`` (h, w, 4), and their slopes; returns the mask of fitted pixels."""
     size = (2 * _SLOPE_RADIUS + 1,) * 2
 
     def window(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

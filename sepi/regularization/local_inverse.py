@@ -1,13 +1,13 @@
 """Variance of a smoothed disparity map: the diagonal of the inverse of its system, approximated locally.
 
-Second-order smoothing (:mod:`sepi.regularization.second_order`) solves ``(W + C) d = W z``, and where ``W`` is the
-information on each pixel, the inverse of the matrix is the covariance of the posterior. If weights were the same all
-over, a Fourier transform would make it diagonal: its diagonal were ``f(c / w) / w`` with
+Second-order smoothing (:mod:`sepi.regularization.second_order`) solves ``(W + C) d = W z``. If ``W`` is the information
+on each pixel, the inverse of the matrix is the posterior covariance. With equal weights everywhere, a Fourier transform
+makes the matrix diagonal, and the diagonal of its inverse is ``f(c / w) / w`` with
 
     f(r) = mean over frequencies of 1 / (1 + r (a^2 + b^2 + a b)),   a, b = 2 - 2 cos
 
-for the second differences along x, along y and across. They are not, but change slowly against the few pixels over
-which a pixel's neighbours count, so means over windows of such a size are put in their place.
+for the second differences along x, along y and mixed. Real weights change slowly over the few pixels that affect a
+pixel, so means over windows of that size replace the equal weights.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy.typing as npt
 from sepi.lightfield import FloatMap
 
 _DATA_WINDOW, _SMOOTHNESS_WINDOW = 5, 3
-"""Pixels over which weights are averaged: as exact inverses of parts of pictures have it best."""
+"""Pixels over which weights are averaged; chosen by comparison with exact inverses."""
 
 _FREQUENCIES = 128
 _LEAST = 1e-8
@@ -33,9 +33,9 @@ def inverse_diagonal(weight: FloatMap, smoothness: list[npt.NDArray[np.float64]]
     Parameters
     ----------
     weight : ndarray, shape (H, W), float32
-        Of the data.
+        Weights of the data.
     smoothness : list of ndarray
-        Weights of the second differences along x, along y and across, of shapes (H, W - 2), (H - 2, W) and
+        Weights of the second differences along x, along y and mixed, of shapes (H, W - 2), (H - 2, W) and
         (H - 1, W - 1).
 
     Returns
@@ -55,7 +55,7 @@ def inverse_diagonal(weight: FloatMap, smoothness: list[npt.NDArray[np.float64]]
 
 @cache
 def _shares() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """``log r`` and ``f(r)``."""
+    """Table of ``log r`` and ``f(r)``."""
     one = 2 - 2 * np.cos(np.pi * (np.arange(_FREQUENCIES) + 0.5) / _FREQUENCIES)
     a, b = one[:, None], one[None]
     differences = a**2 + b**2 + a * b

@@ -1,10 +1,9 @@
-"""Conjugate gradients for the second-order smoothing, preconditioned by hats of several widths.
+"""Conjugate gradients for second-order smoothing, with a multilevel preconditioner of bilinear hats.
 
-Conjugate gradients are slow at what bends over many pixels, the slower the farther. The preconditioner is the inverse
-as single pixels and as bilinear hats see it, 2, 8 and 32 pixels from node to node, each with its own diagonal, all
-added up [1]_: a third of the steps that the diagonal takes with a direct solve for planes in blocks beside it, and
-nothing to be factored. The system is a stencil, and stays one; the loop is short, and loading a library that has one
-takes longer than solving.
+Conjugate gradients take many steps for a surface that bends over many pixels. The preconditioner adds up inverse
+diagonals of the matrix on several levels: single pixels, and bilinear hats with 2, 8 and 32 pixels between nodes [1]_.
+It needs no factorisation, and a third of the steps of a diagonal combined with a direct solution for planes in blocks.
+The matrix remains a stencil. The loop is written out because importing a library for it takes longer than solving.
 
 References
 ----------
@@ -24,37 +23,37 @@ FloatArray = npt.NDArray[np.float64]
 Inverse = Callable[[FloatArray], tuple[FloatArray, float]]
 
 LEVELS = 5
-"""Of hats, each with half the nodes of the one before, along either axis."""
+"""Number of levels of hats, each with half the nodes of the finer one along either axis."""
 
 COUNTED = 2
-"""Every so many levels count; the others only lie between."""
+"""Every second level is part of the preconditioner; the others only connect them."""
 
 HALF = np.float32(0.5)
-"""Height of a hat where the next finer level has nodes beside its own."""
+"""Height of a hat at the finer level's nodes beside its own."""
 
 
 def conjugate_gradients(
     stencil: FloatArray, inverse: Inverse, right: FloatArray, start: FloatArray, rtol: float, max_iterations: int
 ) -> FloatArray:
-    """Solve a system of the smoothing.
+    """Solution of a system of the smoothing, by preconditioned conjugate gradients.
 
     Parameters
     ----------
     stencil : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float32 or float64
-        The matrix, as of :func:`multilevel_inverse`.
+        The matrix, as for :func:`multilevel_inverse`.
     inverse : callable
-        Of :func:`multilevel_inverse`, in the same type.
+        Preconditioner from :func:`multilevel_inverse`, of the same type.
     right, start : ndarray, shape (H + 2 MARGIN, W + 2 MARGIN), of the same type
-        The right side, and where to start; with margins of zeros.
+        The right side and the initial solution, with margins of zeros.
     rtol : float
-        Residual at which to stop, relative to the right side.
+        Residual at which the solver stops, relative to the right side.
     max_iterations : int
-        Steps after which to stop anyway.
+        Most steps of the solver.
 
     Returns
     -------
     ndarray
-        As ``right``.
+        Shape and type of ``right``.
     """
     enough = rtol * float(np.linalg.norm(right))
     if not enough:
@@ -76,21 +75,21 @@ def conjugate_gradients(
 
 
 def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
-    """What is near the inverse of a matrix of the smoothing, symmetric and positive.
+    """Approximate inverse of a matrix of the smoothing, symmetric and positive.
 
     Parameters
     ----------
     stencil : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
-        Of :func:`sepi.regularization.second_order.second_difference_stencil` and the data's weights, with a margin of
+        :func:`sepi.regularization.second_order.second_difference_stencil` plus the data's weights, with a margin of
         zeros.
     dtype : dtype
-        float32 or float64, in which it is applied.
+        Type in which the inverse is applied, float32 or float64.
 
     Returns
     -------
     callable
-        Takes a picture with its margin, of that type, and returns one, which holds until it is called again, and the
-        inner product of both.
+        Takes a picture with its margin and returns another one and the inner product of both. The next call overwrites
+        the returned picture.
     """
     inverse = _inverse(stencil[0], dtype)
     hats = [_inverse(diagonal, dtype) for diagonal in _diagonals(stencil)]
@@ -114,7 +113,7 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
 
 
 def _onto_coarser(fine: FloatArray, out: FloatArray) -> None:
-    """Inner products with hats (h, w) from those (2 h - 1, 2 w - 1) with finer ones."""
+    """Compute the inner products with hats (h, w) from those with finer hats (2 h - 1, 2 w - 1)."""
     rows, halves = fine[::2].copy(), HALF * fine[1::2]
     rows[1:] += halves
     rows[:-1] += halves
@@ -126,7 +125,7 @@ def _onto_coarser(fine: FloatArray, out: FloatArray) -> None:
 
 
 def _add_coarser(coarse: FloatArray, fine: FloatArray) -> None:
-    """Add hats of heights (h, w) to those of the finer level (2 h - 1, 2 w - 1)."""
+    """Add hats of heights (h, w) to the heights of the finer level (2 h - 1, 2 w - 1)."""
     rows = np.repeat(coarse, 2, axis=0)[:-1]
     rows[1::2] = HALF * (coarse[:-1] + coarse[1:])
     fine[:, ::2] += rows
@@ -134,14 +133,14 @@ def _add_coarser(coarse: FloatArray, fine: FloatArray) -> None:
 
 
 def _shapes(stencil: FloatArray) -> list[tuple[int, int]]:
-    """Rows and columns of nodes of each level: each of a coarser level is one of the finer."""
+    """Rows and columns of nodes of each level, finest first; nodes of a coarser level are nodes of the finer one."""
     widest = kernels.SPACING << (LEVELS - 1)
     rows, columns = (-(-(n - 2 * kernels.MARGIN) // widest) for n in stencil.shape[1:])
     return [((rows << i) + 1, (columns << i) + 1) for i in reversed(range(LEVELS))]
 
 
 def _diagonals(stencil: FloatArray) -> list[FloatArray]:
-    """What the matrix has on its diagonal as the hats of each level that counts see it."""
+    """Diagonal of the matrix in the hats of each level of the preconditioner."""
     found: list[FloatArray] = []
     for i, shape in list(enumerate(_shapes(stencil)))[::COUNTED]:
         diagonal = np.empty(shape)
@@ -151,5 +150,5 @@ def _diagonals(stencil: FloatArray) -> list[FloatArray]:
 
 
 def _inverse(diagonal: FloatArray, dtype: npt.DTypeLike) -> FloatArray:
-    """One by one; 0 of what no pixel is part of."""
+    """Reciprocals of a diagonal; 0 for hats without pixels."""
     return np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0).astype(dtype)

@@ -22,10 +22,10 @@ from sepi.lightfield import BoolMap, FloatMap
 from sepi.memory import take_blas_buffer
 
 UNIT = 15.0
-"""Length over which gradients are measured, pixels: about a superpixel, so that the three unknowns are alike."""
+"""Length over which gradients are measured, pixels: about a superpixel, so that the unknowns have similar scales."""
 
 ITERATIONS = 10
-"""Re-weightings of the absolute values; the tolerance shrinks with each."""
+"""Number of re-weightings of the absolute values; the tolerance shrinks with each."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,11 @@ class Coupling:
     Attributes
     ----------
     continuity : float
-        tau_out: weight of agreement between neighbours against a superpixel's worth of data.
+        tau_out: weight of agreement between neighbours, relative to the data of a superpixel.
     slope : float
-        Weight of equal slopes against equal values at the common border.
+        Weight of equal slopes, relative to equal values at the common border.
     tolerance : float
-        Disagreement, pixels per view step, beyond which data or neighbour is taken for an outlier.
+        Disagreement beyond which data or a neighbour is an outlier, pixels per view step.
     """
 
     continuity: float
@@ -48,7 +48,7 @@ class Coupling:
 
 
 def basis(segments: Superpixels) -> FloatArray:
-    """Value of each of the three plane parameters at every pixel; shape (H * W, 3)."""
+    """Coefficients of the three plane parameters at every pixel; shape (H * W, 3)."""
     rows, columns = np.indices(segments.labels.shape)
     labels = segments.labels.ravel()
     offset = np.stack([columns.ravel(), rows.ravel()], axis=1) - segments.centroids[labels]
@@ -56,7 +56,7 @@ def basis(segments: Superpixels) -> FloatArray:
 
 
 def evaluate_planes(segments: Superpixels, planes: FloatArray, design: FloatArray) -> FloatMap:
-    """Disparity of every pixel by the plane of its superpixel; shape (H, W), float32."""
+    """Disparity of every pixel on its superpixel's plane; shape (H, W), float32."""
     values = np.empty(segments.labels.shape, np.float32)
     kernels.values_of_planes(segments.labels.ravel(), design, planes, values.reshape(-1))
     return values
@@ -65,7 +65,7 @@ def evaluate_planes(segments: Superpixels, planes: FloatArray, design: FloatArra
 def fit_planes(
     segments: Superpixels, disparity: FloatMap, weight: FloatMap, design: FloatArray, tolerance: float
 ) -> FloatArray:
-    """Robust plane of each superpixel by itself, from the median disparity by re-weighted least squares.
+    """Robust plane of each superpixel by re-weighted least squares, starting at the median disparity.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def fit_planes(
     """
     planes: FloatArray = np.zeros((len(segments), 3))
     planes[:, 0] = _medians(segments, disparity)
-    # a weak pull to level keeps superpixels with few good pixels solvable
+    # a weak penalty on slopes keeps superpixels with few good pixels solvable
     ridge = np.diag([1e-6, 1e-2, 1e-2])
     for spread in _shrinking(tolerance):
         residual = evaluate_planes(segments, planes, design) - disparity
@@ -102,21 +102,21 @@ def propagate(
     design: FloatArray,
     coupling: Coupling,
 ) -> FloatArray:
-    """Minimise the coupled energy over the planes of the free superpixels, the others held (Eq. 7).
+    """Planes of least coupled energy (Eq. 7) for the free superpixels; the others keep theirs.
 
-    The absolute values of Eq. 7 are minimised by re-weighting: of the data, ``|d_hat - d|``, and of the continuity,
-    ``|d_hat - d_l|``, where ``d_l`` is the neighbour's plane continued linearly to the common border. The equation's
-    denominator, which weakens the coupling across a change of depth, is that re-weighting; its factor of likeness is
-    the colour cue. All free superpixels are solved for together, so depth travels from reliable edges inwards.
+    Re-weighting minimises the absolute values of Eq. 7: of the data, ``|d_hat - d|``, and of the continuity, ``|d_hat -
+    d_l|``, where ``d_l`` is the neighbour's plane at the common border. This re-weighting is the equation's
+    denominator, which weakens the coupling across a change of depth; ``affinity`` is its factor of likeness. All free
+    superpixels are solved for together, so depth spreads inwards from reliable edges.
 
     Parameters
     ----------
     segments : Superpixels
     adjacent : Adjacency
     affinity : ndarray, shape (E,), float
-        0..1 for each border: whether the two sides belong together.
+        Likeness of the two superpixels of each border, 0..1.
     planes : ndarray, shape (N, 3), float
-        Of the held superpixels, and a start for the others.
+        Planes of the held superpixels, and initial ones of the others.
     free : ndarray, shape (N,), bool
     disparity, weight : ndarray, shape (H, W), float32
         Data.
@@ -158,7 +158,7 @@ def propagate(
 
 
 def _shrinking(tolerance: float) -> list[float]:
-    """Tolerances from wide to the final one, so that the first guess does not decide who is an outlier."""
+    """Tolerances from wide to final, so that the initial planes do not decide what is an outlier."""
     return [max(tolerance, 0.5 * 0.6**k) for k in range(ITERATIONS)]
 
 
@@ -171,7 +171,7 @@ def _medians(segments: Superpixels, values: FloatMap) -> FloatArray:
 def _normal_equations(
     segments: Superpixels, disparity: FloatMap, weight: FloatMap, design: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Weighted least squares of each superpixel's data: matrices (N, 3, 3) and right sides (N, 3)."""
+    """Normal equations of each superpixel's data: matrices (N, 3, 3) and right sides (N, 3)."""
     left, right = np.zeros((len(segments), 3, 3)), np.zeros((len(segments), 3))
     weights, values = (np.ascontiguousarray(of_pixels, np.float32).reshape(-1) for of_pixels in (weight, disparity))
     kernels.add_normal_equations(segments.labels.ravel(), design, weights, values, left, right)
@@ -181,7 +181,7 @@ def _normal_equations(
 def _continuity(
     adjacent: Adjacency, at_first: FloatArray, at_second: FloatArray, strength: FloatArray, slope: float, count: int
 ) -> sparse.csr_array:
-    """Quadratic form of the disagreement of neighbours: of values at the border's middle, and of slopes."""
+    """Quadratic form of the disagreement of neighbours in values at the border's middle, and in slopes."""
     number = len(strength)
     rows = np.arange(number)
     triples = []

@@ -1,4 +1,4 @@
-"""Regions of a picture, each with x and y of its own."""
+"""Regions of a picture, each with its own x and y axes."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Plane = npt.NDArray[np.float64]
 
 
 class Region(NamedTuple):
-    """Pixels that belong together.
+    """A set of pixels of a picture.
 
     Attributes
     ----------
     place : Place
-        Rows and columns of the picture that hold it.
+        Rows and columns of the picture that contain it.
     pixels : ndarray, shape (h, w), bool
-        Which of these it is.
+        Its pixels within these.
     """
 
     place: Place
@@ -34,17 +34,17 @@ class Region(NamedTuple):
 
     @property
     def area(self) -> int:
-        """How many they are."""
+        """Number of pixels."""
         return int(np.count_nonzero(self.pixels))
 
     @property
     def basis(self) -> npt.NDArray[np.float64]:
-        """1, x and y of its pixels, (N, 3), from the middle of its place."""
+        """1, x and y of each pixel, from the middle of the place; shape (N, 3)."""
         return basis_of(self.pixels)
 
 
 def seen_from(plane: Plane, one: Region, other: Region) -> Plane:
-    """The plane of one region as that of the place of another one."""
+    """The plane of one region in the axes of another."""
     down, across = (
         there.start - here.start + (longer - length) / 2
         for here, length, there, longer in zip(
@@ -60,11 +60,11 @@ class Parts(NamedTuple):
     Attributes
     ----------
     labels : ndarray, shape (H, W), int32
-        Number of the part that a pixel belongs to, from 1 on; 0 outside.
+        Number of the part of each pixel, from 1; 0 outside.
     places : list of Place
-        The smallest that hold them.
+        Bounding box of each part.
     areas : ndarray, shape (N,), int32
-        Pixels of each.
+        Area of each part in pixels.
     """
 
     labels: npt.NDArray[np.int32]
@@ -73,8 +73,8 @@ class Parts(NamedTuple):
 
 
 def parts_of(mask: BoolMap) -> Parts:
-    """Parts that hang together by the sides of their pixels, of a mask (H, W)."""
-    # SciPy's needs a quarter of a second to be imported
+    """Parts of a mask (H, W) that are connected by sides of pixels."""
+    # importing SciPy's function takes a quarter of a second
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)
     places = [
         (slice(top, top + height), slice(left, left + width)) for left, top, width, height, _ in stats[1:].tolist()
@@ -83,13 +83,13 @@ def parts_of(mask: BoolMap) -> Parts:
 
 
 def widened(place: Place, margin: int) -> Place:
-    """A place with ``margin`` pixels more on each side, as far as the picture goes."""
+    """A place with ``margin`` more pixels on each side, within the picture."""
     rows, columns = (slice(max(side.start - margin, 0), side.stop + margin) for side in place)
     return rows, columns
 
 
 def basis_of(pixels: BoolMap) -> npt.NDArray[np.float64]:
-    """1, x and y of the pixels that are set in an array (h, w), from its middle; (N, 3)."""
+    """1, x and y of the pixels of a mask (h, w), from its middle; shape (N, 3)."""
     height, width = pixels.shape
     y, x = np.nonzero(pixels)
     return np.stack([np.ones(x.size), x - (width - 1) / 2, y - (height - 1) / 2], axis=1)

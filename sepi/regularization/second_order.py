@@ -1,10 +1,9 @@
-"""Second-order smoothing of a disparity map: planes are free, second differences cost, and the data counts by what it
-knows.
+"""Second-order smoothing of a disparity map: second differences cost, so planes cost nothing.
 
 Minimises ``sum_p w_p (d_p - z_p)^2 + sum_q c_q (D_q d)^2`` over disparities ``d``, where ``z`` is the data, ``w`` its
-weight, and ``D_q`` the second differences along x, along y and across; ``c_q`` is small where that of the data is
-large, unless the data there is worth little, and where the colours change. The system has 13 entries a row, a stencil
-that is never put into a sparse matrix, and is solved in :mod:`sepi.regularization.multilevel`.
+weight, and ``D_q`` the second differences along x, along y and mixed. ``c_q`` is small where the colours change, and
+where reliable data has a large second difference. The system has 13 entries in a row, kept as a stencil instead of a
+sparse matrix; :mod:`sepi.regularization.multilevel` solves it.
 """
 
 from __future__ import annotations
@@ -30,23 +29,23 @@ _BACK, _ON = slice(None, -1), slice(1, None)
 _ACROSS = ((_BACK, _BACK), (_BACK, _ON), (_ON, _BACK), (_ON, _ON))
 
 MARGIN: int = kernels.MARGIN
-"""How far second differences reach, pixels: so wide are the zeros round the pictures of the solver."""
+"""Reach of second differences, pixels, and so the width of the zeros round the solver's pictures."""
 
 LEAST_SINGLE_RTOL = 1e-5
-"""Residual down to which single precision is enough for the solver."""
+"""Least residual for which single precision is enough."""
 
-# along x, along y and across: rows and columns of the pixels that make a difference, and their factors
+# along x, along y and mixed: rows and columns of the pixels of a difference, and their factors
 _DIFFERENCES = (
     (((0, 0), (0, 1), (0, 2)), (1.0, -2.0, 1.0)),
     (((0, 0), (1, 0), (2, 0)), (1.0, -2.0, 1.0)),
     (((0, 0), (0, 1), (1, 0), (1, 1)), (1.0, -1.0, -1.0, 1.0)),
 )
-# of the stencil: rows and columns from a pixel to the other that an entry belongs to
+# of the stencil's entries: rows and columns from one pixel to the other
 _ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 0), (2, 0), (1, 1), (1, -1))
 
 
 def colour_changes(guide: FloatMap) -> list[FloatArray]:
-    """Squared RGB distances within the second differences along x, along y and across.
+    """Squared RGB distances within the second differences along x, along y and mixed.
 
     Parameters
     ----------
@@ -72,7 +71,7 @@ def colour_changes(guide: FloatMap) -> list[FloatArray]:
 
 
 def upper_quartile(disparity: FloatMap) -> float:
-    """That of the second differences of a map (H, W) along x and y, without their signs; 0 of a map of few pixels."""
+    """Upper quartile of a map's absolute second differences along x and y; 0 for a map without any."""
     sizes = [
         np.abs(disparity[first] - 2 * disparity[middle] + disparity[last]).ravel()
         for first, middle, last in (_ALONG_X, _ALONG_Y)
@@ -85,7 +84,7 @@ def upper_quartile(disparity: FloatMap) -> float:
 def smoothness_weights(
     disparity: FloatMap, colours: list[FloatArray], reliability: FloatMap, threshold: float, colour_variance: float
 ) -> list[FloatArray]:
-    """Weights of the second differences along x, along y and across, 0..1.
+    """Weights of the second differences along x, along y and mixed, 0..1.
 
     Parameters
     ----------
@@ -94,11 +93,11 @@ def smoothness_weights(
     colours : list of ndarray
         From :func:`colour_changes`.
     reliability : ndarray, shape (H, W), float32
-        0..1: how far a second difference of the data is believed.
+        Trust in second differences of the data, 0..1.
     threshold : float
-        Second difference that counts as a discontinuity, pixels per view step.
+        Second difference of a discontinuity, pixels per view step.
     colour_variance : float
-        Squared RGB distance at which smoothness falls.
+        Squared RGB distance that scales the weights.
 
     Returns
     -------
@@ -129,8 +128,8 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
     Returns
     -------
     ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
-        Entries of each pixel with itself and with those to the right by 1 and 2, below by 1 and 2, below to the right,
-        and below to the left; the matrix is symmetric. With a margin of zeros of :data:`MARGIN` pixels.
+        Entries of each pixel with itself and with the pixels to the right by 1 and 2, below by 1 and 2, below to the
+        right, and below to the left; the matrix is symmetric. The margin is zero.
     """
     stencil = np.zeros((7, shape[0] + 2 * MARGIN, shape[1] + 2 * MARGIN))
     for (corners, factors), weight in zip(_DIFFERENCES, weights, strict=True):
@@ -145,38 +144,38 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
 def solve_smooth(
     smoothness: FloatArray, weight: FloatMap, data: FloatMap, start: FloatMap, rtol: float, max_iterations: int
 ) -> FloatMap:
-    """Disparities of least energy.
+    """Disparities that minimise the energy.
 
     Parameters
     ----------
     smoothness : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
-        From :func:`second_difference_stencil`, times the strength; the data's weights are added to it.
+        From :func:`second_difference_stencil`, times the strength; this function adds the data's weights to it.
     weight, data : ndarray, shape (H, W), float32
         ``w`` and ``z``.
     start : ndarray, shape (H, W), float32
-        Where the solver starts.
+        Initial disparities.
     rtol : float
-        Residual, relative to the data's deviations from their mean, at which the solver stops.
+        Residual at which the solver stops, relative to the data's deviations from their mean.
     max_iterations : int
-        Steps after which it stops anyway.
+        Most steps of the solver.
 
     Returns
     -------
     ndarray, shape (H, W), float32
     """
     if not weight.any():
-        # nothing holds any surface
+        # without weights any plane is a solution
         return data
     w = weight.astype(np.float64) + 1e-9
-    # smoothness does not know constants: without the mean, the rtol does not depend on where zero lies
+    # smoothness ignores constants: without the mean, rtol does not depend on the zero of disparity
     mean = np.average(data, weights=w)
     inside = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
-    # half the memory to go through, a third of the time; the solution is the same to a hundredth of its own error
+    # single precision takes a third of the time; it changes the solution by a hundredth of its error
     dtype: Any = np.float32 if rtol >= LEAST_SINGLE_RTOL else np.float64
     smoothness[0][inside] += w
     packed = smoothness.astype(dtype)
     inverse = multilevel_inverse(smoothness, dtype)
-    # it is large, and goes unless the caller holds it
+    # frees its memory unless the caller holds it
     del smoothness
     right, first = np.zeros((2, *packed.shape[1:]), dtype)
     right[inside], first[inside] = w * (data - mean), start - mean

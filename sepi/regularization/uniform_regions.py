@@ -1,11 +1,11 @@
-"""Regions without texture, told from faint texture by the noise, and planes for them.
+"""Uniform regions, which have no more texture than noise explains, and their planes.
 
 The mean of all views that see a pixel has a small fraction of one view's noise. A region is uniform where the mean's
-gradients are no larger than that noise explains: then no view knows anything about the depth of a pixel, whatever a
-threshold on contrast says. (This takes the place of the paper's LTI, section IV-C of [1]_.)
+gradients are no larger than this noise explains, so that no view has evidence for the depth of its pixels. (This
+replaces the paper's LTI, section IV-C of [1]_.)
 
-What is known lies on its border (:mod:`sepi.regularization.border_planes`), and in how the light changes over the whole
-of it (:mod:`sepi.regularization.lit_planes`).
+The region's border (:mod:`sepi.regularization.border_planes`) and the change of its light
+(:mod:`sepi.regularization.lit_planes`) tell its plane.
 
 References
 ----------
@@ -40,19 +40,19 @@ if TYPE_CHECKING:
     from sepi.matching.gauss_newton import GaussNewton
 
 LEAST_NOISE = 1e-5
-"""Noise below which rounding of float32 is noise too; integers have at least 0.3 levels by rounding."""
+"""Least noise: rounding of float32. Integers have at least 0.3 levels."""
 
 LEFT_OF_SLOPES = 15 / 128
-"""Of the variance of a difference of neighbours, what the binomial mean leaves of white noise."""
+"""Share of the variance of a central difference of white noise that the binomial filter of denoising leaves."""
 
 MOST_CONTRADICTED = 0.1
-"""Of a region, that views may know otherwise where its plane is right elsewhere."""
+"""Largest share of a region in which views may contradict its plane; beyond, the whole region loses the plane."""
 
 NOISY_VIEWS = 25
-"""Of noisy views, are averaged at least: the mean of fewer has so much noise that texture passes for a plain region."""
+"""Least number of noisy views to average: in the mean of fewer, noise hides texture."""
 
 LIT_SHARE = 0.01
-"""Of the picture, below which nothing is asked: it takes as long as a round of the optimisation."""
+"""Least share of the picture for which planes are sought by the light: this takes as long as an optimisation round."""
 
 
 class UniformPlanesParameters(OcclusionMarginParameters, SofteningParameters, BorderPlaneParameters):
@@ -62,43 +62,44 @@ class UniformPlanesParameters(OcclusionMarginParameters, SofteningParameters, Bo
         0.0316, ge=1e-6, le=2, description="residual at which a view counts half in the mean; RGB distance, 0..1"
     )
     views: int | None = Field(
-        25, ge=2, description="views that are averaged, at least, and of noisy ones at least 25; null: all"
+        25, ge=2, description="least number of views to average; at least 25 if they are noisy; null: all"
     )
     window_radius: int = Field(4, ge=1, le=20, description="gradients are averaged over 2 r + 1 pixels")
     noise_factor: float = Field(
-        4.0, gt=0, description="squared gradient, in units of what noise explains, below which a region is uniform"
+        4.0, gt=0, description="squared gradient below which a region is uniform, as a multiple of what noise explains"
     )
     growth: int = Field(
-        8, ge=0, le=50, description="how far beyond the window's reach a region grows into its own colour, in pixels"
+        8, ge=0, le=50, description="how far a region grows over pixels of its colour, beyond the window, in pixels"
     )
     colour_tolerance: float = Field(
         0.0102, ge=0, le=1, description="RGB distance that counts as the region's colour, colours in 0..1"
     )
-    grow_confidence: float = Field(0.75, ge=0, le=1, description="confidence beyond which a pixel keeps its own depth")
-    min_area: int = Field(50, ge=1, description="smaller regions are left alone, in pixels")
-    border_confidence: float = Field(0.3, ge=0, le=1, description="confidence from which a border pixel counts")
-    light: bool = Field(True, description="whether planes are sought by how the light of a region changes, too")
+    grow_confidence: float = Field(0.75, ge=0, le=1, description="confidence from which a region does not take a pixel")
+    min_area: int = Field(50, ge=1, description="least area of a region that may get a plane, in pixels")
+    border_confidence: float = Field(0.3, ge=0, le=1, description="confidence above which a border pixel counts")
+    light: bool = Field(True, description="whether the change of a region's light may tell its plane, too")
     pockets: bool = Field(
-        True, description="whether a region whose border tells no plane may get that of a larger one beside it"
+        True, description="whether a region may get the plane of a larger one beside it if its border tells none"
     )
 
 
 def fill_uniform_regions(
     light_field: LightField, before: StageMaps, parameters: UniformPlanesParameters
 ) -> tuple[FloatMap, BoolMap]:
-    """Disparity with planes in uniform regions, and where that is.
+    """Disparity with planes in uniform regions, and the mask of their pixels.
 
     Parameters
     ----------
     light_field : LightField
     before : StageMaps
+        Maps of the stage before.
     parameters : UniformPlanesParameters
 
     Returns
     -------
     disparity : ndarray, shape (H, W), float32
     held : ndarray, shape (H, W), bool
-        What was given a plane.
+        Pixels that got a plane and should keep it; where noise may hide faint texture, a border's plane is not held.
 
     Raises
     ------
@@ -107,7 +108,7 @@ def fill_uniform_regions(
     """
     from sepi.matching.gauss_newton import GaussNewton
 
-    # planes need it, where views have taken what memory there is
+    # before the views take the memory
     take_blas_buffer()
     field = compared_views(light_field, parameters)
     noisy = isinstance(field, DenoisedLightField)
@@ -126,7 +127,7 @@ def fill_uniform_regions(
     disparity, held = before.disparity.copy(), np.zeros_like(core)
     for (region, _), chosen in zip(found, planes, strict=True):
         if chosen is not None:
-            # a plane that its border holds at one side only may lead anywhere
+            # a plane known at one side only may leave the range at the other
             values = np.clip(region.basis @ chosen.plane, known.minimum, known.maximum)
             disparity[region.place][region.pixels] = values
     regions = disparity != before.disparity
@@ -143,7 +144,7 @@ def fill_uniform_regions(
             kept |= kept_pixels(pixels, disparity[place], before.disparity[place], chosen)
         disparity[place][kept] = before.disparity[place][kept]
         pixels = pixels & ~kept
-        # where noise hides faint texture, that may know the surface better than the plane of a border
+        # faint texture below the noise may tell the surface better than a border's plane
         faint = noisy and chosen.source == "border" and 2 * core[place][pixels].sum() < pixels.sum()
         held[place] |= pixels & np.bool_(not faint)
     return disparity, held
@@ -172,7 +173,7 @@ def _with_borders(
         place = widened(inner, 2)
         pixels = parts.labels[place] == number
         border = cv2.dilate(pixels.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-        # what lies in another region is no border, whether or not that one gets a plane: their order must not matter
+        # pixels of other regions never count as border, so that the order of regions does not matter
         border &= ~uniform[place] & (before.confidence[place] > parameters.border_confidence)
         found.append((Region(place, pixels), BorderPlane.of(border, before.disparity[place], parameters)))
     return found
@@ -186,7 +187,7 @@ def _by_light(
     variance: FloatMap,
     noisy: bool,
 ) -> dict[int, LitPlane]:
-    """Planes by the light, of regions that are large and, where there is no noise, whose border does not tell."""
+    """Planes by the light, for large regions; without noise only for those whose border tells no single plane."""
     asked = [
         n
         for n, (region, border) in enumerate(found)
@@ -211,30 +212,30 @@ def _planes_of(
     noisy: bool,
     parameters: UniformPlanesParameters,
 ) -> list[Chosen | None]:
-    """What each region is given; of pockets that of the regions beside them."""
+    """Plane of each region; pockets get the plane of a region beside them."""
     regions = [region for region, _ in found]
     planes = [
         chosen_plane(region, disparity[region.place], border, lit.get(n), noisy)
         for n, (region, border) in enumerate(found)
     ]
     if noisy or not parameters.pockets:
-        # in noise a region without a border's plane may have faint texture that knows its depth
+        # in noise, faint texture may tell the depth of a region without a border's plane
         return planes
     pockets = [n for n, (region, border) in enumerate(found) if _tells_little(region, border, planes[n])]
-    # no farther than regions grow
+    # as far as regions grow
     reach = parameters.window_radius + parameters.growth
     return with_pockets(regions, planes, pockets, mean, reach, parameters.colour_tolerance)
 
 
 def _tells_little(region: Region, border: BorderPlane | None, chosen: Chosen | None) -> bool:
-    """Whether a region has no plane, or only that of a border most of which lies elsewhere."""
+    """Whether a region has no plane, or only its border's, most of which the plane does not fit."""
     if border is None or chosen is None:
         return border is None and chosen is None
     return chosen.source == "border" and not chosen.confirmed and not border.is_one_plane(region.area)
 
 
 def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: UniformPlanesParameters) -> BoolMap:
-    """Where the mean of the views varies no more than its noise.
+    """Pixels round which the mean of the views varies no more than its noise.
 
     Parameters
     ----------
@@ -254,7 +255,7 @@ def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: Uniform
     )
     size = 2 * parameters.window_radius + 1
     energy = cv2.blur(np.sum(cv2.split(down * down + across * across), axis=0), (size, size))
-    # they halve the noise along each of the two axes; three channels
+    # central differences halve the variance; two axes, three channels
     return np.asarray(energy < parameters.noise_factor * 3 * variance)
 
 
@@ -265,7 +266,7 @@ def uniform_regions(
     confidence: FloatMap,
     parameters: UniformPlanesParameters,
 ) -> BoolMap:
-    """Plain pixels, and what lies round them in their own colour.
+    """Plain pixels, and pixels of their colour around them.
 
     Parameters
     ----------
@@ -286,5 +287,5 @@ def uniform_regions(
     near = cv2.blur(core.astype(np.float32), (size, size))
     colour = cv2.blur(mean * core[..., None].astype(np.float32), (size, size)) / np.maximum(near, 1e-9)[..., None]
     alike = np.sum(cv2.split((mean - colour) ** 2), axis=0) < 27 * variance + parameters.colour_tolerance**2
-    # a running sum leaves rounding errors where there is nothing
+    # above zero by more than the rounding errors of a running sum
     return np.asarray(core | ((near > 0.5 / size**2) & alike & (confidence < parameters.grow_confidence)))

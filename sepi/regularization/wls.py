@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 
 LEAST_CONFIDENCE = 0.01
-"""Keeps the system solvable where no pixel is trusted."""
+"""Least confidence, which keeps the system solvable."""
 
 ITERATIONS_BEFORE_MULTIGRID = 200
-"""As long as setting up the multigrid takes."""
+"""Number of iterations that take about as long as setting up the multigrid."""
 
 
 class WlsParameters(Parameters):
@@ -37,7 +37,7 @@ class WlsParameters(Parameters):
         3e-6, ge=0, description="weight of smoothness against data; for gradients of values 0..1 per px"
     )
     gradient_floor: float = Field(
-        0.002, gt=0, description="image gradient below which all is equally smooth, 0..1 per px"
+        0.002, gt=0, description="image gradient below which smoothness no longer grows, 0..1 per px"
     )
     tau_0: float = Field(1000.0, ge=0, description="how sharply the data weight falls beyond tau_1")
     tau_1: float = Field(
@@ -47,26 +47,24 @@ class WlsParameters(Parameters):
         0.1,
         gt=0,
         le=1,
-        description="share of its weight that data keeps at a discontinuity, where Eq. 9 would leave none",
+        description="share of its weight that data keeps at a discontinuity; Eq. 9: 0",
     )
     tau_2: float = Field(1.5, ge=0, description="how strongly confidence weakens smoothness")
     textureless_confidence: float = Field(0.8, ge=0, le=1, description="c_tl, confidence of textureless regions")
     confidence_power: float = Field(4.0, gt=0, le=10, description="exponent on the confidence as data weight")
     rtol: float = Field(
-        1e-12, gt=0, lt=1, description="relative residual at which the solver stops; pixels of low weight need it small"
+        1e-12, gt=0, lt=1, description="relative residual at which the solver stops; small for pixels of low weight"
     )
 
 
 def rectified_confidence(confidence: FloatMap, textureless: BoolMap, parameters: WlsParameters) -> FloatMap:
-    """Confidence c' of Eq. 10: a constant where textureless, else the stage's own (of the half-SEPI where occluded)."""
+    """Confidence c' of Eq. 10: a constant in textureless regions, else the confidence of the stage before."""
     own = relative_confidence(confidence)
     return np.where(textureless, parameters.textureless_confidence, own).astype(np.float32)
 
 
 def data_weight(disparity: FloatMap, confidence: FloatMap, parameters: WlsParameters) -> FloatMap:
-    """Weight w of Eq. 9: the confidence, or little of it at depth discontinuities, where the deviation in 3x3 pixels
-    marks one.
-    """
+    """Weight w of Eq. 9: a power of the confidence, reduced at depth discontinuities; shape (H, W), float32."""
     mean = cv2.blur(disparity, (3, 3))
     deviation = np.sqrt(np.maximum(cv2.blur((disparity - mean) ** 2, (3, 3)), 0))
     cut = np.exp(-np.minimum(parameters.tau_0 * np.maximum(deviation - parameters.tau_1, 0), 80))
@@ -86,7 +84,7 @@ def energy_system(
 ) -> tuple[sparse.csr_matrix, FloatArray]:
     """Normal equations of Eq. 8 on the 4-connected grid.
 
-    Each pair of neighbours stands twice in the sum, once with the coefficient of either pixel.
+    The sum holds each pair of neighbours twice, with the coefficient of either pixel.
 
     Returns
     -------
@@ -110,11 +108,11 @@ def energy_system(
 
 
 def solve(matrix: sparse.csr_matrix, right: FloatArray, start: FloatMap, rtol: float) -> FloatArray:
-    """Solve by conjugate gradients, to a residual relative to the right side; shape of ``start``, float64.
+    """Solution of the normal equations by conjugate gradients; shape of ``start``, float64.
 
-    With little smoothness the diagonal is preconditioner enough, and an algebraic multigrid takes several times as long
-    to set up as that takes to arrive. What has not arrived after a few iterations is left to multigrid, whose
-    iterations do not grow in number with smoothness or with regions that have hardly any data.
+    With little smoothness, the diagonal is a sufficient preconditioner, and setting up an algebraic multigrid [2]_
+    would take several times as long as the solution. If a residual of ``rtol`` times the right side is not reached
+    soon, the multigrid takes over: its number of iterations does not grow with smoothness or scarce data.
     """
     import scipy.sparse as sparse
     from scipy.sparse.linalg import cg
