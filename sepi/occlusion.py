@@ -52,16 +52,16 @@ class OcclusionParameters(SweepParameters, CannyParameters):
     """What both occlusion models need: candidates, and when a half replaces the full SEPI."""
 
     discontinuity_threshold: float = Field(
-        0.3, gt=0, description="change of the initial depth that makes a candidate, pixels per view step"
+        0.3,
+        gt=0,
+        description="change of the initial depth that makes a pixel a candidate for occlusion, pixels per view step",
     )
     candidate_reach: int = Field(
-        12, ge=0, le=50, description="distance from an edge within which pixels are candidates, px"
+        12, ge=0, le=50, description="distance from an edge within which pixels are candidates, in pixels"
     )
     gain_half: float = Field(0.015, ge=0, le=1, description="by how much a half must lower the mean cost (0..1)")
     gain_quarter: float = Field(0.03, ge=0, le=1, description="by how much a quarter must lower the mean cost (0..1)")
-    min_change: float = Field(
-        0.1, ge=0, description="smaller changes keep the depth from all views, pixels per view step"
-    )
+    min_change: float = Field(0.1, ge=0, description="least change from the depth by all views, pixels per view step")
 
 
 class HalfSepiParameters(OcclusionParameters):
@@ -70,10 +70,10 @@ class HalfSepiParameters(OcclusionParameters):
     patch_radius: int = Field(4, ge=1, le=20, description="mean-shift patch of 2 r + 1 pixels")
     patch_sigma_colour: float = Field(0.05, gt=0, description="mean-shift bandwidth, RGB distance, colours in 0..1")
     patch_sigma_disparity: float = Field(0.3, gt=0, description="mean-shift bandwidth, pixels per view step")
-    side_reach: int = Field(16, ge=1, le=50, description="how far away the nearer surface is looked for, pixels")
+    side_reach: int = Field(16, ge=1, le=50, description="distance within which the nearer surface is searched, pixels")
     side_margin: float = Field(0.1, ge=0, description="by how much the occluder must be nearer, pixels per view step")
     gain_unconfirmed: float = Field(
-        0.03, ge=0, le=2, description="further gain asked for where no nearer surface is found on the hidden side"
+        0.03, ge=0, le=2, description="further gain that is needed if no nearer surface is found on the hidden side"
     )
 
     @property

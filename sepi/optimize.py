@@ -77,42 +77,46 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
         0.02,
         ge=0,
         le=1,
-        description="noise of one channel from which on views are denoised for this stage, colours in 0..1: with less, "
-        "what many views tell of fainter detail is worth more",
+        description="least noise at which this stage works on denoised views; standard deviation of one channel, "
+        "colours in 0..1. Below it, denoising would lose faint detail that many views show",
     )
-    views: int | None = Field(None, ge=2, description="views that the last step compares, at least; null: all")
+    views: int | None = Field(None, ge=2, description="least number of views for the last step; null: all")
     first_views: int | None = Field(
         25,
         ge=2,
-        description="views that all steps but the last compare, at least, unless they are noisy; null: all",
+        description="least number of views for all steps but the last; null, or if they are noisy: all",
     )
     refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
     noisy_refinements: int = Field(
-        6, ge=0, le=20, description="the same of noisy views, in which matching ends farther from where it should"
+        6, ge=0, le=20, description="the same for noisy views, where matching ends farther from the true depth"
     )
     refinement_radius: int = Field(4, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
-    one_surface: bool = Field(True, description="whether windows end at another surface, by disparities and colours")
+    one_surface: bool = Field(
+        True, description="whether a window leaves out other surfaces, by disparities and colours"
+    )
     solves: int = Field(4, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
     solve_radius: int = Field(1, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
     max_update: float = Field(0.05, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
-    strength: float = Field(7.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
+    strength: float = Field(
+        7.0, ge=0, description="weight of the smoothness; the best-known tenth of the pixels has data of weight 1"
+    )
     second_difference_threshold: float = Field(
         0.03, gt=0, description="second difference that marks a discontinuity in the first round, pixels per view step"
     )
     roughness_factor: float = Field(
-        40.0, ge=0, description="the same in later rounds, times the upper quartile of those that the map has"
+        40.0, ge=0, description="the same in later rounds, as a multiple of the second differences' upper quartile"
     )
     smooth_colour: float = Field(
         0.1,
         gt=0,
-        description="RGB distance at which smoothness falls and windows end, colours in 0..1; noise adds to it",
+        description="RGB distance at which smoothness and windows' weights fall, colours in 0..1; noise adds to it",
     )
     reliable_confidence: float = Field(
-        0.5, gt=0, le=1, description="confidence within two pixels from which discontinuities in the data are believed"
+        0.5, gt=0, le=1, description="confidence within two pixels from which a discontinuity in the data is trusted"
     )
-    rtol: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the last round's solver stops")
-    first_rtol: float = Field(3e-3, gt=0, lt=1, description="the same for all rounds before it")
-    max_iterations: int = Field(200, ge=1, description="iterations after which the solver stops anyway")
+    rtol: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the solver stops in the last round")
+    first_rtol: float = Field(3e-3, gt=0, lt=1, description="the same for the other rounds")
+    max_iterations: int = Field(200, ge=1, description="most iterations of the solver")
 
     @model_validator(mode="after")
     def _does_something(self) -> Self:

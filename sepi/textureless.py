@@ -38,22 +38,22 @@ class LtiParameters(CannyParameters):
 
     superpixel_size: int = Field(15, ge=4, le=100, description="superpixel width up to 512x512 pixels, in pixels")
     superpixel_size_large: int = Field(17, ge=4, le=100, description="superpixel width above 512x512 pixels, in pixels")
-    compactness: float = Field(10.0, gt=0, description="SLIC: weight of nearness against likeness of colour")
+    compactness: float = Field(10.0, gt=0, description="SLIC: weight of distance relative to colour")
     texture_confidence: float = Field(
-        0.8, ge=0, le=1, description="confidence from which a slope is distinct, relative to the scene's best"
+        0.8, ge=0, le=1, description="least confidence of a distinct slope, relative to the scene's best"
     )
     texture_agreement: float = Field(
-        0.9, ge=0, le=1, description="share of agreeing neighbours from which a slope is taken for sound"
+        0.9, ge=0, le=1, description="least share of neighbours that must agree with a slope"
     )
     min_support: float = Field(
         0.25,
         ge=0,
         le=1,
-        description="share of texture points and agreeing slopes from which a superpixel is not overruled",
+        description="share of texture points and agreeing slopes from which a superpixel keeps its depth",
     )
-    agreement_radius: int = Field(3, ge=1, le=10, description="neighbourhood of 2 r + 1 pixels")
+    agreement_radius: int = Field(3, ge=1, le=10, description="neighbourhood for this agreement, 2 r + 1 pixels")
     agreement_difference: float = Field(
-        0.15, gt=0, description="difference up to which neighbours agree, pixels per view step"
+        0.15, gt=0, description="largest difference of agreeing neighbours, pixels per view step"
     )
     lti_floor: float = Field(0.1, ge=0, le=1, description="least threshold of the LTI, share of texture points")
     lti_ceiling: float = Field(0.4, ge=0, le=1, description="greatest threshold of the LTI, share of texture points")
@@ -61,16 +61,18 @@ class LtiParameters(CannyParameters):
         0.03, gt=0, description="mean-shift bandwidth in the HSV cone of radius 1, height 1"
     )
     continuity: float = Field(0.3, ge=0, description="tau_out, weight of continuity between neighbours")
-    slope_continuity: float = Field(10.0, ge=0, description="weight of equal slopes against equal depth at the border")
+    slope_continuity: float = Field(
+        10.0, ge=0, description="weight of equal slopes relative to equal depth at the border"
+    )
     tolerance: float = Field(0.05, gt=0, description="residual of an inlier, pixels per view step")
     keep_confidence: float = Field(
-        0.7, ge=0, le=1, description="relative confidence from which a pixel's own depth resists a plane"
+        0.7, ge=0, le=1, description="relative confidence from which a pixel resists a plane"
     )
     smoothing_difference: float = Field(
-        0.1, gt=0, description="change that counts as smoothing, not as overruling, pixels per view step"
+        0.1, gt=0, description="change of depth below which no pixel resists, pixels per view step"
     )
     keep_share: float = Field(
-        0.3, ge=0, le=1, description="share of resisting pixels that refuses a superpixel's plane"
+        0.3, ge=0, le=1, description="share of resisting pixels at which a superpixel keeps its own depth"
     )
 
 

@@ -76,14 +76,16 @@ class AccParameters(CandidateParameters):
     )
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
-    colour_share: float = Field(0.5, ge=0, le=1, description="share of the colours in the cost, the rest is gradients'")
+    colour_share: float = Field(
+        0.5, ge=0, le=1, description="share of the colours in the cost; gradients have the rest"
+    )
     colour_truncation: float = Field(
-        0.05, gt=0, description="difference from which a further one costs nothing more, colours in 0..1"
+        0.05, gt=0, description="difference beyond which the cost no longer grows, colours in 0..1"
     )
     gradient_truncation: float = Field(
-        0.02, gt=0, description="difference of gradients from which a further one costs nothing more, colours per pixel"
+        0.02, gt=0, description="difference of gradients beyond which the cost no longer grows, colours per pixel"
     )
-    window_radius: int = Field(1, ge=0, le=10, description="cost window of 2 r + 1 pixels; 0 aggregates nothing")
+    window_radius: int = Field(1, ge=0, le=10, description="cost window of 2 r + 1 pixels; 0: none")
     filter_radius: int = Field(5, ge=1, le=50, description="window of 2 r + 1 pixels that filters cost slices")
     filter_epsilon: float = Field(
         1e-4, gt=0, description="variance of colour above which the filter keeps edges, colours in 0..1"
@@ -100,17 +102,23 @@ class ConfidentLabelsParameters(Parameters):
     needs: ClassVar[Needs] = Needs(bytes_per_sample=6, bytes_per_pixel=3000, seconds_per_megasample=1)
 
     reliable_deviation: float = Field(
-        0.003, ge=0, description="standard deviation over the candidates from which a pixel's least cost counts"
+        0.003, ge=0, description="standard deviation of the costs over the candidates from which a pixel is reliable"
     )
     fidelity: float = Field(
-        0.01, ge=0, description="cost of a hundredth of the disparity range off a reliable pixel's first depth"
+        0.01,
+        ge=0,
+        description="cost of a difference from a reliable pixel's first depth, per hundredth of the disparity range",
     )
     correspondence: float = Field(
-        0.2, ge=0, description="cost of a hundredth of the disparity range off the depth of matched features"
+        0.2,
+        ge=0,
+        description="cost of a difference from the depth of matched features, per hundredth of the disparity range",
     )
-    smoothness: float = Field(0.003, ge=0, description="cost of a change by a hundredth of the disparity range")
-    iterations: int = Field(5, ge=1, le=100, description="passes of the messages, forth and back")
-    refinements: int = Field(4, ge=0, le=100, description="times that the continuous depth is fitted")
+    smoothness: float = Field(
+        0.003, ge=0, description="cost of a change between neighbours, per hundredth of the disparity range"
+    )
+    iterations: int = Field(5, ge=1, le=100, description="passes of the messages, there and back")
+    refinements: int = Field(4, ge=0, le=100, description="number of fits of the continuous depth")
     filter_radius: int = Field(3, ge=1, le=50, description="window of 2 r + 1 pixels that filters the refinement")
     filter_epsilon: float = Field(
         1e-4, gt=0, description="variance of colour above which the filter keeps edges, colours in 0..1"

@@ -80,10 +80,10 @@ class ConstrainedEntropyParameters(CandidateParameters):
         0.1,
         ge=1e-3,
         le=10,
-        description="difference to the pixel's colour at which views and neighbours count less, colours in 0..1",
+        description="colour difference at which the weight of views and neighbours falls, colours in 0..1",
     )
     colour_constraint: float = Field(
-        1.0, ge=0, description="what a sub-patch without any of the pixel's colour adds to its defocus, colours in 0..1"
+        1.0, ge=0, description="defocus added for a sub-patch that has none of the pixel's colour, colours in 0..1"
     )
     filter_radius: int = Field(5, ge=1, le=50, description="window of 2 r + 1 pixels in which costs are filtered")
     filter_epsilon: float = Field(

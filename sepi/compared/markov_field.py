@@ -23,14 +23,16 @@ class MarkovFieldParameters(Parameters):
 
     needs: ClassVar[Needs] = Needs(bytes_per_sample=6, bytes_per_pixel=4000, seconds_per_megasample=0.6)
 
-    smoothness: float = Field(0.02, ge=0, description="cost of a change by a hundredth of the disparity range")
+    smoothness: float = Field(
+        0.02, ge=0, description="cost of a change between neighbours, per hundredth of the disparity range"
+    )
     truncation: float = Field(
-        0.1, gt=0, le=1, description="change from which a further one costs no more, part of the disparity range"
+        0.1, gt=0, le=1, description="change beyond which the cost no longer grows, as a share of the disparity range"
     )
     contrast: float = Field(
         0.05, gt=0, description="mean difference of colours at which smoothness falls to 1/e, colours in 0..1"
     )
-    iterations: int = Field(8, ge=1, le=100, description="passes of the messages, forth and back")
+    iterations: int = Field(8, ge=1, le=100, description="passes of the messages, there and back")
 
 
 def markov_field(

@@ -90,14 +90,15 @@ class MishibaParameters(CandidateParameters):
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     feature_sigma: float = Field(
-        1.0, gt=0, le=10, description="Gaussian of the mean that a pixel's bit is compared with, in pixels"
+        1.0,
+        gt=0,
+        le=10,
+        description="standard deviation of the Gaussian mean with which a pixel is compared for its bit, in pixels",
     )
     lattice_step: int = Field(
-        2, ge=1, le=8, description="distance of the pixels whose costs are computed; those between are interpolated"
+        2, ge=1, le=8, description="distance of the pixels whose costs are computed, in pixels; others are interpolated"
     )
-    radius: int = Field(
-        3, ge=1, le=50, description="window of 2 r + 1 lattice pixels whose costs are fitted with colours"
-    )
+    radius: int = Field(3, ge=1, le=50, description="window in which colours fit the costs, 2 r + 1 of these pixels")
     epsilon: float = Field(1e-4, gt=0, description="variance of colour above which edges are kept, colours in 0..1")
 
 
@@ -105,11 +106,11 @@ class MedianDescentParameters(Parameters):
     """Parameters of the refinement by weighted medians."""
 
     smoothness: float = Field(
-        1.2, ge=0, le=100, description="weight of all neighbours of a pixel together, of its colour; its datum has 0..1"
+        1.2, ge=0, le=100, description="weight of all neighbours of a pixel's colour together; data has 0..1"
     )
     sigma: float = Field(0.03, ge=1e-4, le=2, description="RGB distance at which a neighbour's weight falls, 0..1")
-    radius: int = Field(5, ge=1, le=15, description="neighbours of a pixel: 2 r + 1 squared, with gaps between")
-    gap: int = Field(2, ge=1, le=10, description="distance of neighbours from each other, in pixels")
+    radius: int = Field(5, ge=1, le=15, description="neighbourhood of 2 r + 1 by 2 r + 1 pixels, with gaps between")
+    gap: int = Field(2, ge=1, le=10, description="distance of these neighbours, in pixels")
     passes: int = Field(8, ge=1, le=100, description="passes of the weighted median over all pixels")
 
 

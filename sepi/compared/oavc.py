@@ -85,20 +85,20 @@ class OavcParameters(CandidateParameters):
         0.5,
         gt=0,
         le=1,
-        description="share of the views that must have a vote for some candidate; sets each pixel's threshold",
+        description="share of the views that must vote for some candidate; it sets each pixel's threshold",
     )
     least_threshold: float = Field(
         0.004,
         ge=1e-6,
         le=1,
-        description="least difference within which a view has a vote, mean of the channels, colours in 0..1",
+        description="least threshold of a vote: mean difference of the channels, colours in 0..1",
     )
 
 
 class GuidedMedianParameters(GuidedCostsParameters):
     """Parameters of the filtered costs and of the median of the map."""
 
-    median_radius: int = Field(3, ge=0, le=50, description="median window of 2 r + 1 pixels; 0 takes no median")
+    median_radius: int = Field(3, ge=0, le=50, description="median window of 2 r + 1 pixels; 0: no median")
     median_sigma: float = Field(
         0.05, gt=0, description="RGB distance at which a pixel's weight in the median falls, colours in 0..1"
     )

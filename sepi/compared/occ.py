@@ -105,7 +105,7 @@ class OccSplitParameters(OccParameters, CannyParameters):
         "the distance of the farthest view",
     )
     colour_tolerance: float = Field(
-        0.02, ge=0, le=1, description="by how much the halves' colours may look reversed, colours in 0..1"
+        0.02, ge=0, le=1, description="how far the halves' colours may look reversed, colours in 0..1"
     )
 
 
@@ -119,18 +119,18 @@ class OccFieldParameters(CandidateParameters):
 
     num_disparities: int | None = number_field(LABELS, "docs/reproduce/compared.md")
     smoothness: float = Field(
-        1.0, ge=0, description="cost of a jump between neighbours of one colour; that of any disparity is 1 at most"
+        1.0, ge=0, description="cost of a jump between neighbours of one colour; the cost of a disparity is at most 1"
     )
     truncation: float = Field(
-        0.03, gt=0, le=1, description="change from which a further one costs no more, part of the disparity range"
+        0.03, gt=0, le=1, description="change beyond which the cost no longer grows, as a share of the disparity range"
     )
     contrast: float = Field(
         0.02, gt=0, description="mean difference of colours at which smoothness falls to a half, colours in 0..1"
     )
     occlusion_weight: float = Field(
-        0.002, ge=0, description="difference of colours that a change of the predicted occlusion by 1 counts as"
+        0.002, ge=0, description="difference of colours that equals a change of the predicted occlusion by 1"
     )
-    iterations: int = Field(8, ge=1, le=100, description="passes of the messages, forth and back")
+    iterations: int = Field(8, ge=1, le=100, description="passes of the messages, there and back")
 
 
 class Found(NamedTuple):

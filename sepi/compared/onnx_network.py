@@ -59,18 +59,22 @@ class OnnxParameters(Parameters):
         ("all: 1 (t s c) y x",), min_length=1, description="'VIEWS: AXES' of each input (docs/reproduce/compared.md)"
     )
     grid: tuple[int, int] | None = Field(
-        None, description="rows and columns of views that the network takes, round the reference view; null: all"
+        None, description="rows and columns of views round the reference view that the network takes; null: all"
     )
-    reversed: tuple[Literal["t", "s"], ...] = Field((), description="axes of views that it counts from the other end")
-    grey: bool = Field(False, description="whether it takes one channel, of brightness")
-    scale: float = Field(1.0, description="factor of the colours, which are 0..1")
-    offset: float = Field(0.0, description="added to them then")
-    output: str | None = Field(None, description="name of the output that is the disparity; null: the first")
-    disparity_scale: float = Field(1.0, description="factor that makes pixels per view step of its output")
-    disparity_offset: float = Field(0.0, description="added then, pixels per view step")
-    margin: int = Field(0, ge=0, le=200, description="by how much the output is smaller on each side, pixels")
-    tile: int | None = Field(None, ge=8, description="width of the pieces of the output, pixels; null: the whole")
-    overlap: int = Field(16, ge=0, description="by how much pieces reach into each other, pixels")
+    reversed: tuple[Literal["t", "s"], ...] = Field(
+        (), description="axes of views whose order the network takes reversed"
+    )
+    grey: bool = Field(False, description="whether the network takes one channel, brightness")
+    scale: float = Field(1.0, description="factor of the input colours, which are 0..1")
+    offset: float = Field(0.0, description="added to the input colours after the factor")
+    output: str | None = Field(None, description="name of the output with the disparity; null: the first")
+    disparity_scale: float = Field(1.0, description="factor from the output to pixels per view step")
+    disparity_offset: float = Field(0.0, description="added to the output after the factor, pixels per view step")
+    margin: int = Field(
+        0, ge=0, le=200, description="how much narrower the output is than the input on each side, pixels"
+    )
+    tile: int | None = Field(None, ge=8, description="width of the output's tiles, pixels; null: one for all")
+    overlap: int = Field(16, ge=0, description="overlap of neighbouring tiles, pixels")
 
     @model_validator(mode="after")
     def _can_be_followed(self) -> Self:

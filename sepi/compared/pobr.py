@@ -95,10 +95,12 @@ class PobrCostParameters(CandidateParameters):
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     truncation: float = Field(
-        0.1, gt=0, le=1, description="t, colour difference from which a further one costs no more, colours in 0..1"
+        0.1, gt=0, le=1, description="t, colour difference beyond which the cost no longer grows, colours in 0..1"
     )
-    radius: int = Field(2, ge=1, le=20, description="of the guided filter of the costs, windows of 2 r + 1 pixels")
-    epsilon: float = Field(1e-4, gt=0, description="variance of colour above which that filter keeps edges, 0..1")
+    radius: int = Field(2, ge=1, le=20, description="window of the guided filter of the costs, 2 r + 1 pixels")
+    epsilon: float = Field(
+        1e-4, gt=0, description="variance of colour above which the filter keeps edges, colours in 0..1"
+    )
 
 
 class PobrRegionParameters(Parameters):
@@ -107,9 +109,11 @@ class PobrRegionParameters(Parameters):
     superpixels: int = Field(2000, ge=1, description="number of superpixels")
     tau_0: float = Field(1000.0, ge=0, description="how sharply the label confidence falls beyond tau_1")
     tau_1: float = Field(
-        0.2, ge=0, description="deviation of its labels that makes a superpixel such a region, pixels per view step"
+        0.2,
+        ge=0,
+        description="deviation of a superpixel's labels above which their confidence falls, pixels per view step",
     )
-    least_share: float = Field(0.03, gt=0, le=1, description="q, share that a shrunk label confidence keeps")
+    least_share: float = Field(0.03, gt=0, le=1, description="q, least factor of the label confidence")
 
 
 class PobrSmoothingParameters(Parameters):
@@ -119,7 +123,9 @@ class PobrSmoothingParameters(Parameters):
         3e-6, ge=0, description="weight of smoothness against data; for gradients of values 0..1 per px"
     )
     gradient_floor: float = Field(
-        0.002, gt=0, description="f, image gradient below which all is equally smooth, 0..1 per px; noise adds to it"
+        0.002,
+        gt=0,
+        description="f, image gradient below which smoothness no longer grows, 0..1 per px; noise adds to it",
     )
     tau_2: float = Field(1.5, ge=0, description="how strongly label confidence weakens smoothness")
 

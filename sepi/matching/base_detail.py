@@ -56,7 +56,7 @@ class BaseDetailParameters(SofteningParameters):
     detail_share: float = Field(0.6, gt=0, le=1, description="share of the detail in the cost")
     base_radius: int = Field(4, ge=1, le=20, description="bilateral window of 2 r + 1 pixels that takes detail out")
     base_sigma_colour: float = Field(
-        0.05, gt=0, le=2, description="sum of the RGB differences that counts as an edge of the base, colours in 0..1"
+        0.05, gt=0, le=2, description="sum of RGB differences at an edge of the base, colours in 0..1"
     )
     base_sigma_space: float = Field(4.0, gt=0, le=20, description="width of the base's window, in pixels")
 

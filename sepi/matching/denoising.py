@@ -59,7 +59,7 @@ class DenoisingParameters(Parameters):
     """Parameters of the denoising."""
 
     denoising: float = Field(
-        1.5, ge=0, le=10, description="detail of noisy views below so many times its noise is left out; 0 keeps all"
+        1.5, ge=0, le=10, description="detail of noisy views below this multiple of its noise is left out; 0 keeps all"
     )
 
 

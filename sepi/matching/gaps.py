@@ -33,16 +33,16 @@ _MOST, _SEEING = 3 / 4, 1 / 8
 class GapParameters(OcclusionMarginParameters):
     """Parameters of what is seen through gaps."""
 
-    gaps: bool = Field(True, description="whether what is seen through gaps is told from what borders them")
+    gaps: bool = Field(True, description="whether surfaces seen through gaps get a depth of their own")
     gap_step: float = Field(
-        0.6, gt=0, description="by how much a farther surface is farther at least, pixels per view step"
+        0.6, gt=0, description="least depth step from the gap's border to the surface behind, pixels per view step"
     )
     gap_reach: int = Field(
-        32, ge=1, le=200, description="how far away a farther surface of the same colour is looked for, pixels"
+        32, ge=1, le=200, description="distance within which a farther surface of the same colour is searched, pixels"
     )
-    gap_colour: float = Field(0.06, gt=0, le=2, description="distance of colours that are the same; RGB, 0..1")
+    gap_colour: float = Field(0.06, gt=0, le=2, description="largest RGB distance of the same colour, colours in 0..1")
     gap_gain: float = Field(
-        0.5, gt=0, lt=1, description="share of the squared residual that has to be left at the farther depth, at most"
+        0.5, gt=0, lt=1, description="largest squared residual at the farther depth, as a share of that before"
     )
 
 

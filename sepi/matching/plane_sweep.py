@@ -59,19 +59,17 @@ class SweepParameters(CandidateParameters):
         le=2,
         description="residual at which the robust photo-consistency is one half; RGB distance, colours in 0..1",
     )
-    window_radius: int = Field(
-        3, ge=0, le=10, description="cost window of 2 r + 1 pixels; 0 aggregates nothing, in pixels"
-    )
+    window_radius: int = Field(3, ge=0, le=10, description="cost window of 2 r + 1 pixels, in pixels; 0: none")
     window_sigma: float = Field(
         0.02,
         ge=1e-6,
         le=10,
-        description="colour distance at which a window pixel's weight falls; RGB distance, colours in 0..1",
+        description="RGB distance at which a window pixel's weight falls, colours in 0..1",
     )
     correct_noise: bool = Field(
         True,
-        description="whether costs are without what noise makes of interpolation, and confidence without most of what "
-        "noise alone costs",
+        description="whether costs are corrected for the effect of interpolation on noise, and confidence for most of "
+        "the cost of noise",
     )
     softening: Softening = 0.7
 

@@ -63,7 +63,7 @@ class SmoothingParameters(Parameters):
     )
     small_penalty: SmallPenalty = 0.03
     large_penalty: float = Field(
-        1.0, ge=0, description="cost of a larger change where the colour stays; more below 25 views"
+        1.0, ge=0, description="cost of a larger change where the colour does not change; more below 25 views"
     )
     colour_weakening: float = Field(
         65.0, ge=0, description="how much a colour change weakens the larger penalty, per sum of RGB differences"

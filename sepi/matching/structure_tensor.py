@@ -38,7 +38,7 @@ class StructureTensorParameters(Parameters):
     inner_sigma: float = Field(0.7, gt=0, le=10, description="smoothing before the differences, in pixels")
     outer_sigma: float = Field(2.0, gt=0, le=20, description="smoothing of the tensor, in pixels")
     shear_reach: float = Field(
-        0.7, gt=0, le=2, description="largest disparity trusted round a shear, in pixels per view step"
+        0.7, gt=0, le=2, description="largest disparity relative to a shear that is trusted, in pixels per view step"
     )
 
 

@@ -27,12 +27,14 @@ of the shortest way round, two pixels wide."""
 class BorderPlaneParameters(Parameters):
     """Parameters of planes by borders."""
 
-    tolerance: float = Field(0.05, gt=0, description="distance from the plane of what agrees, pixels per view step")
-    behind_penalty: float = Field(
-        2.0, ge=0, description="weight of border behind the plane against border that agrees with it"
+    tolerance: float = Field(
+        0.05, gt=0, description="largest distance of an inlier from the plane, pixels per view step"
     )
-    min_inlier_ratio: float = Field(0.25, ge=0, le=1, description="share of the border without which there is no plane")
-    ransac_iterations: int = Field(500, ge=1, description="planes tried for each region")
+    behind_penalty: float = Field(
+        2.0, ge=0, description="penalty on border pixels behind the plane, relative to inliers"
+    )
+    min_inlier_ratio: float = Field(0.25, ge=0, le=1, description="least share of inliers in the border")
+    ransac_iterations: int = Field(500, ge=1, description="number of planes that are tried for each region")
 
 
 @dataclass(frozen=True)
