@@ -2,7 +2,7 @@
 
 Examples
 --------
-A built-in scene stands for light fields of your own; :func:`sepi.read_light_field` takes a folder of any known format.
+A built-in scene takes the place of your own light field; :func:`sepi.read_light_field` reads all known formats.
 
 >>> from pathlib import Path
 >>> import sepi
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     Examples
     --------
-    Say it where you report a result: maps of two versions may differ.
+    State it with your results: maps of two versions may differ.
 
     >>> import sepi
     >>> f"sepi {sepi.__version__}"  # doctest: +ELLIPSIS
@@ -87,7 +87,7 @@ _HOME = {
 
 
 def __getattr__(name: str) -> Any:
-    # on first use: the pipeline imports every stage, which `sepi --help` and the commands of single stages do without
+    # on first use: the pipeline imports every stage, and `sepi --help` and single stages do not need it
     if name == "__version__":
         from sepi.io.provenance import package_version
 

@@ -1,7 +1,7 @@
-"""What the built-in variants choose for each stage.
+"""The built-in variants: a choice for each stage.
 
-Variant ``best`` is what ``sepi depth`` uses, ``fast`` takes half its time, ``paper`` is the method as published; the
-others are rows of the ablations, and the methods that the paper compares with.
+``sepi depth`` uses ``best``, ``fast`` takes half its time, and ``paper`` is the method as published. The others are
+rows of the ablations, and the methods that the paper compares with.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 from sepi.compared.methods import LEARNED, METHODS
 
 UNCORRECTED = "no_noise_correction"
-"""The paper's method with costs as noise makes them, for light fields that have noise: no column of its tables."""
+"""The paper's method without the correction of costs for noise; not a column of the paper's tables."""
 
 ENTRIES: dict[str, dict[str, Any]] = {
     "paper": {"initial": "sepi", "occlusion": "half_sepi", "textureless": "lti", "optimize": "wls"},
@@ -31,17 +31,17 @@ ENTRIES: dict[str, dict[str, Any]] = {
         "textureless": "uniform_planes",
         "optimize": "second_order",
     },
-    # few views and candidates, and no more rounds than needed
+    # few views, candidates and rounds
     "fast": {
         "initial": {"choice": "semi_global", "first_views": 9, "first_sampling": 3},
-        # of one pass that takes a tenth longer for it hardly anything gets better
+        # in a single pass, the mean reference takes a tenth longer and gains next to nothing
         "occlusion": {"choice": "visibility", "passes": 1, "views": 25, "sampling": 2, "mean_noise": 1},
         "textureless": {"choice": "uniform_planes", "views": 9},
-        # of so few views faint detail in noise tells less than it harms
+        # with so few views, faint detail in noise does more harm than good
         "optimize": {"choice": "second_order", "views": 25, "solves": 1, "least_noise": 0},
     },
     "best_paper_initial": {"base": "best", "initial": "sepi"},
-    # colours alone must tell surfaces apart: their scale is narrower than beside the detail
+    # colours alone need a smaller scale than together with detail
     "best_no_detail": {
         "base": "best",
         "initial": {"use_detail": False},
@@ -69,7 +69,7 @@ ENTRIES: dict[str, dict[str, Any]] = {
     **METHODS,
     **LEARNED,
 }
-"""Name to entry of each: :data:`sepi.variants.VARIANT_ENTRIES`."""
+"""Name to entry of each variant, see :data:`sepi.variants.VARIANT_ENTRIES`."""
 
 DEFAULT_VARIANT = "best"
 """Variant of ``sepi depth``."""
@@ -94,4 +94,4 @@ PARTS_OF_BEST: dict[str, str] = {
     "best_no_smoothing": "Gauss-Newton, no smoothing",
     "best_wls": "the paper's global optimisation",
 }
-"""Rows of the ablation of ``best``, and what they leave out or put back."""
+"""Rows of the ablation of ``best``, and what each leaves out or takes from the paper."""

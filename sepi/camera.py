@@ -1,16 +1,16 @@
-"""From disparity to metric depth: what the camera's geometry says.
+"""From disparity to metric depth, by the camera's geometry.
 
-Views are taken by cameras a baseline ``b`` apart and sheared so that a point at the focus distance ``F`` has disparity
+Cameras stand a baseline ``b`` apart, and views are sheared so that a point at the focus distance ``F`` has disparity
 zero. With the focal length ``f`` in pixels, a point at depth ``Z`` has the disparity ``d = b f (1 / Z - 1 / F)``, so
 
     Z = b f / (d + b f / F).
 
-This is the formula of the HCI 4D light field benchmark [1]_, whose ``beta`` is ``b f F``; it gives the focal length and
-the sensor size in millimetres, the size being that of the longer side of the picture that the sensor took: views that
-were cut out of it have its focal length, and a principal point aside.
+This is the formula of the HCI 4D light field benchmark [1]_, whose ``beta`` is ``b f F``. The benchmark gives the focal
+length and the sensor size in millimetres; the size is that of the longer side of the whole picture. Views that were cut
+out of it have its focal length, and a principal point away from their middle.
 
-Disparities are in pixels per view step, so ``b`` is the distance from one column of cameras to the next, whatever that
-of rows; where there is one column only, that from one row to the next.
+Disparities are in pixels per view step, so ``b`` is the distance from one column of cameras to the next; if there is
+only one column, from one row to the next.
 
 References
 ----------
@@ -33,8 +33,8 @@ from sepi.validation import described, is_finite, whole_pair
 Map = npt.NDArray[np.float32]
 Flags = npt.NDArray[np.bool_]
 
-# part of a map beyond infinity that is told; by how many standard deviations, or where these are not known by how many
-# pixels per view step, a pixel must lie there
+# least share of a map beyond infinity for a warning; by how many standard deviations, or if unknown by how many pixels
+# per view step, a pixel must lie beyond
 _BEYOND, _SIGMAS, _UNSURE = 0.05, 3.0, 0.2
 
 Part = tuple[int, int, int, int]
@@ -43,17 +43,17 @@ Part = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class Camera:
-    """Geometry of a light field's cameras: what turns disparity into depth.
+    """Geometry of a light field's cameras, which turns disparity into depth.
 
     Depth is ``scale / (disparity + offset)``, the formula of the HCI 4D light field benchmark [1]_;
-    :func:`sepi.camera.camera_from` makes a camera of focal length, baseline, focus distance and sensor size.
+    :func:`sepi.camera.camera_from` makes a camera from focal length, baseline, focus distance and sensor size.
 
     Attributes
     ----------
     scale : float
-        ``b f``: depth times disparity above infinity's, metres times pixels per view step.
+        ``b f``, metres times pixels per view step.
     offset : float
-        ``b f / F``: what a disparity must be above for its point to lie before infinity, pixels per view step.
+        ``b f / F``, pixels per view step; disparity ``-offset`` lies at infinity.
     focal_px : float
         Focal length in pixels.
     right, down : float
@@ -105,14 +105,14 @@ class Camera:
         Returns
         -------
         ndarray, of the same shape, float32
-            Metres, along the viewing direction; infinite at and beyond infinity, where ``disparity <= -offset``.
+            Metres, along the viewing direction; infinite where ``disparity <= -offset``.
         """
         above = np.asarray(disparity, np.float64) + self.offset
         with np.errstate(divide="ignore"):
             return np.where(above > 0, self.scale / np.where(above > 0, above, 1), np.inf).astype(np.float32)
 
     def depth_sigma(self, disparity: Map, sigma: Map) -> Map:
-        """Standard deviation of the depth that follows from that of the disparity, by the derivative.
+        """Standard deviation of the depth, from that of the disparity by the derivative.
 
         Parameters
         ----------
@@ -151,23 +151,23 @@ def camera_from(
     shape: tuple[int, int],
     crop_of: Part | None = None,
 ) -> Camera:
-    """Camera from the numbers of the HCI 4D benchmark's ``parameters.cfg``.
+    """Camera from focal length, baseline, focus distance and sensor size, as in the HCI 4D benchmark.
 
     Parameters
     ----------
     focal_length_mm : float
         Focal length in millimetres.
     baseline_mm : float
-        Distance between neighbouring columns of cameras (rows, where there is one column only) in millimetres.
+        Distance between neighbouring columns of cameras in millimetres; between rows if there is one column.
     focus_distance_m : float
-        Depth at which the disparity is zero, in metres; infinite for cameras that look straight ahead.
+        Depth at which the disparity is zero, in metres; infinite for parallel cameras.
     sensor_size_mm : float
-        Width or height of the sensor that took the whole picture, whichever is longer, in millimetres.
+        Longer side of the sensor that took the whole picture, in millimetres.
     shape : (int, int)
         Height and width of a view in pixels.
     crop_of : (int, int, int, int), optional
-        Where the views are parts of what the sensor took: its width and height, and the column and row in it of their
-        first pixel.
+        If the views are parts of the sensor's picture: width and height of that picture, and column and row in it of
+        the views' first pixel.
 
     Returns
     -------
@@ -176,11 +176,11 @@ def camera_from(
     Raises
     ------
     SepiError
-        If a number is not positive, or the whole picture has no such part.
+        If a number is not positive, or the views do not fit into the whole picture.
 
     Examples
     --------
-    A light field that came without its camera gets one, and its depth in metres:
+    A light field without a camera gets one, and depth in metres:
 
     >>> from dataclasses import replace
     >>> from sepi.camera import camera_from
@@ -212,7 +212,7 @@ def camera_from(
 
 
 def require_part(part: Part, shape: tuple[int, ...]) -> None:
-    """Raise unless a whole picture has a part of this height and width."""
+    """Raise unless a part of this height and width fits into its whole picture."""
     (width, height, x, y), (rows, columns) = part, shape
     if min(x, y) < 0 or x + columns > width or y + rows > height:
         raise SepiError(
@@ -221,19 +221,19 @@ def require_part(part: Part, shape: tuple[int, ...]) -> None:
 
 
 def warn_of_infinity(where: object, camera: Camera, disparity: Map, sigma: Map | None, unknown: Flags) -> None:
-    """Warn of a camera by which much of a map lies beyond infinity, more than the map's error explains.
+    """Warn if the camera puts more of a map beyond infinity than the map's error explains.
 
     Parameters
     ----------
     where : object
-        For the message.
+        Name or path for the message.
     camera : Camera
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
     sigma : ndarray, shape (H, W), float32, or None
-        Its standard deviation, where that is known.
+        Its standard deviation, if known.
     unknown : ndarray, shape (H, W), bool
-        Pixels that have no say.
+        Pixels that do not count.
     """
     farthest = disparity + (_UNSURE if sigma is None else _SIGMAS * sigma)
     share = float(np.mean(farthest[~unknown] < -camera.offset)) if not unknown.all() else 0.0
@@ -248,5 +248,5 @@ def warn_of_infinity(where: object, camera: Camera, disparity: Map, sigma: Map |
 
 
 def numbers_of(camera: Camera) -> tuple[float, ...]:
-    """What :class:`Camera` takes, as files keep it: three numbers, and two more where the principal point is aside."""
+    """Arguments of :class:`Camera` as files keep them: three, or five if the principal point is off the middle."""
     return astuple(camera)[: 5 if camera.right or camera.down else 3]

@@ -1,7 +1,6 @@
-"""What every command has in common: one clear line for a user's error, a progress bar, and the command of a stage.
+"""Parts shared by all commands: one line for a user's error, a progress bar, timing, and the command of a stage.
 
-A stage module ends with ``stage_command("initial", CHOICES)()``: ``python -m sepi.initial`` is the command that the
-workflow's rule calls.
+A stage module ends with ``stage_command("initial", CHOICES)()``; the workflow's rule calls ``python -m sepi.initial``.
 """
 
 from __future__ import annotations
@@ -25,21 +24,21 @@ import click
 
 from sepi.errors import SepiError, SepiWarning, one_line
 
-# what only the commands of stages need is imported there: every command imports this module
+# every command imports this module, so imports for the commands of stages stand in their function
 if TYPE_CHECKING:
     from sepi.stage import Choice, Progress
 
-# a workflow that stops its jobs; a terminal that is closed, which not all systems tell of
+# sent by a workflow that stops its jobs, and by a closed terminal (not on all systems)
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 WORKFLOW_PROCESS = "SEPI_WORKFLOW_PROCESS"
-"""Environment variable: number of the process that a command ends with; the workflow sets its own for its jobs."""
+"""Environment variable with the process number of the workflow, with which its jobs end."""
 
-# Linux: the signal that a process gets when its parent is gone
+# Linux: option of prctl for the signal that a process gets when its parent ends
 _PR_SET_PDEATHSIG = 1
-# glibc's settings, by their environment variables: how many heaps threads have; from how many bytes on what is freed
-# goes back to the system at once; from how many on what is free at the end of a heap does
+# settings of glibc, by environment variable: number of heaps for threads; least size in bytes of an array that returns
+# to the system when freed; least free size at the end of a heap that returns to the system
 _HEAP = {
     "MALLOC_ARENA_MAX": (-8, 1),
     "MALLOC_MMAP_THRESHOLD_": (-3, 100_000_000),
@@ -48,7 +47,7 @@ _HEAP = {
 
 
 class _Shown(click.ClickException):
-    """A user's error as click shows it: ``sepi: MESSAGE`` on stderr, exit code 1."""
+    """A user's error; click shows ``sepi: MESSAGE`` on stderr, exit code 1."""
 
     def show(self, file: IO[Any] | None = None) -> None:
         click.echo(f"sepi: {self.format_message()}", file=file, err=file is None)
@@ -82,7 +81,7 @@ class SepiGroup(click.Group):
 
 
 def _end_with_the_workflow() -> None:
-    """Where this is a job of the workflow, and the system can, ask to be ended when the workflow is."""
+    """Let a job of the workflow end with it, on systems that can do this."""
     workflow = os.environ.get(WORKFLOW_PROCESS)
     if workflow is None or sys.platform != "linux":
         return
@@ -90,16 +89,16 @@ def _end_with_the_workflow() -> None:
 
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-    # it may be gone already
+    # the workflow may have ended already
     if os.getppid() == 1 and workflow != "1":
         sys.exit(128 + signal.SIGTERM)
 
 
 def use_memory_again() -> None:
-    """Have the C library give again what was freed, as far as it can and the user's environment does not say otherwise.
+    """Let the C library reuse freed memory, unless environment variables set its behaviour.
 
-    glibc gives each thread a heap of its own, and what one has freed the others do not take again: 40 MB of a benchmark
-    scene. Arrays it gives back at once, and to clear the pages of others takes a thirtieth of ``sepi depth``.
+    glibc gives each thread its own heap, and other threads do not reuse memory freed there: 40 MB of a benchmark scene.
+    It returns large arrays to the system at once, and clearing new pages takes a thirtieth of ``sepi depth``.
     """
     if sys.platform == "linux":
         import ctypes
@@ -112,10 +111,10 @@ def use_memory_again() -> None:
 
 @contextmanager
 def shown_errors() -> Iterator[None]:
-    """Turn :class:`SepiError` into a line without traceback, and signals into an exit that removes unfinished files.
+    """Turn a user's error into one line without traceback, and a signal into an exit that removes unfinished files.
 
-    So does a path that the system refuses: a name that is too long, a folder that may not be read. A
-    :class:`SepiWarning` becomes a line too, and the command goes on.
+    Users' errors are :class:`SepiError`, a path that the system refuses, and too little memory. A :class:`SepiWarning`
+    becomes a line too, and the command goes on.
     """
     main = threading.current_thread() is threading.main_thread()
     before = {number: signal.signal(number, _exit_on_signal) for number in _ENDING} if main else {}
@@ -141,7 +140,7 @@ def shown_errors() -> Iterator[None]:
 
 
 def _is_of_memory(error: Exception) -> bool:
-    """Whether there was too little memory, also for the stack of a thread, or within OpenCV."""
+    """Whether an error means too little memory, also for a thread's stack or in OpenCV."""
     cv2 = sys.modules.get("cv2")
     within_opencv = cv2 is not None and isinstance(error, cv2.error) and error.code == cv2.Error.StsNoMem
     return isinstance(error, MemoryError) or within_opencv or str(error) == "can't start new thread"
@@ -180,10 +179,10 @@ def progress_bar(label: str) -> Iterator[Progress]:
 
 
 def peak_memory_mb() -> float:
-    """The most memory that this process has held so far, MB."""
+    """Largest memory of this process so far, MB."""
     with suppress(OSError, StopIteration):
         status = Path("/proc/self/status").read_text(encoding="ascii")
-        # ru_maxrss below would start at what the parent held
+        # ru_maxrss below would count the parent's memory
         return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")) / 2**10
     try:
         import resource
@@ -203,7 +202,7 @@ def megabytes(maxrss: int) -> float:
 
 
 def write_timing(path: Path, started: float, threads: int, **more: Any) -> None:
-    """Write as JSON seconds since ``started`` (of ``time.perf_counter``), peak memory, machine, and what is given."""
+    """Write JSON with the seconds since ``started`` (``time.perf_counter``), peak memory, machine, and ``more``."""
     from sepi.io.files import atomic_path
     from sepi.machine import this_machine
 
@@ -219,10 +218,10 @@ def write_timing(path: Path, started: float, threads: int, **more: Any) -> None:
 
 
 def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
-    """The command ``python -m sepi.STAGE`` of a stage with its own choices and those of the compared methods.
+    """The command ``python -m sepi.STAGE``, with the stage's own choices and those of the compared methods.
 
-    It reads a light field and the maps of the stage before, runs one choice, and writes one stage file, whole or not at
-    all.
+    The command reads a light field and the maps of the stage before, runs one choice, and writes one stage file, whole
+    or not at all.
     """
     from sepi.compared.methods import StageChoices
     from sepi.exposure import equally_bright

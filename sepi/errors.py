@@ -1,4 +1,4 @@
-"""The exception that the command line turns into a clear line and a non-zero exit code, and the warning it shows."""
+"""The error that the command line shows as one line with exit code 1, and the warning."""
 
 
 class SepiError(Exception):
@@ -7,11 +7,11 @@ class SepiError(Exception):
     Parameters
     ----------
     message : str
-        Text of users and files may be in it; the error's own text is one line that a terminal can show.
+        May contain text of users and files; the error's text is one printable line.
 
     Examples
     --------
-    What a program that works through many light fields catches: any other exception is a bug.
+    A program for many light fields catches this error; any other exception is a bug:
 
     >>> import sepi
     >>> for name in ("cotton", "antinous"):
@@ -28,12 +28,12 @@ class SepiError(Exception):
 
 
 class SepiWarning(UserWarning):
-    """Something that is probably not as the user meant it; the message says what would be right.
+    """Something that the user probably did not intend; the message says what would be right.
 
     Parameters
     ----------
     message : str
-        As that of an error.
+        As for :class:`SepiError`.
 
     Examples
     --------
@@ -50,7 +50,7 @@ class SepiWarning(UserWarning):
     >>> [warning.category.__name__ for warning in told]
     ['SepiWarning']
 
-    To end with an error in place of it:
+    To get an error instead:
 
     >>> warnings.simplefilter("error", sepi.SepiWarning)
     """
@@ -60,12 +60,12 @@ class SepiWarning(UserWarning):
 
 
 def one_line(text: str) -> str:
-    """Text without what would end a line or command a terminal; as it is where there is none of that."""
+    """Text with line ends and control characters escaped; unchanged if it has none."""
     if text.isprintable():
         return text
     return "".join(letter if letter.isprintable() else " " if letter.isspace() else "?" for letter in text)
 
 
 def printable(text: str) -> str:
-    """Text from a file as one line for a message, whatever is in it."""
+    """Any text from a file as one printable line for a message."""
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())

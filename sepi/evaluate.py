@@ -1,6 +1,6 @@
-"""Evaluation (section V): the scores, the error and the regions of every map of a scene, each computed once.
+"""Evaluation (section V): scores, error maps and regions of a scene's disparity maps.
 
-:mod:`sepi.scoring.scores` says what the scores are.
+:mod:`sepi.scoring.scores` defines the scores.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ def evaluation_of(light_field: LightField, maps: FloatMap | StageMaps) -> Evalua
     Parameters
     ----------
     light_field : LightField
-        With ground truth; without, the evaluation is empty.
+        Without ground truth, the evaluation is empty.
     maps : ndarray, shape (H, W), float32, or StageMaps
-        Disparity in pixels per view step; finished maps have their error bars scored, too, where they have any.
+        Disparity in pixels per view step, or final maps, whose error bars are scored, too.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def evaluation_of(light_field: LightField, maps: FloatMap | StageMaps) -> Evalua
     >>> found.scores["paper"]["all"]["mse100"] < found.scores["paper"]["occluded"]["mse100"]
     True
 
-    What its error bars are worth, among them how often the interval holds the truth, and how wide it is:
+    Scores of the error bars, among them how often the interval holds the truth, and how wide it is:
 
     >>> {"coverage", "width"} <= found.scores["paper"]["all"].keys()
     True
@@ -68,7 +68,7 @@ def evaluation_of(light_field: LightField, maps: FloatMap | StageMaps) -> Evalua
 def evaluations_of(
     light_field: LightField, maps: Mapping[str, FloatMap | StageMaps], thresholds: Sequence[float] = ()
 ) -> dict[str, Evaluation]:
-    """Scores, error maps and masks of disparity maps of one light field, by name; the masks are found once for all.
+    """Scores, error maps and masks of several disparity maps of one light field, by name.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def evaluations_of(
         Scored over the regions of :func:`sepi.scoring.scores.region_masks`. Without ground truth the evaluations are
         empty.
     maps : mapping of str to ndarray, shape (H, W), float32, or StageMaps
-        Name to disparity in pixels per view step, or to finished maps, whose error bars are scored, too.
+        Name to disparity in pixels per view step, or to final maps, whose error bars are scored, too.
     thresholds : sequence of float
         As :func:`sepi.scoring.scores.score` takes them.
 
@@ -92,7 +92,7 @@ def evaluations_of(
 
     Examples
     --------
-    What the stage for textureless regions of variant ``best`` is worth on a bare wall:
+    The gain by the stage for textureless regions of variant ``best`` on a bare wall:
 
     >>> import sepi
     >>> from sepi.evaluate import evaluations_of
@@ -125,7 +125,7 @@ def _evaluation(
     edges: Edges,
     thresholds: Sequence[float],
 ) -> Evaluation:
-    """What is to be said of a map, beside what all maps of the scene have in common."""
+    """Evaluation of one map, with the masks that all maps of the scene share."""
     disparity, truth = _disparity(maps), light_field.ground_truth
     assert truth is not None
     bars = ErrorBars.of(maps, light_field.reach) if isinstance(maps, StageMaps) else None
@@ -143,16 +143,15 @@ def _disparity(maps: FloatMap | StageMaps) -> FloatMap:
 
 
 def _error(disparity: FloatMap, ground_truth: FloatMap) -> FloatMap:
-    """Estimate minus ground truth; NaN where either is unknown."""
+    """Estimate minus ground truth; NaN where either is not finite."""
     known = np.isfinite(ground_truth) & np.isfinite(disparity)
     return np.subtract(disparity, ground_truth, out=np.full(ground_truth.shape, np.nan, np.float32), where=known)
 
 
 def _scored(light_field: LightField, maps: StageMaps) -> FloatMap | StageMaps:
-    """What is scored of a stage's maps, and no more of them: there are dozens."""
+    """The disparity of a stage's maps, or if they are final, what :func:`sepi.estimate_depth` returns for scores."""
     if maps.sigma is None:
         return maps.disparity
-    # as they are handed to users
     final = with_unknown(light_field, maps)
     return StageMaps(final.disparity, final.confidence, {name: final.extra[name] for name in ERROR_BARS})
 

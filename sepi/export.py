@@ -1,4 +1,4 @@
-"""The command that turns a variant's last stage file into its folder of final maps."""
+"""The command that makes the folder of final maps from a variant's last stage file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--variant", required=True, help="Name of the variant, for the attributes.")
 @click.option("--output", type=_PATH, required=True, help="Folder to write.")
 def main(light_field_path: Path, maps: Path, variant: str, output: Path) -> None:
-    """Write disparity.pfm, result.h5 and pictures from a stage file, with what no view knows marked."""
+    """Write disparity.pfm, result.h5 and pictures of a stage file, with unknown pixels marked."""
     light_field = read_light_field(light_field_path)
     made_by = MadeBy(variant, tuple(history_of(maps)), light_field.require_disparity_range())
     # the folder is the workflow's own, which has removed what says so

@@ -1,7 +1,7 @@
-"""Views as bright as the reference view: cameras of an array, and one that moves, expose each picture otherwise.
+"""Views made as bright as the reference view, for cameras that expose each picture differently.
 
-All methods compare colours of the views. A difference of some per cent is more than noise and faint texture are, and
-moves the minimum of a cost over all views. It is measured on small pictures, since it is the same all over a view.
+All methods compare colours of the views. A difference of a few per cent exceeds noise and faint texture, and shifts the
+minimum of a cost over all views. It is the same all over a view, so small pictures are enough to measure it.
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ import numpy.typing as npt
 
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, FloatMap, LightField, full_scale
 
-# values that tell of brightness, full range = 1: neither black nor burnt out
+# values that count, full range = 1: neither black nor overexposed
 _DARKEST, _BRIGHTEST = 0.03, 0.97
-# blur before brightness is compared, pixels; part of the picture's pixels that must be comparable
+# blur before the comparison, pixels; least share of comparable pixels
 _BLUR = 2.0
 _COMPARABLE = 0.02
-# factors of all views within this of one are none
+# if the factors of all views lie this close to 1, nothing changes
 _ALIKE = 0.02
-# the same of means over whole views, at a glance
+# the same for means over whole views
 _MEANS_ALIKE = 0.01
-# a factor is clear that is so many standard errors from one, of which things that move by more have at most four;
-# pixels of a square of which each tells as much as one
+# least distance of a factor from 1 in standard errors (things that move by more than the shift cause at most four);
+# number of neighbouring pixels that count as one measurement
 _CLEAR = 5.0
 _ALONE = 64
-# least side of the small pictures that tell whether there is a difference, and of those that tell it, pixels
+# least side of the small pictures, in pixels: to find whether there is a difference, and to measure it
 _SIDE, _FINE_SIDE = 96, 192
-# every so many rows count in means over whole views
+# means over whole views use every fourth row
 _STRIDE = 4
 
 
 def equally_bright(light_field: LightField) -> LightField:
-    """The light field with views as bright as the reference view, or itself where all are.
+    """The light field with all views as bright as the reference view; itself if they are.
 
     Parameters
     ----------
@@ -43,8 +43,8 @@ def equally_bright(light_field: LightField) -> LightField:
     Returns
     -------
     LightField
-        Views of the same dtype; each channel of a view is multiplied by one number, as far as its values go, and a note
-        says by how much at most.
+        Views of the same dtype. Each channel of a view is multiplied by one factor, within the range of its values; a
+        note states the largest factor.
     """
     if _means_are_alike(light_field):
         return light_field
@@ -69,10 +69,9 @@ def equally_bright(light_field: LightField) -> LightField:
 def brightness_factors(
     light_field: LightField, side: int = _FINE_SIDE
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """What to multiply each view's channels by to be as bright as the reference view, and the error of that.
+    """Factors that make each view's channels as bright as the reference view's, and their errors.
 
-    Both of shape (T, S, C): :func:`gains` of each view, made smaller while its sides are this long; 1 and 0 for missing
-    views.
+    Both have shape (T, S, C) and are the :func:`gains` of views reduced to about this side; missing views have 1 and 0.
     """
     step = max(1, min(light_field.shape) // side)
     factors = np.ones((*light_field.grid, light_field.views.shape[4]))
@@ -88,27 +87,27 @@ def brightness_factors(
 def gains(
     reference: FloatMap, view: FloatMap, shown: BoolMap
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """What to multiply each channel of a view by to be as bright as the reference view where both see the same.
+    """Factors that make each channel of a view as bright as the reference view's.
 
-    Pictures are laid over each other by the one shift that fits best, and the ratio is the median over all pixels: what
-    is hidden, or moves by more, is outvoted.
+    The best single shift aligns the pictures. The factor is the median ratio over all pixels, so that hidden pixels, or
+    those that move by more, do not matter.
 
     Parameters
     ----------
     reference, view : ndarray, shape (H, W, C), float32
         Colours in 0..1.
     shown : ndarray, shape (H, W), bool
-        Which of its pixels the view has.
+        Pixels that the view has.
 
     Returns
     -------
     factors, errors : ndarray, shape (C,), float64
-        And the standard errors of their logarithms; 1 and 0 where too little of both pictures tells.
+        Factors, and the standard errors of their logarithms; 1 and 0 if too few pixels are comparable.
     """
     height, width = view.shape[:2]
     size = width, height
     shift, _ = cv2.phaseCorrelate(_grey(reference), _grey(view), cv2.createHanningWindow(size, cv2.CV_32F))
-    # it takes half a pixel for the middle of an odd number of them
+    # for odd sizes, phaseCorrelate is off by half a pixel
     across, down = np.rint(shift - np.array([cv2.getOptimalDFTSize(side) % 2 / 2 for side in size])).astype(int)
     if abs(across) > width // 2 or abs(down) > height // 2:
         across = down = 0
@@ -124,13 +123,13 @@ def gains(
             ratios = np.log(one[both]) - np.log(other[both])
             middle = np.median(ratios)
             found[c] = np.exp(middle)
-            # of a median of normal errors, by their median deviation
+            # standard error of a median of normal errors
             errors[c] = 1.25 * 1.48 * np.median(np.abs(ratios - middle)) / np.sqrt(len(ratios) / _ALONE)
     return found, errors
 
 
 def _means_are_alike(light_field: LightField) -> bool:
-    """Whether the views are as bright on average, at a glance; not told where they do not show all of their pixels."""
+    """Whether the views have the same mean brightness; False for views with missing pixels."""
     if light_field.missing is not None:
         return False
     own = _mean(light_field, light_field.reference_position)
@@ -139,14 +138,14 @@ def _means_are_alike(light_field: LightField) -> bool:
 
 
 def _mean(light_field: LightField, place: tuple[int, ...]) -> npt.NDArray[np.float64]:
-    """Mean colour of a view, of some of its rows, which are counted from the nearer end."""
+    """Mean colour over some rows of a view; the rows are symmetric, so that a flipped view has the same mean."""
     rows = np.arange(light_field.shape[0])
     view = light_field.views[place][np.minimum(rows, rows[::-1]) % _STRIDE == 0]
     return np.array(cv2.mean(view)[: view.shape[2]])
 
 
 def _small(light_field: LightField, place: tuple[int, int], step: int) -> tuple[FloatMap, BoolMap]:
-    """A view in 0..1, made so many times smaller, and which of its pixels it shows."""
+    """A view in 0..1 reduced by a factor of ``step``, and the mask of the pixels that it has."""
     view, (height, width) = light_field.views[place], (size // step for size in light_field.shape)
     small = cv2.resize(view, (width, height), interpolation=cv2.INTER_AREA)
     small = small.reshape(height, width, -1) / np.float32(full_scale(view.dtype))

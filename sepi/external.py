@@ -1,6 +1,6 @@
-"""External methods' disparity maps of a scene: read, checked and scored like this package's own.
+"""External methods' disparity maps of a scene, read, checked and scored.
 
-A map that is missing or wrong is told, not an error: the report shows it as a cell with its problem.
+A missing or wrong map is no error: a warning tells it, and the report's table shows the problem.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ def external_maps(
     scene: str = "",
     thresholds: Sequence[float] = (),
 ) -> dict[str, ExternalMap]:
-    """Read and score external methods' maps of a light field.
+    """External methods' maps of a light field with their scores, or with their problems.
 
-    What is wrong with a map is told by a :class:`SepiWarning` that names method, scene, file and reason. Values that
-    are not finite are kept, counted in such a warning, and scored as bad pixels.
+    For each problem, a :class:`SepiWarning` names method, scene, file and reason. Values that are not finite stay; such
+    a warning counts them, and they are scored as bad pixels.
 
     Parameters
     ----------
@@ -49,16 +49,16 @@ def external_maps(
     sources : mapping of str to ExternalSource
         Method to its map, whose ``path`` is a file.
     scene : str
-        What messages call the scene; the light field's own name unless given.
+        Name of the scene in messages; default: the light field's.
     thresholds : sequence of float
         As :func:`sepi.scoring.scores.score` takes them.
 
     Returns
     -------
     dict of str to ExternalMap
-        In the order of ``sources``. A file that is missing, cannot be read, has another size than the views or no
-        finite value has its problem (``no file``, ``not readable``, ``800x600 instead of 512x512`` as width x height,
-        ``no finite value``) and no map.
+        In the order of ``sources``. A map that is missing, cannot be read, or has another size than the views or no
+        finite value is None, with a problem: ``no file``, ``not readable``, ``800x600 instead of 512x512`` (width x
+        height) or ``no finite value``.
     """
     scene = scene or light_field.name
     found = {method: _read(light_field, scene, method, source) for method, source in sources.items()}
@@ -69,7 +69,7 @@ def external_maps(
 
 
 def _read(light_field: LightField, scene: str, method: str, source: ExternalSource) -> ExternalMap:
-    """The map of a method or its problem, without scores."""
+    """The map of a method, or its problem, without scores."""
     path = Path(source.path)
     digest = ""
 

@@ -1,6 +1,6 @@
-"""Stage ingest: read a light field of any format, settle its disparity range, write one HDF5 file.
+"""Stage ingest: one HDF5 file from a light field of any format, with a disparity range.
 
-Ground truth lies apart (:mod:`sepi.truth`): no stage runs again for it.
+Ground truth has a file of its own (:mod:`sepi.truth`), so that a change of it runs no stage again.
 """
 
 from __future__ import annotations

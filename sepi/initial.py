@@ -1,16 +1,15 @@
 """Initial depth (section IV-A, Eq. 1-5 of [1]_).
 
-``sepi`` takes, for every pixel of the reference view, the candidate whose line through the SEPI has the least colour
-variance (Eq. 3-4), and its distinctness as confidence (Eq. 5). The line meets one sample of each view, so this is a
-plane sweep (:mod:`sepi.matching.plane_sweep`); the construction itself is in :mod:`sepi.matching.stitched_epi`.
+For each pixel of the reference view, ``sepi`` takes the candidate whose line through the SEPI has the least colour
+variance (Eq. 3-4), with its distinctness as confidence (Eq. 5). The line meets one sample of each view, so this is a
+plane sweep (:mod:`sepi.matching.plane_sweep`); :mod:`sepi.matching.stitched_epi` builds the SEPIs themselves.
 
 ``semi_global`` compares colours and fine detail (:mod:`sepi.matching.base_detail`) of a few views that are spread over
 the grid, and smooths the costs semi-globally (:mod:`sepi.matching.semi_global`).
 
-``structure_tensor`` is the initial depth that the paper's ablation puts in its place
-(:mod:`sepi.matching.structure_tensor`).
+``structure_tensor`` is the initial depth of the paper's ablation (:mod:`sepi.matching.structure_tensor`).
 
-What every choice is given, and hands on: :class:`sepi.stage.Choice`.
+:class:`sepi.stage.Choice` describes arguments and results of all choices.
 
 References
 ----------
@@ -66,7 +65,7 @@ def sepi(
 def semi_global(
     light_field: LightField, previous: StageMaps | None, parameters: VisibilitySweepParameters, progress: Progress
 ) -> StageMaps:
-    """Depth from colours and detail of a few views, smoothed semi-globally: the first stage of variant ``best``.
+    """Depth from colours and detail of a few views, with semi-global smoothing; variant ``best`` uses it.
 
     Returns
     -------
@@ -96,7 +95,7 @@ def semi_global(
 def structure_tensor(
     light_field: LightField, previous: StageMaps | None, parameters: StructureTensorParameters, progress: Progress
 ) -> StageMaps:
-    """Depth from the structure tensor of single EPIs, without stitching: for the ablation (table 4 of [1]_).
+    """Depth from the structure tensor of single EPIs, for the paper's ablation without SEPIs (table 4 of [1]_).
 
     Returns
     -------
@@ -110,7 +109,7 @@ def structure_tensor(
 
     Examples
     --------
-    What stitching gains, where noise grows to the right of the picture:
+    The gain by stitching in a scene with noise:
 
     >>> import numpy as np
     >>> from sepi import initial

@@ -1,4 +1,4 @@
-"""Ctrl-C and other signals that end a program wait where they would be lost."""
+"""Delay of Ctrl-C and other signals that end a program, where they would be lost."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if 
 
 
 class _Waiting:
-    """A handler that only notes the first signal, and does with others what another one does."""
+    """A signal handler that notes the first signal and passes later ones to another handler."""
 
     def __init__(self, handler: Callable[[int, FrameType | None], object], came: list[int]) -> None:
         self.handler, self.came = handler, came
@@ -27,20 +27,20 @@ class _Waiting:
 
 
 def _handlers() -> dict[int, object]:
-    # other threads are not interrupted, and may not ask
+    # only the main thread gets signals and may ask for handlers
     main = threading.current_thread() is threading.main_thread()
     return {number: signal.getsignal(number) for number in _ENDING} if main else {}
 
 
 @contextmanager
 def no_interrupt_lost() -> Iterator[None]:
-    """Let signals that raise an exception do so at the end of the block; a second one does at once.
+    """Delay the exception of a first signal to the end of the block; a second signal raises at once.
 
-    For libraries that call Python from C, as h5py does when it lets go of an object or writes to a file of Python's:
-    what is raised there is reported and forgotten, and the program goes on as if nobody had pressed Ctrl-C.
+    For libraries that call Python from C, such as h5py when it frees an object or writes to a Python file. They report
+    and drop an exception there, and the program would go on as if nobody had pressed Ctrl-C.
     """
     came: list[int] = []
-    # what is no function raises nothing
+    # handlers that are no function raise nothing
     waiting = {number: _Waiting(handler, came) for number, handler in _handlers().items() if callable(handler)}
     try:
         for number, instead in waiting.items():
@@ -54,7 +54,7 @@ def no_interrupt_lost() -> Iterator[None]:
 
 
 def interruptibly(values: Iterable[_Value]) -> Iterator[_Value]:
-    """The same values, for what is long in making inside a block of :func:`no_interrupt_lost`: signals raise there."""
+    """The same values, computed so that signals raise at once, within a block of :func:`no_interrupt_lost`."""
     remaining = iter(values)
     while True:
         with _at_once():

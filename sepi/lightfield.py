@@ -1,14 +1,14 @@
-"""The light field: a grid of views of one scene, and what is known about it.
+"""The light field: a grid of views of one scene, its geometry, and its ground truth.
 
 Conventions, shared by every module:
 
 - views are ``(T, S, H, W, C)``: ``t`` is the row of the view grid (top to bottom), ``s`` its column (left to right);
-- the centre view is ``(T // 2, S // 2)``; the *reference* view, whose depth is made, is the centre view unless another
-  is asked for;
+- the centre view is ``(T // 2, S // 2)``; the *reference* view, whose depth is estimated, is the centre view unless
+  another one is chosen;
 - disparity ``d`` is in pixels per view step, positive when nearer than the focus plane; the reference-view
   pixel ``(y, x)`` is seen in view ``(t, s)`` at ``(y - d * (t - t0), x - d * (s - s0))``;
-- a view step is that from one column of views to the next. Where rows are another distance apart, or views stand off
-  the grid, ``baselines`` takes the place of ``(t - t0, s - s0)``.
+- a view step is the distance from one column of views to the next. If rows are another distance apart, or views stand
+  off the grid, ``baselines`` replaces ``(t - t0, s - s0)``.
 """
 
 from __future__ import annotations
@@ -33,34 +33,34 @@ FloatMap = npt.NDArray[np.float32]
 BoolMap = npt.NDArray[np.bool_]
 
 Truth = tuple[FloatMap | None, Mapping[str, BoolMap]]
-"""Ground truth of the reference view, and masks by name: what only scores are made with."""
+"""Ground truth of the reference view, and masks by name, for scores only."""
 
 RANGE_SOURCES = ("parameters", "given", "estimated")
-"""Where the range of a light field may come from."""
+"""Sources of a disparity range."""
 
 LOWEST, HIGHEST = -0.5, 1.5
-"""As far beyond 0..1 as float views may go, for what resampling overshoots."""
+"""Limits of float views, beyond 0..1 because resampling overshoots."""
 
 _LARGEST_ODD_GRID = 1000
-"""Views of a grid with more rows and columns than a view has pixels: more, and its axes are taken for others."""
+"""Most views of a grid with more rows and columns than a view has pixels; with more, the axes are mistaken."""
 
 _GENEROUS = 100
-"""So many times farther than views show anything a range may reach: generous ones cost time and do no harm."""
+"""Largest disparity range, as a multiple of the disparities that other views can show; a wide range only costs time."""
 
 MIN_SIZE = 2
-"""Least height and width of a view in pixels: what a sample between pixels needs."""
+"""Least height and width of a view in pixels, for interpolation."""
 
 
 @dataclass(frozen=True)
 class DisparityRange:
-    """Disparities between which the candidates lie.
+    """Range of the candidate disparities.
 
     Attributes
     ----------
     minimum, maximum : float
         Pixels per view step; ``minimum < maximum``, both finite.
     source : str
-        Where the range came from: ``"parameters"`` (the scene's own file), ``"given"`` (flag or config) or
+        Source of the range: ``"parameters"`` (the scene's own file), ``"given"`` (flag or configuration) or
         ``"estimated"`` (from the views).
 
     Raises
@@ -96,7 +96,7 @@ class DisparityRange:
         Parameters
         ----------
         count : int
-            How many, at least 2.
+            Number of candidates, at least 2.
 
         Returns
         -------
@@ -108,7 +108,7 @@ class DisparityRange:
 
 @dataclass(frozen=True)
 class LightField:
-    """A light field with what is known about its scene.
+    """A light field: views, their geometry, and ground truth if known.
 
     Attributes
     ----------
@@ -117,11 +117,11 @@ class LightField:
     name : str
         Name of the scene.
     source : str
-        Where the light field came from: a path or ``"built-in"``.
+        Path that the light field was read from, or ``"built-in"``.
     present : ndarray, shape (T, S), bool
-        Which views exist; the reference view must. All, unless given.
+        Views that exist; the reference view must. Default: all.
     disparity_range : DisparityRange or None
-        None where nothing is known (it can be estimated from the views).
+        None if unknown; it can be estimated from the views.
     ground_truth : ndarray, shape (H, W), float32, or None
         Ground-truth disparity of the reference view, for evaluation only.
     masks : mapping of str to ndarray, shape (H, W), bool
@@ -131,42 +131,42 @@ class LightField:
     row_spacing : float
         Distance from one row of views to the next, in view steps.
     positions : ndarray, shape (T, S, 2), float64, or None
-        Where each view was taken, ``(down, across)`` in view steps from a common origin; None: on the grid, at
-        ``(row_spacing * t, s)``. Those of missing views do not count.
+        Position of each view, ``(down, across)`` in view steps from a common origin; None: on the grid, at
+        ``(row_spacing * t, s)``. Positions of missing views do not count.
     camera : Camera or None
-        Geometry that turns disparity into metric depth, where it is known.
+        Geometry that turns disparity into metric depth, if known.
     notes : tuple of str
         What the reader assumed or left out, for the user.
     arranged : bool
-        False: the views stand in one row, in their order, and their grid is yet to be found; nothing can be matched
-        before, and the centre of the row may be missing.
+        False: the views stand in one row, in their order, and their grid is not yet known. Nothing can be matched until
+        then, and the centre of the row may be missing.
     settled : bool
-        True: ``row_spacing`` is known, be it one; it is not looked for in the views.
+        True: ``row_spacing`` is known, and is not estimated from the views.
     reading : str
-        How the source was read where flags or options say so, as JSON: what reads it in the same way again.
+        Flags or options with which the source was read, as JSON, to read it the same way again.
     rig : Rig or None
-        Where the views stand in the world, and the cameras that they were rectified from; None unless such were read.
+        Position of the views in the world, and the calibrated cameras that they were rectified from, if any.
     missing : ndarray, shape (T, S, H, W), bool, or None
-        Pixels that views do not show, since their cameras looked elsewhere; None: they show all. Views hold the nearest
-        pixel there that they show, so that filters end there as at a picture's border, and nothing is compared with it.
-        (Methods of others that know no border compare it, as they do beyond the border.)
+        Pixels that views lack because their cameras looked elsewhere; None: no pixels. Views repeat their nearest pixel
+        there, so that filters end as at a picture's border, and stages compare nothing with it. (Compared methods that
+        know no border do compare it.)
     files : ndarray, shape (T, S), str, or None
-        Name of each view's file in the folder that is the source; None where views have none of their own.
+        Name of each view's file in the source's folder; None if views have no files of their own.
     directions : tuple of int
-        1 or -1 where names of files tell that the coordinates of cameras grow or fall from row to row, and from column
-        to column; 0: nothing is known.
+        1 or -1 if file names tell that the coordinates of cameras grow or fall from row to row, and from column to
+        column; 0: unknown.
     workspace : Workspace or None
-        What stages keep of the views for each other (:mod:`sepi.workspace`); None: nothing. No part of the light field.
+        Intermediate results that stages share (:mod:`sepi.workspace`); not part of the light field.
 
     Raises
     ------
     SepiError
-        If a shape or dtype is not as above, floats are not finite or far outside 0..1, the row spacing is no positive
-        number, or the reference view lies outside the grid or is missing.
+        If a shape or dtype is not as above, floats are not finite or far outside 0..1, the row spacing is not positive,
+        or the reference view lies outside the grid or is missing.
 
     Examples
     --------
-    From an array: here 3 x 4 grey views of 48 x 64 pixels, the first of which was never taken.
+    From an array of 3 x 4 grey views of 48 x 64 pixels, of which the first is missing:
 
     >>> import numpy as np
     >>> from sepi import LightField
@@ -219,7 +219,7 @@ class LightField:
             position = whole_pair(f"{self.name}: view", self.view, "two whole numbers (t, s)")
             object.__setattr__(self, "view", position)
         for key in ("name", "source"):
-            # names of files need not be text, or one line of it; what is not cannot be printed or stored
+            # file names need not be printable text, but text that is printed and stored must be
             object.__setattr__(self, key, _shown(getattr(self, key)))
         require_type(f"{self.name}: notes", self.notes, (tuple, list), "a tuple of texts")
         for note in self.notes:
@@ -300,12 +300,12 @@ class LightField:
         return {what: array for what, array in named.items() if array is not None}
 
     def require_seen_range(self) -> None:
-        """Raise for a range far beyond the disparities at which any other view shows what the reference view shows.
+        """Raise if the range goes far beyond the disparities that another view can show.
 
         Raises
         ------
         SepiError
-            If it is, or the range is unknown.
+            If it does, or the range is unknown.
         """
         known = self.require_disparity_range()
         others = self.present.copy()
@@ -334,7 +334,7 @@ class LightField:
 
     @property
     def reference_rig(self) -> Rig | None:
-        """The rig with the reference view at its origin, and that view's camera alone; None without one."""
+        """The rig with its origin at the reference view, and only that view's camera; None without a rig."""
         if self.rig is None or self.positions is None:
             return None
         at = self.reference_position
@@ -355,7 +355,7 @@ class LightField:
         """Baseline ``(down, across)`` from the reference view to each view, in view steps; shape (T, S, 2).
 
         A pixel ``(y, x)`` of disparity ``d`` is seen in view ``(t, s)`` at ``(y, x) - d * baselines[t, s]``. Zero for
-        missing views, of which nobody asks.
+        missing views.
         """
         positions = self.positions
         if positions is None:
@@ -370,16 +370,15 @@ class LightField:
 
     @property
     def rgb_views(self) -> npt.NDArray[Any]:
-        """The views with three channels, ``(T, S, H, W, 3)``: what all computation sees.
+        """The views with three channels, as all stages see them; shape (T, S, H, W, 3), read-only.
 
-        Grey counts as three equal channels, so that a light field gives the same maps as grey and as RGB. They take no
-        memory of their own and cannot be written to.
+        Grey becomes three equal channels without a copy, so that a light field gives the same maps in grey and in RGB.
         """
         return np.broadcast_to(self.views, (*self.views.shape[:4], 3))
 
     @property
     def reference_view(self) -> FloatMap:
-        """The reference view as ``(H, W, 3)`` float32 in 0..1, grey as three equal channels."""
+        """The reference view with three channels, in 0..1; shape (H, W, 3), float32."""
         return as_unit_float(self.rgb_views[self.reference_position])
 
     def require_disparity_range(self) -> DisparityRange:
@@ -392,7 +391,7 @@ class LightField:
         Raises
         ------
         SepiError
-            If it is not known.
+            If it is unknown.
         """
         if self.disparity_range is None:
             raise SepiError(f"{self.name}: disparity range unknown; give one (MIN MAX, pixels per view step)")
@@ -404,7 +403,7 @@ class LightField:
         Parameters
         ----------
         disparity_range : DisparityRange
-            Takes the place of its own, if it has one.
+            The new range.
 
         Returns
         -------
@@ -414,7 +413,7 @@ class LightField:
         return replace(self, disparity_range=disparity_range)
 
     def seen_from(self, view: tuple[int, int]) -> LightField:
-        """The same light field with another reference view; ground truth and masks, which belong to a view, go.
+        """The same light field with another reference view, without the ground truth and masks of the old one.
 
         Parameters
         ----------
@@ -424,7 +423,7 @@ class LightField:
         Returns
         -------
         LightField
-            Shares its views with this one; itself where it has this reference view already.
+            Shares its views with this one; the same object if it has this reference view already.
 
         Raises
         ------
@@ -449,7 +448,7 @@ def _shown(text: str) -> str:
 
 
 def _require_unit(name: str, values: npt.NDArray[Any]) -> None:
-    """Raise unless floats are finite and 0..1, but for what resampling overshoots."""
+    """Raise unless floats are finite and about 0..1 (:data:`LOWEST` to :data:`HIGHEST`)."""
     low, high = float(values.min()), float(values.max())
     if not (low >= LOWEST and high <= HIGHEST):
         raise SepiError(f"{name}: float views must be finite and within 0..1, got {low:g} to {high:g}")
@@ -482,10 +481,10 @@ def as_unit_float(values: npt.NDArray[Any]) -> FloatMap:
 
 
 def require_light_field(value: object) -> None:
-    """Raise for what is no light field, such as the path of one."""
+    """Raise unless a value is a light field, and not a path, for example."""
     require_type("light field", value, LightField, "a LightField, as sepi.read_light_field makes it")
 
 
 def full_scale(dtype: npt.DTypeLike) -> float:
-    """Pixel value that stands for 1.0."""
+    """Pixel value that means 1.0."""
     return float(np.iinfo(dtype).max) if np.issubdtype(dtype, np.integer) else 1.0

@@ -1,4 +1,4 @@
-"""What maps and their times were made with: processor, cores, versions of libraries; no names of hosts or users."""
+"""Description of the machine for files of times: processor, cores, versions; no names of hosts or users."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ LIBRARIES = (
     "matplotlib",
     "snakemake",
 )
-"""Distributions whose versions are told, where they are installed."""
+"""Distributions whose versions are listed, if installed."""
 
 
 def this_machine() -> dict[str, Any]:
-    """Processor, cores that may be used, memory in GiB, and versions."""
+    """Processor, usable cores, memory in GiB, and versions."""
     return {
         "processor": _processor(),
         "cores": available_cores(),
@@ -42,7 +42,7 @@ def this_machine() -> dict[str, Any]:
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """Of the package and the libraries; to look for them takes 50 ms."""
+    """Versions of the package and its libraries; takes 50 ms."""
     found = {"sepi": package_version()}
     for name in LIBRARIES:
         with suppress(PackageNotFoundError):

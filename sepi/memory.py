@@ -1,4 +1,4 @@
-"""Memory that must be there before a library takes it that does not know how to do without."""
+"""Memory that OpenBLAS and glibc take, and how to get it first or return it."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from contextlib import suppress
 import numpy as np
 
 BLAS_BUFFER = 64_000_000
-"""OpenBLAS takes 32 MB at its first call; bytes, with some to spare."""
+"""Bytes that must be free for OpenBLAS, which takes 32 MB at its first call."""
 
 
 def require_memory(number: int) -> None:
-    """See that there is memory where a limit on the process's address space is set (``ulimit -v``).
+    """Raise if a limit on the process's address space (``ulimit -v``) leaves less memory than this.
 
-    OpenBLAS asks for its buffer again and again, without end, where the limit is reached.
+    At the limit, OpenBLAS would ask for its buffer again without end.
 
     Parameters
     ----------
@@ -27,14 +27,14 @@ def require_memory(number: int) -> None:
     MemoryError
     """
     try:
-        # taken, not written to, and given back at once
+        # allocated without being written to, and freed at once
         np.empty(number, np.uint8)
     except MemoryError as error:
         raise MemoryError(f"{number // 10**6} MB more are needed than a limit on this process leaves") from error
 
 
 def take_blas_buffer() -> None:
-    """Have OpenBLAS take its buffer, while there is memory for it.
+    """Let OpenBLAS take its buffer while there is memory.
 
     Raises
     ------
@@ -45,9 +45,9 @@ def take_blas_buffer() -> None:
 
 
 def give_back_memory() -> None:
-    """Have the C library give back what arrays have freed, as far as the system's can.
+    """Let the C library return freed memory to the system, with glibc.
 
-    glibc keeps free what lies below something that is in use, and what is made next mostly does not fit in there.
+    glibc keeps free memory below memory in use, and later arrays mostly do not fit into it.
     """
     if sys.platform == "linux":
         with suppress(AttributeError, OSError):

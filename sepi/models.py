@@ -1,4 +1,4 @@
-"""Turn what a user wrote (config keys, flags, JSON) into checked models; each error is one line that names the key."""
+"""Checked models from what a user wrote (configuration, flags, JSON); each error is one line that names the key."""
 
 from __future__ import annotations
 
@@ -16,38 +16,38 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 AS_PAIR = BeforeValidator(lambda value: pair_of(value) or (tuple(value) if isinstance(value, list) else value))
-"""Of a field of two numbers: takes them as the command line does, too."""
+"""Validator of a field of two numbers, which also takes them as the command line does."""
 
 
 class CheckedModel(BaseModel):
-    """Keys and values that a user writes: frozen, unknown keys refused, no value taken for one of another type."""
+    """Keys and values that a user writes; frozen, without unknown keys or conversion of types."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
 
 def _plain(value: object) -> Any:
-    """A NumPy number as Python's, for JSON."""
+    """A NumPy number as a Python number, for JSON."""
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError
 
 
 def validated(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
-    """Check ``values`` against ``model``.
+    """The model with these values, checked.
 
     Parameters
     ----------
     model : type
-        A pydantic model; its unknown keys are errors.
+        A pydantic model; unknown keys are errors.
     values : mapping
         Keys and values as JSON has them (lists for tuples, no NaN).
     where : str
-        The place the user wrote them, for the message: ``"stages.initial.sepi"``.
+        Where the user wrote them, for the message: ``"stages.initial.sepi"``.
 
     Raises
     ------
     SepiError
-        One line for the first key that is wrong: which, why, and what would be right.
+        If a key is wrong: the first one, why, and what would be right.
     """
     _require_fields(model, values, where)
     for key, value in values.items():
@@ -57,7 +57,7 @@ def validated(model: type[Model], values: Mapping[str, Any], where: str) -> Mode
             # YAML can name Python objects
             raise SepiError(f"{where}.{key}: expected numbers, text, lists or keys with values, got {value}") from error
     try:
-        # by way of JSON, because strict models take a JSON list for a tuple but not a Python list
+        # through JSON: strict models accept a JSON list for a tuple, but not a Python list
         return model.model_validate_json(json.dumps(dict(values), allow_nan=False, default=_plain))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
@@ -69,7 +69,7 @@ def validated(model: type[Model], values: Mapping[str, Any], where: str) -> Mode
 
 
 def _require_fields(model: type[BaseModel], values: Mapping[str, Any], where: str) -> None:
-    """Refuse unknown keys here rather than by pydantic, to suggest the nearest known one."""
+    """Raise for unknown keys; unlike pydantic, suggest the nearest known key."""
     require_known(where, values, model.model_fields)
     for name, value in values.items():
         inner = model.model_fields[name].annotation

@@ -5,19 +5,18 @@ crosses the occluder. ``half_sepi`` repeats the slope computation with the views
 
 1. candidates: pixels near Canny edges of the reference view and near discontinuities of the initial depth;
 2. mean shift on the patch of image and depth gives the surface that each pixel belongs to;
-3. side: by geometry the half away from the nearer surface is kept. (With positive disparity nearer, a nearer surface on
-   the right hides the pixel from the views on the right, so the left half is kept. The paper's sentence says the
-   reverse.)
-4. half-SEPI depth and its confidence replace the full ones where they explain the views clearly better.
+3. side: the half away from the nearer surface is kept. (A nearer surface on the right hides the pixel from the views on
+   the right, so the left half is kept. The paper's sentence says the reverse.)
+4. half-SEPI depth and confidence replace the full ones where they explain the views clearly better.
 
-``wang`` is the occlusion model of [2]_, which the paper's text compares with: the angular patch is split along the edge
-orientation, and the half with the smaller cost is kept. ``none`` hands the initial depth on.
+``wang`` is the occlusion model of [2]_, which the paper's text compares with: it splits the angular patch along the
+edge orientation, and keeps the half with the smaller cost. ``none`` returns the initial depth.
 
-``visibility`` chooses the views one by one: those in which nothing of the map so far occludes the pixel
-(:mod:`sepi.matching.visibility_sweep`); pixels that a depth discontinuity runs through then go to the surface that
-fills most of them (:mod:`sepi.boundaries.decision`).
+``visibility`` chooses the views one by one, by the map so far: those in which nothing occludes the pixel
+(:mod:`sepi.matching.visibility_sweep`). A pixel on a depth discontinuity then gets the surface that fills most of it
+(:mod:`sepi.boundaries.decision`).
 
-What every choice is given, and hands on: :class:`sepi.stage.Choice`.
+:class:`sepi.stage.Choice` describes arguments and results of all choices.
 
 References
 ----------
@@ -49,7 +48,7 @@ from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_
 
 
 class OcclusionParameters(SweepParameters, CannyParameters):
-    """What both occlusion models need: candidates, and when a half replaces the full SEPI."""
+    """Parameters of both occlusion models: candidates, and when a half replaces the full SEPI."""
 
     discontinuity_threshold: float = Field(
         0.3,
@@ -78,12 +77,12 @@ class HalfSepiParameters(OcclusionParameters):
 
     @property
     def groups(self) -> int:
-        """Those between the dividing lines of the halves, and those on them."""
+        """Groups between the dividing lines of the halves, and on them."""
         return 8
 
 
 class VisibilityParameters(VisibleViewsParameters, BoundaryParameters):
-    """Parameters of the views chosen one by one, and of pixels beside depth steps."""
+    """Parameters of the choice of views, and of pixels beside depth steps."""
 
 
 class WangParameters(OcclusionParameters):
@@ -93,7 +92,7 @@ class WangParameters(OcclusionParameters):
 
     @property
     def groups(self) -> int:
-        """Sectors between the edges."""
+        """Sectors between the edge orientations."""
         return 2 * self.directions
 
 
@@ -105,8 +104,8 @@ def half_sepi(
     Returns
     -------
     StageMaps
-        Adds ``occlusion_candidates`` and ``occluded``, bool, and ``view_subset``, uint8, the subset kept, a number
-        of ``subset_names``: all views, a half, or a quarter.
+        Adds ``occlusion_candidates`` and ``occluded``, bool, and ``view_subset``, uint8: number of the subset kept, in
+        ``subset_names`` (all views, a half, or a quarter).
 
     References
     ----------
@@ -163,8 +162,8 @@ def wang(
     Returns
     -------
     StageMaps
-        Adds ``occlusion_candidates`` and ``occluded``, bool, and ``view_subset``, uint8, the subset kept, a number
-        of ``subset_names``: all views, or a half plane.
+        Adds ``occlusion_candidates`` and ``occluded``, bool, and ``view_subset``, uint8: number of the subset kept, in
+        ``subset_names`` (all views, or a half plane).
 
     References
     ----------
@@ -190,7 +189,7 @@ def wang(
     result = sweep(
         light_field, parameters, groups=views.groups, subsets=views.subsets, mask=candidates, progress=progress
     )
-    # the two halves beside the edge have the edge's normal, and its reverse, as their middle
+    # the middles of the two halves lie along the edge's normal and against it
     normal = edge_angle(light_field.reference_view, parameters)
     first = np.floor(normal / np.pi * parameters.directions).astype(np.int64) % (2 * parameters.directions)
     number = np.arange(2 * parameters.directions)[:, None, None]
@@ -203,12 +202,12 @@ def wang(
 def visibility(
     light_field: LightField, previous: StageMaps | None, parameters: VisibilityParameters, progress: Progress
 ) -> StageMaps:
-    """Depth from the views that see each pixel, as the map so far tells: the second stage of variant ``best``.
+    """Depth from the views that see each pixel, by the map so far; variant ``best`` uses it.
 
     Returns
     -------
     StageMaps
-        Adds ``occluded``, bool: pixels that something nearer occludes in some view.
+        Adds ``occluded``, bool: pixels that something nearer occludes in at least one view.
 
     Examples
     --------
@@ -227,7 +226,7 @@ def visibility(
     before, given = require_previous(previous), light_field
     light_field = compared_views(light_field, parameters)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress, mean_reference)
-    # at a rim denoising would mix the colours that have to be told apart
+    # denoising would mix the colours of both surfaces at a rim
     disparity = assigned_to_surfaces(given, result.disparity, parameters)
     views = spread_views(light_field, parameters.views)
     disparity = without_specks(light_field, disparity, views, parameters)
@@ -248,7 +247,7 @@ def occlusion_candidates(reference_view: FloatMap, disparity: FloatMap, paramete
 def nearer_on_hidden_side(
     surface: FloatMap, disparity: FloatMap, sides: list[str], reach: int, margin: float
 ) -> BoolMap:
-    """Whether a nearer surface lies where it would hide the pixel from the views that are left out.
+    """Whether a nearer surface lies on the side that hides the pixel from the views left out.
 
     Parameters
     ----------
@@ -257,11 +256,11 @@ def nearer_on_hidden_side(
     disparity : ndarray, shape (H, W), float32
         Disparity of the pixels by the views that are kept.
     sides : list of str
-        The half that is kept, or the two whose overlap is; one hidden side is enough.
+        The half that is kept, or the two halves of a quarter; a nearer surface on one hidden side is enough.
     reach : int
-        Pixels.
+        Distance of the search, pixels.
     margin : float
-        By how much nearer, pixels per view step.
+        Least difference of disparity, pixels per view step.
 
     Returns
     -------
@@ -272,7 +271,7 @@ def nearer_on_hidden_side(
     for side in sides:
         dt, ds = SIDES[side]
         for distance in range(1, reach + 1):
-            # the views kept lie towards (dt, ds), so the occluder lies the other way
+            # the views kept lie towards (dt, ds), so the occluder lies on the opposite side
             dy, dx = -dt * distance, -ds * distance
             if abs(dy) >= H or abs(dx) >= W:
                 break
@@ -290,7 +289,7 @@ def replace_where_better(
     names: tuple[str, ...],
     min_change: float,
 ) -> StageMaps:
-    """Initial maps with the depth and confidence of the subset of least cost where that is not all views.
+    """Initial maps with depth and confidence of the subset of least cost.
 
     Parameters
     ----------
@@ -298,10 +297,11 @@ def replace_where_better(
     result : SweepResult
         Subset 0 is all views.
     cost : ndarray, shape (N, H, W), float32
-        Costs to choose by.
+        Cost of each subset.
     candidates : ndarray, shape (H, W), bool
+        Pixels that may change.
     names : tuple of str, length N
-        Of the subsets.
+        Names of the subsets.
     min_change : float
         Smaller changes of disparity keep the depth from all views.
 

@@ -1,15 +1,14 @@
 """Global optimisation (section IV-D, Eq. 8-12 of [1]_).
 
-``wls`` minimises the weighted least squares energy of Eq. 8: fidelity to the refined depth where it deserves it (Eq.
-9-10: the confidences of occluded, textureless and other pixels, little where the depth changes abruptly), and
-smoothness on the 4-connected grid where the image is smooth (Eq. 11) and the depth uncertain (Eq. 12).
+``wls`` minimises the weighted least squares energy of Eq. 8: fidelity to the refined depth by its confidence, reduced
+at depth discontinuities (Eq. 9-10), and smoothness on the 4-connected grid where the image is smooth (Eq. 11) and the
+depth uncertain (Eq. 12).
 
-``second_order`` goes back to the views instead: Gauss-Newton steps on their residuals
-(:mod:`sepi.matching.gauss_newton`) refine the depth below the disparity sampling, and second-order smoothing
-(:mod:`sepi.regularization.second_order`), which leaves planes free, weighs each pixel by how much the views know about
-it. ``none`` hands the depth on.
+``second_order`` compares the views again: Gauss-Newton steps on their residuals (:mod:`sepi.matching.gauss_newton`)
+refine the depth below the disparity sampling. Second-order smoothing (:mod:`sepi.regularization.second_order`), which
+leaves planes unchanged, weights each pixel by the views' information on it. ``none`` returns the depth unchanged.
 
-What every choice is given, and hands on: :class:`sepi.stage.Choice`.
+:class:`sepi.stage.Choice` describes arguments and results of all choices.
 
 References
 ----------
@@ -58,10 +57,10 @@ if TYPE_CHECKING:
     from sepi.matching.surface_windows import Surfaces
 
 UNIFORM_WEIGHT = 0.05
-"""Weight of a plane that was put into a region without texture; planes cost nothing, so little holds it."""
+"""Weight of the data on planes of textureless regions; planes cost nothing, so a small weight keeps them."""
 
 WLS_VIEWS = 9
-"""Views that are asked how far a map by weighted least squares may be wrong, at least."""
+"""Least number of views for the error bars of a map by weighted least squares."""
 
 LEAST_RELIABILITY = 1e-6
 LEAST_SMOOTHNESS = 1e-8
@@ -128,15 +127,15 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
 def wls(
     light_field: LightField, previous: StageMaps | None, parameters: WlsParameters, progress: Progress
 ) -> StageMaps:
-    """Globally optimised depth: weighted least squares (section IV-D, Eq. 8-12 of [1]_).
+    """Depth by globally weighted least squares (section IV-D, Eq. 8-12 of [1]_).
 
-    Takes the map ``textureless`` where that stage ran.
+    Uses the map ``textureless`` if the stage before made one.
 
     Returns
     -------
     StageMaps
         With the error bars ``sigma``, ``low`` and ``high``; ``confidence`` is the probability of an error of at most
-        :data:`sepi.stage.CLOSE`, not the rectified confidence c' of Eq. 10, which weighs the data.
+        :data:`sepi.stage.CLOSE`, not the rectified confidence c' of Eq. 10, which weights the data.
 
     References
     ----------
@@ -177,9 +176,9 @@ def wls(
 def second_order(
     light_field: LightField, previous: StageMaps | None, parameters: SecondOrderParameters, progress: Progress
 ) -> StageMaps:
-    """Depth refined on the views and smoothed, planes being free: the last stage of variant ``best``.
+    """Depth refined by the views, with second-order smoothing; variant ``best`` uses it.
 
-    Takes the map ``textureless`` where that stage ran.
+    Uses the map ``textureless`` if the stage before made one.
 
     Returns
     -------
@@ -221,16 +220,16 @@ def second_order(
             views = spread_views(light_field, parameters.views if last or noisy else parameters.first_views)
             matching = GaussNewton(light_field, parameters, parameters.occlusion_margin, views)
         if i <= refinements or last:
-            # other steps are too small to change it
+            # later steps are too small to change the visibility
             mean = matching.mean(disparity)
         if i == 0:
-            # a map that was smoothed is told by itself
+            # a smoothed map tells its discontinuities itself
             by_colour = _coloured(mean, light_field, parameters) if refinements and parameters.one_surface else by_depth
         if last:
-            # the splines have it
+            # the splines hold a copy
             matching.forget_detail()
             told = gradient, information, _ = matching.with_evidence(mean, disparity)
-            # the solver has use for their memory
+            # memory for the solver
             del matching, mean
             forget_splines(light_field)
             forget_detail(light_field)
@@ -239,7 +238,7 @@ def second_order(
         surfaces = by_depth if smooth else by_colour
         radius = parameters.solve_radius if smooth else parameters.refinement_radius
         step, curvature = windowed_step(gradient, information, disparity, surfaces, radius, parameters.max_update)
-        # where no view knows anything, a step would follow the noise
+        # in uniform regions, a step would follow the noise
         target = np.clip(disparity + np.where(uniform, np.float32(0), step), lowest, highest)
         if smooth:
             threshold = _threshold(disparity, parameters, first=i == refinements)
@@ -256,10 +255,9 @@ def _with_bars(
     variance: FloatMap | None,
     calibration: Calibration,
 ) -> StageMaps:
-    """Maps with error bars, by what the views told of (nearly) this map.
+    """Maps with error bars, from the views' evidence about (nearly) this map.
 
-    The light field is the one that was given, not denoised: its noise counts. Where smoothing adds to what the views
-    know, ``variance`` is what is left of both.
+    The light field is the original one, whose noise counts. ``variance``, if given, is the variance after smoothing.
     """
     gradient, curvature, evidence = told
     known = light_field.require_disparity_range()
@@ -275,15 +273,15 @@ def _with_bars(
 
 
 def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMap:
-    """How far the data is believed, 0..1: by the best confidence within two pixels, since edges lower it."""
+    """Trust in the data, 0..1, by the best confidence within two pixels, since edges lower the confidence."""
     best = cv2.dilate(confidence, np.ones((5, 5), np.uint8))
     return np.asarray(np.clip((best / parameters.reliable_confidence) ** 2, LEAST_RELIABILITY, 1), np.float32)
 
 
 def _threshold(disparity: FloatMap, parameters: SecondOrderParameters, first: bool) -> float:
-    """Second difference that marks a discontinuity: a part of curved leaves is no step, one of a bare wall is.
+    """Second difference of a discontinuity, in proportion to the map's own: leaves curve more than a wall.
 
-    Before the first smoothing most of what a map has is noise.
+    In the first round it is a parameter, because second differences are mostly noise before any smoothing.
     """
     from sepi.regularization.second_order import upper_quartile
 
@@ -294,16 +292,16 @@ def _threshold(disparity: FloatMap, parameters: SecondOrderParameters, first: bo
 
 
 class _Prior(NamedTuple):
-    """What is known of a map's smoothness in all rounds.
+    """Inputs of the smoothing that are the same in all rounds.
 
     Attributes
     ----------
     uniform : ndarray, shape (H, W), bool
-        Pixels that no view knows anything about.
+        Pixels of textureless regions with a plane.
     reliability : ndarray, shape (H, W), float32
-        0..1.
+        Trust in second differences of the data, 0..1.
     colours : list of ndarray
-        Of :func:`sepi.regularization.second_order.colour_changes`.
+        From :func:`sepi.regularization.second_order.colour_changes`.
     colour_variance : float
         Squared change of colour that weakens smoothness.
     """
@@ -342,9 +340,9 @@ def _smoothed(
     *,
     last: bool,
 ) -> tuple[FloatMap, FloatMap | None]:
-    """Second-order smoothing of ``target``, of inverse variance ``curvature``; and, the last time, its variance.
+    """``target``, of inverse variance ``curvature``, after second-order smoothing; in the last round with its variance.
 
-    There is little of it where ``shape``, the map so far, has a second difference beyond the threshold, or the colours
+    Smoothing is weak where ``shape``, the map so far, has a second difference beyond the threshold, or the colours
     change.
     """
     from sepi.regularization.local_inverse import inverse_diagonal

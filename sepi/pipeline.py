@@ -1,4 +1,4 @@
-"""The whole way from a light field to a depth map: the stages of a variant, one after the other."""
+"""Depth maps of a light field: the stages of a variant, run in order."""
 
 from __future__ import annotations
 
@@ -34,29 +34,28 @@ def estimate_depth(
     Parameters
     ----------
     light_field : LightField
-        Where its disparity range is unknown, it is estimated from the views.
+        If its disparity range is unknown, the range is estimated from the views.
     variant : str or Variant
-        Name of a built-in variant (:data:`sepi.variants.VARIANTS`), or a choice for each stage and what it overrides.
+        Name of a built-in variant (:data:`sepi.variants.VARIANTS`), or a choice and parameters for each stage.
     parameters : mapping, optional
-        Stage to field to value, where the defaults do not suit: ``{"initial": {"num_disparities": 91}}``.
+        Stage to field to value, to override defaults: ``{"initial": {"num_disparities": 91}}``.
     progress : callable
         Called with the fraction done, 0..1.
     memory : int, optional
-        Bytes that the process should stay within, the light field and Python itself included. The maps are the same;
-        with little memory it takes longer.
+        Most bytes of the process, the light field and Python included. Less memory takes more time, for the same maps.
 
     Returns
     -------
     StageMaps
         ``disparity`` (H, W) float32 in pixels per view step, ``confidence`` (H, W) float32 in 0..1, ``extra`` maps of
-        the stages and ``unknown``, bool: pixels that no view knows anything about, of confidence 0.
+        the stages and ``unknown``, bool: pixels for whose depth no view has evidence, with confidence 0.
 
     Raises
     ------
     SepiError
-        If the variant, a stage or a field is unknown, a value is not allowed, or the memory cannot be enough.
+        If the variant, a stage or a field is unknown, a value is not allowed, or ``memory`` is too small.
     MemoryError
-        If a limit on the process's address space cannot be enough.
+        If a limit on the process's address space is too small.
 
     Examples
     --------
@@ -70,7 +69,7 @@ def estimate_depth(
     >>> bool(np.median(np.abs(maps.disparity - light_field.ground_truth)) < 0.01)
     True
 
-    The method as published, with a parameter of its own:
+    The method as published, with another value of a parameter:
 
     >>> maps = sepi.estimate_depth(light_field, "paper", {"initial": {"num_disparities": 91}})
     >>> sorted(set(maps.extra) - {"sigma", "low", "high"})[:4]
@@ -86,12 +85,12 @@ def estimate_depth(
 
         light_field = light_field.with_range(estimate_range(light_field))
     light_field.require_seen_range()
-    # kernels read views without gaps in memory
+    # kernels need contiguous views
     views, workspace = np.ascontiguousarray(light_field.views), light_field.workspace or Workspace()
     light_field = replace(light_field, views=views, workspace=workspace)
     compared = equally_bright(light_field)
     require_memory_of(compared, settings.values())
-    # what was made to tell what is needed stays
+    # the workspace keeps the noise that require_memory_of measured
     workspace = replace(workspace, detail_bytes=bytes_of_volumes(compared, settings.values()))
     if memory is not None:
         workspace = replace(workspace, band_bytes=bytes_of_bands(compared, settings.values(), memory))
@@ -119,7 +118,7 @@ def _after_all_stages(
         maps = STAGES[stage][choice].run(light_field, maps, settings[stage], of_all)
         of_all(1.0)
         if stage in ("initial", "occlusion"):
-            # what they take is the most; later stages would only have to clear the pages again
+            # these stages take most; later ones would only clear these pages again
             give_back_memory()
     assert maps is not None  # there are stages
     return maps

@@ -1,6 +1,4 @@
-"""Read a light field of any format, ready for the stages: checked as a whole, and with a warning where its views seem
-to be in the wrong order.
-"""
+"""Light fields of any format, read and checked, with a warning if the views seem to be in the wrong order."""
 
 from __future__ import annotations
 
@@ -23,9 +21,9 @@ from sepi.lightfield import DisparityRange, LightField
 from sepi.memory import give_back_memory
 from sepi.validation import described, require_type
 
-# 16-bit views darker than this, a sixteenth of the full scale, hold fewer bits or next to no light
+# 16-bit views darker than this, a sixteenth of the full scale, have fewer bits or hardly any light
 _NARROW = 4096
-# what cameras may stand off a plane, in view steps, before it matters how far away the scene is
+# distance of cameras from their plane, in view steps, beyond which rectification needs the depth of the scene
 _FLAT = 1e-3
 
 
@@ -38,26 +36,25 @@ def read_light_field(
     check_order: bool = True,
     truth: bool = True,
 ) -> LightField:
-    """Read a light field of any known format.
+    """A light field read from a file or folder of any known format.
 
     Parameters
     ----------
     path : str or Path
         File or folder.
     disparity_range : tuple of float, optional
-        ``(minimum, maximum)`` in pixels per view step, in place of the scene's own.
+        ``(minimum, maximum)`` in pixels per view step; default: the scene's own.
     file_format : str, optional
-        Word of a format: ``"exported"``, ``"hci"``, ``"images"``, ``"eslf"``, ``"mosaic"``, ``"tiff-stack"``,
-        ``"matlab"``, ``"numpy"``, ``"hci-2013"``, ``"openlf"``, ``"hdf5"`` or ``"sepi"``; found by looking unless
-        given.
+        ``"exported"``, ``"hci"``, ``"images"``, ``"eslf"``, ``"mosaic"``, ``"tiff-stack"``, ``"matlab"``, ``"numpy"``,
+        ``"hci-2013"``, ``"openlf"``, ``"hdf5"`` or ``"sepi"``; default: recognised from the files.
     options : ReadOptions, optional
-        What the files do not say: grid, name pattern, axes, order, views to leave out, reference view, row spacing,
-        white.
+        Grid, name pattern, axes, order, views to leave out, reference view, row spacing or white, if the files do not
+        tell them.
     check_order : bool
-        Look at the views: warn (:class:`SepiWarning`) where another order of them clearly fits better, and find how far
-        their rows are apart where nothing says so.
+        Check the views: warn (:class:`SepiWarning`) if another order fits clearly better, and measure an unknown row
+        spacing.
     truth : bool
-        Read ground truth and masks where there are any; without, as if there were none.
+        Whether to read ground truth and masks.
 
     Returns
     -------
@@ -67,15 +64,15 @@ def read_light_field(
     Raises
     ------
     SepiError
-        If nothing is there, the format is unknown, the files are damaged or contradict each other or the options,
-        the grid of the views cannot be told, or there is nothing to match in the views.
+        If there is no such file, the format is unknown, the files are damaged or contradict each other or the options,
+        the grid of the views is ambiguous, or the views have no contrast to match.
     MemoryError
-        If a limit on the process's address space leaves too little to look at them.
+        If a limit on the process's address space is too small to check the views.
 
     Examples
     --------
-    An array whose grid of views comes last, as some programs store it: sizes tell the axes, ``sepi.ReadOptions`` could
-    name them.
+    An array with the grid of views last, as some programs store it. Its sizes tell the axes; otherwise
+    ``sepi.ReadOptions`` names them.
 
     >>> import numpy as np
     >>> import sepi
@@ -116,7 +113,7 @@ def read_light_field(
         light_field = settle_row_spacing(light_field, views)
     record = reading_record(options, file_format)
     if record:
-        # a file of this package may be of other files that were read otherwise
+        # a file of this package may name other files, read with other options
         light_field = replace(light_field, source=str(path), reading=record)
     if given is not None:
         light_field = light_field.with_range(given)
@@ -145,7 +142,7 @@ def read_light_field(
 
 
 def _with_axes(path: Path, options: ReadOptions, file_format: str | None, unclear: UnclearAxesError) -> LightField:
-    """An array whose sizes leave its axes open, read as its views fit together."""
+    """An array with ambiguous axes, read with those for which its views fit together."""
     from sepi.inspection.array_axes import fitting_axes
 
     tried = {axes: read(path, replace(unarranged(options), axes=axes), file_format) for axes in unclear.readings}
@@ -158,7 +155,7 @@ def _with_axes(path: Path, options: ReadOptions, file_format: str | None, unclea
 
 
 def _with_depths(path: Path, light_field: LightField, options: ReadOptions, given: DisparityRange | None) -> LightField:
-    """Calibrated cameras without points: rectified for the depths that the views tell, if they stand off a plane."""
+    """The light field rectified for depths estimated from its views, if its cameras have no points and no plane."""
     from sepi.inspection.disparity_range import estimate_range
     from sepi.io.readers import calibrated
 
@@ -183,7 +180,7 @@ def read_cameras(
     exclude: tuple[str, ...] = (),
     disparity_range: tuple[float, float] | None = None,
 ) -> LightField:
-    """Read views with calibrated cameras, and rectify them to a light field.
+    """A light field rectified from pictures of calibrated cameras.
 
     Parameters
     ----------
@@ -191,9 +188,9 @@ def read_cameras(
         COLMAP model (extra ``sepi[colmap]``), ``transforms.json``, or a table ``cameras.csv`` or ``cameras.yaml``; or
         a folder with one of them.
     images : str or Path, optional
-        Folder of the pictures, where the model's own does not lead to them.
+        Folder of the pictures, if the model does not name it.
     reference : str, optional
-        Name of the picture whose depth is made; that of the most central camera unless given.
+        Name of the picture whose depth is estimated; default: that of the most central camera.
     exclude : tuple of str
         Names of pictures to leave out.
     disparity_range : tuple of float, optional
@@ -202,12 +199,12 @@ def read_cameras(
     Returns
     -------
     LightField
-        Views of float32, with positions, camera and ``rig``; its notes say how flat the cameras stand.
+        Views of float32, with positions, camera and ``rig``; its notes say how far the cameras stand off a plane.
 
     Raises
     ------
     SepiError
-        If there are no cameras or pictures, or they make no light field.
+        If cameras or pictures are missing, or the cameras do not suit a light field.
 
     Examples
     --------
@@ -242,7 +239,7 @@ def _given_range(path: Path, bounds: tuple[float, float]) -> DisparityRange:
 
 
 def _depth_warning(light_field: LightField) -> str | None:
-    """Tell of 16-bit files that hold fewer bits: to the stages, such views are nearly black."""
+    """Warning about 16-bit files with fewer bits, since stages see nearly black views; None if all is well."""
     view = light_field.views[light_field.reference_position]
     brightest = int(view.max()) if view.dtype == np.uint16 else _NARROW
     if brightest >= _NARROW:

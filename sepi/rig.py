@@ -1,7 +1,7 @@
-"""Calibrated cameras: how each one sees, where it stood, and how rectified views lie between them.
+"""Calibrated cameras: lenses, poses, and the rectified views made from their pictures.
 
 Axes are those of computer vision: x to the right, y down, z forward. The middle of a picture's first pixel is (0, 0).
-A world point ``P`` lies at ``R (P - C)`` before a camera of rotation ``R`` that stands at ``C``.
+A camera at ``C`` with rotation ``R`` sees the world point ``P`` at ``R (P - C)`` in its own axes.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ PINHOLE, FISHEYE = "pinhole", "fisheye"
 METRES = "metres"
 
 WORLD = "axes and origin of the calibrated cameras' world"
-"""What files say of points that a rig placed."""
+"""Description of coordinates in files of points from a rig."""
 
 LENSES = (PINHOLE, FISHEYE)
-"""How a lens sees: OpenCV's model with radial and tangential distortion, or OpenCV's fisheye model."""
+"""Kinds of lenses: OpenCV's model with radial and tangential distortion, and OpenCV's fisheye model."""
 
 MOST_COEFFICIENTS = {PINHOLE: 8, FISHEYE: 4}
-"""Distortion: ``k1 k2 p1 p2 k3 k4 k5 k6`` of a pinhole, ``k1 k2 k3 k4`` of a fisheye; missing ones are zero."""
+"""Largest number of coefficients: ``k1 k2 p1 p2 k3 k4 k5 k6`` (pinhole), ``k1 k2 k3 k4`` (fisheye); others are 0."""
 
-# rays that leave the picture's own field by more than this part may be bent back into it by the distortion's polynomial
+# rays farther outside the picture's field than this factor are not seen: the polynomial may bend them back into it
 _BEYOND = 1.02
 _BORDER_POINTS = 33
 _ROUNDS, _CLOSELY = 30, 1e-12
@@ -39,7 +39,7 @@ _ROUNDS, _CLOSELY = 30, 1e-12
 
 @dataclass(frozen=True)
 class Lens:
-    """How a camera sees.
+    """Lens of a camera: size of its pictures, focal length, principal point, distortion.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Lens:
             )
 
     def scaled(self, width: int, height: int) -> Lens:
-        """The lens in its picture scaled to another size.
+        """The lens for pictures scaled to another size.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class Lens:
         Raises
         ------
         SepiError
-            If one side is scaled otherwise than the other.
+            If the two sides have different scales.
 
         Examples
         --------
@@ -119,7 +119,7 @@ class Lens:
         ((250.0, 250.0), (159.5, 119.5))
         """
         x, y = width / self.width, height / self.height
-        # whichever of the two pictures is smaller was rounded
+        # the smaller picture is the rounded one
         if abs(x - y) >= max(1, x) / self.width + max(1, y) / self.height:
             raise SepiError(
                 f"the picture is {width}x{height}, but its camera has {self.width}x{self.height}; expected pictures as "
@@ -138,12 +138,12 @@ class Lens:
 
     @property
     def _coefficients(self) -> Floats:
-        # OpenCV takes 4, 5, 8, ... of them
+        # OpenCV takes 4, 5, 8, ... coefficients
         missing = MOST_COEFFICIENTS[self.kind] - len(self.distortion)
         return np.array([*self.distortion, *(0.0,) * missing], np.float64)
 
     def project(self, rays: Floats) -> Floats:
-        """Pixels at which rays are seen.
+        """Pixels at which the camera sees rays.
 
         Parameters
         ----------
@@ -153,7 +153,7 @@ class Lens:
         Returns
         -------
         ndarray, shape (N, 2), float64
-            ``(x, y)``; NaN for what no pixel can see.
+            ``(x, y)``; NaN for rays that no pixel sees.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             flat = rays[:, :2] / rays[:, 2:]
@@ -165,7 +165,7 @@ class Lens:
 
     @np.errstate(over="ignore", invalid="ignore")
     def rays(self, pixels: Floats) -> Floats:
-        """Rays that are seen at pixels.
+        """Rays that the camera sees at pixels.
 
         Parameters
         ----------
@@ -184,7 +184,7 @@ class Lens:
         points, flat = np.asarray(pixels, np.float64)[:, None], np.eye(3)
         undistort = cv2.undistortPoints if self.kind == PINHOLE else cv2.fisheye.undistortPoints
         found = undistort(points, self.matrix, self._coefficients, R=flat, P=flat)[:, 0]
-        # OpenCV's own iterations end early, and how early depends on its version
+        # OpenCV's iterations end early, depending on its version
         for _ in range(_ROUNDS if self.kind == PINHOLE else 0):
             missed = (points[:, 0] - self._seen_at(np.asarray(found, np.float64))) / np.array(self.focal)
             found = np.asarray(found, np.float64) + missed
@@ -192,10 +192,10 @@ class Lens:
                 break
         return np.column_stack([found, np.ones(len(found))])
 
-    # what an absurd distortion bends beyond all numbers is seen by no pixel
+    # absurd distortions overflow, and no pixel sees such rays
     @np.errstate(over="ignore", invalid="ignore", divide="ignore")
     def _seen_at(self, flat: Floats) -> Floats:
-        """Pixels of rays with z = 1, given by their (x, y): OpenCV's formulas, for a tenth of its time."""
+        """Pixels of rays with z = 1, given by (x, y), by OpenCV's formulas in a tenth of its time."""
         square = (flat**2).sum(axis=1)
         if self.kind == PINHOLE:
             k1, k2, p1, p2, k3, k4, k5, k6 = self._coefficients
@@ -228,7 +228,7 @@ class Lens:
 
     @cached_property
     def _field(self) -> float:
-        """Greatest square of the distance from the axis of a ray that the picture shows, at z = 1."""
+        """Largest squared distance from the axis, at z = 1, of a ray that the picture shows."""
         rays = self.rays(self.border())[:, :2]
         return _BEYOND**2 * float((rays**2).sum(axis=1).max())
 
@@ -240,16 +240,16 @@ class Shot:
     Attributes
     ----------
     name : str
-        Of the picture's file.
+        Name of the picture's file.
     lens : Lens
     rotation : ndarray, shape (3, 3), float64
         From the world's axes to the camera's.
     centre : ndarray, shape (3,), float64
-        Where it stands in the world.
+        Position in the world.
 
     Examples
     --------
-    A point two metres before a camera that stands at the origin, unturned:
+    A point two metres in front of a camera at the origin without rotation:
 
     >>> import numpy as np
     >>> from sepi.rig import Lens, Shot
@@ -266,14 +266,13 @@ class Shot:
 
 @dataclass(frozen=True)
 class Rectified:
-    """A view of a rectified light field: the camera that took it, and what became of its pixels.
+    """A view of a rectified light field: its camera, and its zoom.
 
     Attributes
     ----------
     shot : Shot
     zoom : float
-        Focal length of the view as a multiple of the light field's: it makes up for a camera before or behind the
-        plane of the others.
+        Focal length of the view as a multiple of the light field's, for a camera in front of or behind the plane.
     """
 
     shot: Shot
@@ -282,20 +281,20 @@ class Rectified:
 
 @dataclass(frozen=True)
 class Rig:
-    """Where a rectified light field stands in the world, and the cameras that it was made from.
+    """Pose of a rectified light field in the world, and the cameras that it was made from.
 
     Attributes
     ----------
     rotation : ndarray, shape (3, 3), float64
         From the world's axes to those that all rectified views share.
     origin : ndarray, shape (3,), float64
-        World point of the position (0, 0), in whose axes points are given.
+        World point of the position (0, 0), the origin of points.
     step : float
         Length of a view step in units of the world.
     units : str
-        What these are: ``"metres"``, or ``"units of the model"``.
+        ``"metres"``, or ``"units of the model"``.
     views : mapping of (int, int) to Rectified
-        Grid position to what stands there.
+        Grid position to the view.
 
     Examples
     --------
@@ -315,7 +314,7 @@ class Rig:
     views: Mapping[tuple[int, int], Rectified]
 
     def centre(self, position: npt.ArrayLike) -> Floats:
-        """World points at which views stand.
+        """World points of view positions.
 
         Parameters
         ----------
@@ -331,12 +330,12 @@ class Rig:
         return np.asarray(self.origin + self.step * along, np.float64)
 
     def seen_from(self, position: npt.ArrayLike) -> Rig:
-        """The same with its origin elsewhere.
+        """The same rig with another origin.
 
         Parameters
         ----------
         position : array-like, shape (2,)
-            Of the new origin, ``(down, across)`` in view steps.
+            Position of the new origin, ``(down, across)`` in view steps.
 
         Returns
         -------
@@ -359,7 +358,7 @@ class Rig:
         return points @ self.rotation + self.origin
 
     def to_text(self) -> str:
-        """All of it as JSON.
+        """The rig as JSON.
 
         Returns
         -------
@@ -377,7 +376,7 @@ class Rig:
 
     @staticmethod
     def from_text(text: str) -> Rig:
-        """Read what :meth:`to_text` wrote.
+        """A rig from the text that :meth:`to_text` returns.
 
         Parameters
         ----------
@@ -390,7 +389,7 @@ class Rig:
         Raises
         ------
         SepiError
-            If it is no such text.
+            If it is another text.
         """
         try:
             told = json.loads(text)

@@ -1,8 +1,8 @@
-"""What every stage has in common: parameters, the maps that travel from stage to stage, and what a choice must keep to.
+"""Parts shared by all stages: parameters, maps, and the contract of a choice.
 
 A stage module defines ``CHOICES``: for each choice that a variant may name, a parameter model and a pure function
 ``(light_field, previous, parameters, progress) -> StageMaps``. The Python API, the command line and the workflow's
-rules all call that function.
+rules call this function.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 
 REACH = 4.0
-"""View steps from the reference view to the farthest, along an axis, in what a stage function sees: of 9x9 views."""
+"""View steps from the reference view to the farthest along an axis, for a stage function; that of 9x9 views."""
 
 CLOSE = 0.07
-"""Error that the confidence of maps with error bars is about, in pixels per view step of :data:`REACH`."""
+"""Largest error whose probability is the confidence of maps with error bars, pixels per view step of :data:`REACH`."""
 
 SIGMA, LOW, HIGH = ERROR_BARS = "sigma", "low", "high"
-"""Maps of how far a disparity may be wrong: standard deviation, and bounds of the interval of 90 %."""
+"""Names of the error bars: standard deviation, and bounds of the interval of 90 %."""
 
 Progress = Callable[[float], None]
 """Called with the fraction done, 0..1."""
 
 
 def no_progress(_: float) -> None:
-    """For callers who do not watch.
+    """Ignore progress, for callers who do not show it.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def no_progress(_: float) -> None:
 
     Examples
     --------
-    A stage called by itself, once unwatched and once with what it tells collected:
+    A stage called by itself, without progress and with all fractions collected:
 
     >>> from sepi import initial
     >>> from sepi.scenes import render
@@ -56,7 +56,7 @@ def no_progress(_: float) -> None:
 
 
 class Needs(NamedTuple):
-    """What a choice takes that takes more than its stage usually does, by the size of the light field.
+    """Memory and time of a choice beyond what its stage usually needs, by the size of the light field.
 
     Attributes
     ----------
@@ -77,14 +77,14 @@ class Needs(NamedTuple):
 class Parameters(BaseModel):
     """Parameters of one choice of a stage: frozen, unknown keys refused, each with a default and a description.
 
-    A model of pydantic. Each field takes a default, bounds, and a description that names its unit: ``config.yaml`` and
-    the command line are made of these.
+    This is a pydantic model. Each field has a default, bounds, and a description that names its unit; ``config.yaml``
+    shows them.
 
     Raises
     ------
     pydantic.ValidationError
-        If a field is unknown or a value not allowed; what users write goes through
-        :func:`sepi.variants.stage_parameters`, which tells it as a :class:`sepi.SepiError` of one line.
+        If a field is unknown or a value not allowed. For users, :func:`sepi.variants.stage_parameters` turns this into
+        a :class:`sepi.SepiError` of one line.
 
     Examples
     --------
@@ -102,20 +102,20 @@ class Parameters(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
     needs: ClassVar[Needs] = Needs()
-    """What the workflow asks a cluster for beyond the usual."""
+    """Memory and time that the workflow requests beyond the usual."""
 
     def settled(self, light_field: LightField) -> Self:
-        """These parameters with what follows from a light field filled in, to be told and kept with the maps.
+        """These parameters with values that depend on the light field filled in, for the record of the maps.
 
         Parameters
         ----------
         light_field : LightField
-            Of known disparity range.
+            With a known disparity range.
 
         Returns
         -------
         model of the same class
-            A sweep's has the number of candidates in it.
+            For a sweep, with the number of candidates.
         """
         return self
 
@@ -126,11 +126,11 @@ class Parameters(BaseModel):
 
 
 class NoParameters(Parameters):
-    """A choice that has nothing to set."""
+    """No parameters."""
 
 
 class OcclusionMarginParameters(Parameters):
-    """Which surfaces hide a pixel from a view."""
+    """Parameters of the occlusion of a pixel in a view."""
 
     occlusion_margin: float = Field(
         0.15, ge=0, description="by how much an occluder must be nearer, pixels per view step"
@@ -139,14 +139,14 @@ class OcclusionMarginParameters(Parameters):
 
 @dataclass(frozen=True)
 class CostVolume:
-    """What each candidate disparity costs each pixel, for a later stage that chooses among all of them.
+    """Costs of all candidate disparities at each pixel, for a later stage that chooses among them.
 
     Attributes
     ----------
     disparities : ndarray, shape (K,), float32
         The candidates, rising and uniform, pixels per view step.
     costs : ndarray, shape (K, H, W), float16
-        Finite, less is better. Half precision, since every scene's file holds one; make costs range over about 0..1.
+        Finite; less is better. Half precision saves space in files, so costs should lie in about 0..1.
 
     Raises
     ------
@@ -177,20 +177,18 @@ class CostVolume:
 
 
 Entry = dict[str, Any]
-"""What one stage did: ``stage``, ``choice`` and ``parameters``."""
+"""Record of one stage: ``stage``, ``choice`` and ``parameters``."""
 
 
 def entry(stage: str, choice: str, parameters: Parameters, light_field: LightField) -> Entry:
-    """The entry of a stage that ran with these parameters on a light field of known disparity range."""
+    """The record of a stage that ran with these parameters on a light field of known disparity range."""
     settled = parameters.settled(light_field)
     return {"stage": stage, "choice": choice, "parameters": settled.model_dump(mode="json")}
 
 
 @dataclass(frozen=True)
 class MadeBy:
-    """What made finished maps: the variant, empty where it has no name; the stages that did anything, in order; and the
-    range of disparities that was searched.
-    """
+    """Record of final maps: the variant's name (may be empty), its stages except ``none`` in order, disparity range."""
 
     variant: str
     history: tuple[Entry, ...]
@@ -199,7 +197,7 @@ class MadeBy:
 
 @dataclass(frozen=True)
 class StageMaps:
-    """What a stage hands on, and :func:`sepi.estimate_depth` returns: disparity, confidence, and further maps by name.
+    """Disparity, confidence and further maps, as stages and :func:`sepi.estimate_depth` return them.
 
     Attributes
     ----------
@@ -208,14 +206,14 @@ class StageMaps:
     confidence : ndarray, shape (H, W), float32
         0..1.
     extra : mapping of str to ndarray, shape (H, W)
-        Maps of this stage and of those before it (``occluded``, ``view_subset``, ``superpixels``, ...); of this
-        package's last stages the error bars ``sigma``, ``low`` and ``high``, too.
+        Maps of this stage and of those before it (``occluded``, ``view_subset``, ``superpixels``, ...), and after the
+        last stage of most variants the error bars ``sigma``, ``low`` and ``high``.
     subset_names : tuple of str
-        What the values of the map ``view_subset`` stand for, from 0 on; empty without such a map.
+        Names for the values of the map ``view_subset``, from 0; empty without such a map.
     cost_volume : CostVolume or None
-        Of a data cost that a later stage regularises; that stage hands on none.
+        Costs that a later stage regularises; that stage returns None.
     made_by : MadeBy or None
-        What :func:`sepi.estimate_depth` made them with, for whoever keeps them.
+        Record that :func:`sepi.estimate_depth` adds.
 
     Examples
     --------
@@ -227,11 +225,11 @@ class StageMaps:
     ['disparity', 'confidence', 'occlusion_candidates', 'occluded', 'view_subset']
     >>> maps.subset_names[:5]
     ('full', 'left', 'right', 'up', 'down')
-    >>> used = maps.extra["view_subset"]  # which views each pixel's depth was made from
+    >>> used = maps.extra["view_subset"]  # the views from which each pixel's depth was estimated
     >>> bool((used[maps.mask("occluded")] != maps.subset_names.index("full")).all())
     True
 
-    A map from elsewhere, to be written or refined like one of this package:
+    A map from another program, to be written or refined like one of this package:
 
     >>> import numpy as np
     >>> other = sepi.StageMaps(light_field.ground_truth, np.ones(light_field.shape, np.float32))
@@ -247,7 +245,7 @@ class StageMaps:
     made_by: MadeBy | None = None
 
     def all(self) -> dict[str, npt.NDArray[Any]]:
-        """Every map by name.
+        """All maps by name.
 
         Returns
         -------
@@ -258,7 +256,7 @@ class StageMaps:
 
     @property
     def sigma(self) -> FloatMap | None:
-        """Standard deviation of the disparity (H, W), float32, pixels per view step; None where nothing tells it."""
+        """Standard deviation of the disparity (H, W), float32, pixels per view step; None without error bars."""
         return self.extra.get(SIGMA)
 
     @property
@@ -282,21 +280,21 @@ class StageMaps:
         Returns
         -------
         ndarray, shape (H, W), bool
-            All False where there is none, as that stage was switched off.
+            All False if there is no such map, for example because its stage was switched off.
         """
         if name in self.extra:
             return self.extra[name].astype(bool)
         return np.zeros(self.disparity.shape, bool)
 
     def updated(self, disparity: FloatMap, confidence: FloatMap, **extra: npt.NDArray[Any]) -> StageMaps:
-        """These maps with a new disparity and confidence and further maps: what a stage returns.
+        """These maps with a new disparity and confidence and further maps, for a stage to return.
 
         Parameters
         ----------
         disparity, confidence : ndarray, shape (H, W), float32
             Pixels per view step; 0..1.
         **extra : ndarray, shape (H, W)
-            Maps to add, or to put in place of those of the same name.
+            Maps to add; they replace maps of the same name.
 
         Returns
         -------
@@ -305,7 +303,7 @@ class StageMaps:
         return replace(self, disparity=disparity, confidence=confidence, extra={**self.extra, **extra})
 
     def without_costs(self) -> StageMaps:
-        """These maps without the cost volume: what is handed on where nobody will choose among its candidates.
+        """These maps without the cost volume, for stages after which nothing uses the costs.
 
         Returns
         -------
@@ -326,19 +324,18 @@ class Choice:
     parameters : type
         Model of its parameters, a subclass of :class:`Parameters`.
     function : callable
-        The stage function ``(light_field, previous, parameters, progress) -> StageMaps``: pure, of a light field with a
-        known disparity range, and of the maps that the stage before handed on (None for the first stage). It takes
-        ``parameters`` of its model and tells ``progress`` the fraction done, 0..1. Its maps have ``disparity`` and
-        ``confidence`` of shape (H, W), float32, and more as its docstring says. It changes none of its arguments, reads
-        no ground truth and writes no file; view steps are such as :meth:`run` makes them. It raises
-        :class:`~sepi.errors.SepiError` where the range is unknown, or there are no maps to refine. Docstrings of
-        choices say what is particular to each.
+        The stage function ``(light_field, previous, parameters, progress) -> StageMaps``. It gets a light field with a
+        known disparity range, in view steps as :meth:`run` sets them, and the maps of the stage before (None for the
+        first stage). It calls ``progress`` with the fraction done, 0..1. It returns maps with ``disparity`` and
+        ``confidence`` of shape (H, W), float32, and others that its docstring lists. It changes none of its arguments,
+        reads no ground truth and writes no file. It raises :class:`~sepi.errors.SepiError` if the range is unknown, or
+        maps to refine are missing.
     own_steps : bool
-        Whether it is given the light field's own view steps, as choices that callers add are.
+        Whether the function gets the light field's own view steps, as added choices do.
 
     Examples
     --------
-    A choice of one's own for the last stage, a median filter, beside the built-in ones:
+    A new choice for the last stage, a median filter:
 
     >>> import cv2
     >>> from pydantic import Field
@@ -367,16 +364,16 @@ class Choice:
     def run(
         self, light_field: LightField, previous: StageMaps | None, parameters: Parameters, progress: Progress
     ) -> StageMaps:
-        """Run the stage function in view steps of which the farthest view is :data:`REACH` away.
+        """Maps of the stage function, run in view steps with the farthest view :data:`REACH` away.
 
-        What a threshold in pixels per view step means depends on how far the views stand apart; so the maps of a light
-        field whose positions are told in another unit are the same, but for that unit.
+        So thresholds in pixels per view step mean the same for all light fields, and the unit of positions does not
+        change the maps.
 
         Parameters
         ----------
         light_field : LightField
         previous : StageMaps or None
-            As the light field has its view steps; so are the maps that are returned.
+            In the light field's own view steps, like the returned maps.
         parameters : Parameters
         progress : callable
 
@@ -389,12 +386,12 @@ class Choice:
             return self.function(light_field, previous, parameters, progress)
         given = None if previous is None else _rescaled(previous, 1 / factor)
         found = self.function(_respaced(light_field, factor), given, parameters, progress)
-        # handed on: rounded no further
+        # unchanged maps must not be rounded again
         return previous if previous is not None and found is given else _rescaled(found, factor)
 
 
 def _respaced(light_field: LightField, factor: float) -> LightField:
-    """The same views with so many times as many view steps between them; ground truth, which no stage reads, goes."""
+    """The light field with baselines multiplied by ``factor``, without ground truth."""
     known = light_field.disparity_range
     if known is not None:
         known = replace(known, minimum=known.minimum / factor, maximum=known.maximum / factor)
@@ -403,7 +400,7 @@ def _respaced(light_field: LightField, factor: float) -> LightField:
 
 
 def _rescaled(maps: StageMaps, factor: float) -> StageMaps:
-    """Maps with so many times the disparity."""
+    """Maps with disparities multiplied by ``factor``."""
     unit, volume = np.float32(factor), maps.cost_volume
     if volume is not None:
         volume = replace(volume, disparities=volume.disparities * unit)
@@ -414,7 +411,7 @@ def _rescaled(maps: StageMaps, factor: float) -> StageMaps:
 def none(
     light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
 ) -> StageMaps:
-    """The choice of a stage that is switched off: the maps of the stage before as they are."""
+    """The maps of the stage before, unchanged: the choice of a stage that is switched off."""
     return require_previous(previous)
 
 
@@ -424,7 +421,7 @@ def require_previous(previous: StageMaps | None) -> StageMaps:
     Parameters
     ----------
     previous : StageMaps or None
-        As the stage function got them.
+        Argument of the stage function.
 
     Returns
     -------
@@ -433,7 +430,7 @@ def require_previous(previous: StageMaps | None) -> StageMaps:
     Raises
     ------
     SepiError
-        If there are none.
+        If it is None.
 
     Examples
     --------
@@ -458,22 +455,22 @@ def require_costs(previous: StageMaps | None) -> tuple[StageMaps, CostVolume]:
     Parameters
     ----------
     previous : StageMaps or None
-        As the stage function got them.
+        Argument of the stage function.
 
     Returns
     -------
     before : StageMaps
     volume : CostVolume
-        That of ``before``.
+        Cost volume of ``before``.
 
     Raises
     ------
     SepiError
-        If there is none.
+        If one of them is missing.
 
     Examples
     --------
-    A stage that takes the candidate of least cost at each pixel, and hands on no costs:
+    A stage that takes the candidate of least cost at each pixel, and returns no costs:
 
     >>> import numpy as np
     >>> from sepi.compared.cost_volumes import disparity_of, least_costs

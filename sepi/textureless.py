@@ -1,20 +1,20 @@
 """Depth of textureless regions (section IV-C, Eq. 6-7 of [1]_).
 
-``lti`` finds the superpixels that hold too little texture for a slope and gives them the depth that propagates,
-linearly, from the reliable edges of their neighbourhood:
+``lti`` finds superpixels with too little texture for a slope, and propagates depth linearly into them from the reliable
+edges around them:
 
 1. SLIC superpixels; texture points are Canny edges and pixels whose slope is distinct;
-2. local texture information, the share of texture points (Eq. 6); its threshold adapts to the scene: it lies where the
-   sorted LTI rises fastest;
+2. local texture information (LTI), the share of texture points (Eq. 6), with an adaptive threshold where the sorted LTI
+   rises fastest;
 3. a robust plane for each superpixel; those with texture are held, the others are free;
-4. the coupled energy of data and continuity (Eq. 7), with the HSV mean-shift cue for which neighbours belong together;
-5. a plane smooths the depth it fits, but overrules only depth without support: neither distinct nor in agreement with
-   its neighbourhood (noise lowers the confidence of good depth too, but does not make it disagree).
+4. the coupled energy of data and continuity (Eq. 7), with the HSV mean-shift cue for the likeness of neighbours;
+5. a plane may smooth any depth, but replaces only depth that is neither distinct nor in agreement with its
+   neighbourhood. (Noise lowers the confidence of good depth, but not its agreement.)
 
-``uniform_planes`` tells textureless regions by the noise and gives each the plane that its border supports
-(:mod:`sepi.regularization.uniform_regions`). ``none`` hands the depth on.
+``uniform_planes`` finds textureless regions by comparison with the noise, and gives each the plane of its border
+(:mod:`sepi.regularization.uniform_regions`). ``none`` returns the depth unchanged.
 
-What every choice is given, and hands on: :class:`sepi.stage.Choice`.
+:class:`sepi.stage.Choice` describes arguments and results of all choices.
 
 References
 ----------
@@ -79,13 +79,13 @@ class LtiParameters(CannyParameters):
 def lti(
     light_field: LightField, previous: StageMaps | None, parameters: LtiParameters, progress: Progress
 ) -> StageMaps:
-    """Depth propagated into superpixels of little local texture information (section IV-C, Eq. 6-7 of [1]_).
+    """Depth with planes in superpixels of little local texture information (section IV-C, Eq. 6-7 of [1]_).
 
     Returns
     -------
     StageMaps
-        Adds ``superpixels``, int32 labels; ``lti``, float32, of each pixel's superpixel, 0..1; ``textureless``, bool,
-        the pixels whose depth was replaced.
+        Adds ``superpixels``, int32 labels; ``lti``, float32, that of each pixel's superpixel, 0..1; ``textureless``,
+        bool, the pixels whose depth was replaced.
 
     References
     ----------
@@ -113,7 +113,7 @@ def lti(
     )
     progress(0.3)
     agreement = slope_agreement(before.disparity, parameters.agreement_radius, parameters.agreement_difference)
-    # where no candidate inside the range was best, neighbours agree about its end only
+    # where an end of the range was best, agreement of neighbours means nothing
     lowest, highest = light_field.require_disparity_range().candidates(2)
     rounding = 1e-6 * (highest - lowest + abs(highest) + abs(lowest))
     at_end = (before.disparity <= lowest + rounding) | (before.disparity >= highest - rounding)
@@ -122,15 +122,15 @@ def lti(
     texture = canny_edges(light_field.reference_view, parameters) | (confidence > parameters.texture_confidence)
     information = local_texture_information(segments, texture)
     free = information < lti_threshold(information, parameters.lti_floor, parameters.lti_ceiling)
-    # doubtful depth is common here, so trust rises steeply with confidence
+    # much depth is doubtful here, so the weight rises steeply with confidence
     weight = confidence**4 * agreement**2
-    # a plane continued far from its data may leave the range that was searched
+    # far from its data, a plane may leave the range
     plane = np.clip(
         propagated(light_field.reference_view, segments, free, before.disparity, weight, parameters), lowest, highest
     )
     progress(0.9)
     unsupported = local_texture_information(segments, texture | agrees) < parameters.min_support
-    # a plane may smooth any depth, but overrule only what is neither distinct nor in agreement with its neighbours
+    # a plane may smooth any depth, but replaces only depth neither distinct nor in agreement with its neighbourhood
     overruled = np.abs(plane - before.disparity) > parameters.smoothing_difference
     resists = overruled & ((confidence > parameters.keep_confidence) | agrees | ~unsupported[segments.labels])
     replaced = accepted(segments, free, resists, parameters.keep_share)
@@ -146,12 +146,12 @@ def lti(
 def uniform_planes(
     light_field: LightField, previous: StageMaps | None, parameters: UniformPlanesParameters, progress: Progress
 ) -> StageMaps:
-    """Planes in regions whose texture is no more than noise: the third stage of variant ``best``.
+    """Depth with planes in uniform regions, which have no more texture than noise; variant ``best`` uses it.
 
     Returns
     -------
     StageMaps
-        Adds ``textureless``, bool: the regions that were given a plane.
+        Adds ``textureless``, bool: pixels that got a plane.
 
     Examples
     --------
@@ -181,7 +181,7 @@ def superpixel_size(shape: tuple[int, int], parameters: LtiParameters) -> int:
 
 
 def slope_agreement(disparity: FloatMap, radius: int, difference: float) -> FloatMap:
-    """Share of a pixel's neighbours whose slope agrees with its own: noise in place of slopes does not agree.
+    """Share of a pixel's neighbours whose slope agrees with its own.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def slope_agreement(disparity: FloatMap, radius: int, difference: float) -> Floa
     radius : int
         The neighbourhood is ``2 radius + 1`` pixels wide and high.
     difference : float
-        Pixels per view step up to which two slopes agree.
+        Largest difference of agreeing slopes, pixels per view step.
 
     Returns
     -------
@@ -210,16 +210,15 @@ def slope_agreement(disparity: FloatMap, radius: int, difference: float) -> Floa
 
 
 def local_texture_information(segments: Superpixels, texture: BoolMap) -> FloatArray:
-    """Share of each superpixel's pixels that are texture points and not on its edge (Eq. 6); shape (N,), 0..1."""
+    """Share of texture points, without those on its border, in each superpixel (Eq. 6); shape (N,), 0..1."""
     return segments.means(texture & segments.interior())
 
 
 def lti_threshold(information: FloatArray, floor: float, ceiling: float) -> float:
     """Adaptive threshold: the LTI at which the first-order difference of the sorted LTI is greatest.
 
-    Between superpixels without texture and superpixels with texture there are few, so the sorted LTI rises fastest
-    there. Differences are taken over a run of superpixels (3 %), since single ones are mostly zero or one pixel's
-    worth.
+    Few superpixels lie between those with and those without texture, so the sorted LTI rises fastest there. Differences
+    are taken over 3 % of the superpixels, since single ones are mostly zero or one pixel.
 
     Parameters
     ----------
@@ -249,7 +248,7 @@ def propagated(
     weight: FloatMap,
     parameters: LtiParameters,
 ) -> FloatMap:
-    """Disparity of every pixel by the plane of its superpixel, after propagation; shape (H, W), float32."""
+    """Disparity of every pixel on its superpixel's plane, after propagation; shape (H, W), float32."""
     from sepi.regularization.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
 
     design = basis(segments)
@@ -265,7 +264,7 @@ def propagated(
 
 
 def accepted(segments: Superpixels, free: BoolMap, resists: BoolMap, keep_share: float) -> BoolMap:
-    """Pixels that take the plane's depth: none with a good depth of their own, nor where too many of those object."""
+    """Pixels that take the plane's depth: those that do not resist, in superpixels where few do; shape (H, W), bool."""
     taken = free & (segments.means(resists) < keep_share)
     return np.asarray(taken[segments.labels] & ~resists)
 

@@ -1,4 +1,4 @@
-"""How many threads this process may use: compiled loops and OpenCV keep to it."""
+"""Number of threads of compiled loops and OpenCV."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from sepi.validation import require_type
 
 
 def available_cores() -> int:
-    """Cores that this process may use: a container or a scheduler may give it fewer than the machine has."""
+    """Number of cores that this process may use, which a container or a scheduler may limit."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def threads_used() -> int:
-    """Threads of a compiled loop: as :func:`use_threads` said, else one for each core."""
+    """Number of threads of a compiled loop, as set by :func:`use_threads`; default: one for each core."""
     return kernels.thread_count()
 
 
 def use_threads(count: int) -> None:
-    """Let compiled loops and OpenCV use at most so many threads, and never more than this process has cores.
+    """Limit the threads of compiled loops and OpenCV; there are never more than cores.
 
     Parameters
     ----------
     count : int
-        Threads, at least 1.
+        Most threads, at least 1.
 
     Raises
     ------
     SepiError
-        If it is no such number.
+        If it is not such a number.
 
     Examples
     --------
-    Programs that work on many light fields in several processes give each of them one thread:
+    Programs with several processes for many light fields give each process one thread:
 
     >>> from sepi.threads import use_threads
     >>> use_threads(1)
@@ -52,5 +52,5 @@ def use_threads(count: int) -> None:
     if "cv2" in sys.modules:
         sys.modules["cv2"].setNumThreads(count)
     else:
-        # read when it is loaded
+        # OpenCV reads this when loaded
         os.environ["OPENCV_FOR_THREADS_NUM"] = str(count)

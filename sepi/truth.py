@@ -1,4 +1,4 @@
-"""Ground truth of a scene as a file of its own, so that a new one asks for scores and for no map."""
+"""Ground truth of a scene in a file of its own, so that a change of it runs no stage again."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def main(
     light_field: Path | None,
     output: Path,
 ) -> None:
-    """Write ground truth and masks of the light field at PATH; without one that is named, that there are none.
+    """Write ground truth and masks of the light field at PATH; without PATH, a file that says there are none.
 
-    Ground truth of one's own, --truth, takes the place of the light field's.
+    --truth replaces the light field's own ground truth.
     """
     truth: Truth = (None, {})
     if path is not None:

@@ -1,4 +1,4 @@
-"""Checks of what a user wrote or passed; each error is one line that names it."""
+"""Checks of values that a user wrote or passed; each error is one line that names the value."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sepi.errors import SepiError
 
 
 def value_of(text: str) -> Any:
-    """What a user wrote after ``KEY=``: as JSON reads it, or the text itself."""
+    """Value of a text after ``KEY=``: read as JSON, else the text itself."""
     try:
         return json.loads(text)
     except (ValueError, RecursionError):
@@ -27,7 +27,7 @@ def value_of(text: str) -> Any:
 
 
 def settings_of(texts: Iterable[str], example: str) -> dict[str, Any]:
-    """What a user gave by ``--set KEY=VALUE``, repeated."""
+    """Key to value, from repeated ``--set KEY=VALUE``."""
     found = {}
     for text in texts:
         match = re.fullmatch(r"(\w+)=(.*)", text)
@@ -38,7 +38,7 @@ def settings_of(texts: Iterable[str], example: str) -> dict[str, Any]:
 
 
 def require_known(where: str, names: Iterable[str], known: Iterable[str]) -> None:
-    """Raise for the first of ``names`` that is not ``known``: with the nearest and all of them."""
+    """Raise for the first of ``names`` that is not ``known``; the error suggests the nearest and lists all."""
     allowed = list(known)
     unknown = next((str(name) for name in names if name not in allowed), None)
     if unknown is None:
@@ -49,13 +49,13 @@ def require_known(where: str, names: Iterable[str], known: Iterable[str]) -> Non
 
 
 def require_type(where: str, value: object, kind: type | tuple[type, ...], expected: str) -> None:
-    """Raise unless ``value`` is of this type: what is wrong, in the words of what was ``expected``."""
+    """Raise unless ``value`` is of this type; the error says what was ``expected``."""
     if not isinstance(value, kind):
         raise SepiError(f"{where}: expected {expected}, got {described(value)}")
 
 
 def require_path(where: str, value: object) -> Path:
-    """A path, whatever held it."""
+    """The path that a string or path object holds."""
     require_type(where, value, (str, os.PathLike), "a path")
     return Path(value)  # type: ignore[arg-type]
 
@@ -75,7 +75,7 @@ def is_finite(value: object) -> bool:
 
 
 def whole_pair(where: str, value: Any, expected: str) -> tuple[int, int]:
-    """Two whole numbers, as a tuple whatever held them; an error that says what was ``expected`` otherwise."""
+    """Two whole numbers as a tuple; else an error that says what was ``expected``."""
     try:
         first, second = map(operator.index, value)
     except (TypeError, ValueError) as error:
@@ -90,7 +90,7 @@ def pair_of(text: object, signs: str = "xX×,") -> tuple[int, int] | None:
 
 
 def described(value: object) -> str:
-    """A value for a message: itself where that is short, else what it is."""
+    """A value for a message: the value itself if short, else its type."""
     if isinstance(value, Real) and not isinstance(value, bool):
         return f"{value:g}"
     short = repr(value)

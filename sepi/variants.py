@@ -1,6 +1,6 @@
-"""The stages in order, their choices, and the variants: a choice for each stage.
+"""The stages in order, their choices, and the variants, which name a choice for each stage.
 
-What the built-in ones choose: :mod:`sepi.built_in_variants`.
+:mod:`sepi.built_in_variants` lists the built-in variants.
 
 Examples
 --------
@@ -11,10 +11,10 @@ True
 {'initial': 'sepi', 'occlusion': 'half_sepi', 'textureless': 'lti', 'optimize': 'wls'}
 >>> VARIANT_ENTRIES["no_sepi"]  # as users write theirs
 {'base': 'paper', 'initial': 'structure_tensor'}
->>> list(STAGES["textureless"])  # what a variant may choose there
+>>> list(STAGES["textureless"])  # choices of that stage
 ['lti', 'uniform_planes', 'none']
 >>> STAGES["occlusion"]["half_sepi"].parameters.model_fields["side_reach"].description
-'how far away the nearer surface is looked for, pixels'
+'distance within which the nearer surface is searched, pixels'
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ STAGES: dict[str, StageChoices] = {
 """Stage to its choices, in the order in which the stages run."""
 
 HANDED_ON = "none"
-"""The choice of a stage that hands on the maps of the stage before: it is no job and has no file."""
+"""The choice of a stage that is switched off; it is no job and has no file."""
 
 # choices that callers added, as stage and name
 _ADDED: set[tuple[str, str]] = set()
@@ -54,25 +54,24 @@ _LONGEST_LABEL = 120
 
 
 def add_choice(stage: str, name: str, choice: Choice) -> None:
-    """Add a choice of your own to a stage, for this process: variants may name it from then on.
+    """Add a choice of your own to a stage, for variants in this process.
 
-    Adding it again replaces it, as in a notebook whose cell runs twice. For a method that the command line and the
-    workflow should know, too, see docs/reproduce/compared.md.
+    Adding it again replaces it, as in a notebook whose cell runs twice. See docs/reproduce/compared.md for a method
+    that the command line and the workflow should know, too.
 
     Parameters
     ----------
     stage : str
         A key of :data:`STAGES`.
     name : str
-        Letters, digits and ``_``; none of the stage's own choices.
+        Letters, digits and ``_``; not the name of a built-in choice.
     choice : Choice
         Its parameters and its function.
 
     Raises
     ------
     SepiError
-        If there is no such stage, the name is no such name, or the stage has a choice of this name that the package
-        brought.
+        If there is no such stage, the name has other characters, or a built-in choice has this name.
 
     Examples
     --------
@@ -102,7 +101,7 @@ def add_choice(stage: str, name: str, choice: Choice) -> None:
 
 @dataclass(frozen=True)
 class Variant:
-    """One choice for each stage, and what it overrides of the choices' parameters.
+    """A choice for each stage, and overridden parameters.
 
     Attributes
     ----------
@@ -114,11 +113,11 @@ class Variant:
     Raises
     ------
     SepiError
-        If one is not a choice of its stage, or a field or value is not one of the choice's.
+        If a stage has no such choice, or a choice no such field or value.
 
     Examples
     --------
-    The paper's method, but for its initial depth, and with fewer candidates:
+    The paper's method with another initial depth, and fewer candidates:
 
     >>> from sepi import estimate_depth
     >>> from sepi.variants import Variant
@@ -152,15 +151,15 @@ class Variant:
 
     @property
     def labels(self) -> dict[str, str]:
-        """Stage to what names its choice together with its overrides: ``"visibility+use_mixture=False"``."""
+        """Stage to the label of its choice and overrides: ``"visibility+use_mixture=False"``."""
         return {stage: choice_label(choice, self.overrides.get(stage, {})) for stage, choice in self.choices.items()}
 
 
 def choice_label(choice: str, overrides: Mapping[str, Any]) -> str:
-    """What names a choice and its overrides, in tables and as a folder: ``"visibility+use_mixture=False"``.
+    """Label of a choice and its overrides for tables and folders: ``"visibility+use_mixture=False"``.
 
-    Equal overrides give equal labels, in whatever order and however the numbers are written. A label that would be too
-    long for a folder, or holds anything but letters, digits and ``_ . - + =``, ends with a digest instead.
+    Equal overrides give equal labels, in any order and notation of numbers. A label that is too long for a folder, or
+    has characters other than letters, digits and ``_ . - + =``, ends with a digest instead.
     """
     parts = [choice, *(f"{name}={_written(overrides[name])}" for name in sorted(overrides))]
     label = "+".join(parts)
@@ -170,34 +169,34 @@ def choice_label(choice: str, overrides: Mapping[str, Any]) -> str:
 
 
 def _written(value: Any) -> str:
-    """A value as briefly as it can be read back; 0.0 and 0 are the same."""
+    """Shortest text of a value; 0.0 and 0 have the same."""
     if isinstance(value, float):
         return repr(value).removesuffix(".0").replace("e+", "e")
     return str(value)
 
 
 def choice_of(label: str) -> str:
-    """The choice that :func:`choice_label` names."""
+    """The choice of a label by :func:`choice_label`."""
     return label.partition("+")[0]
 
 
 def variant_from(name: str, entries: Mapping[str, Any], where: str, users: tuple[str, ...] = ()) -> Variant:
     """The variant that an entry such as ``{"base": "best", "occlusion": {"use_mixture": False}}`` describes.
 
-    For each stage an entry has a choice, ``"visibility"``, or a choice and what to override,
-    ``{"choice": "visibility", "use_mixture": False}``. With ``base`` it starts from another variant: stages that it
-    leaves out are that variant's, and overrides without a choice are made on top of that variant's.
+    For each stage, an entry has a choice, ``"visibility"``, or a choice with overrides,
+    ``{"choice": "visibility", "use_mixture": False}``. With ``base``, stages that it leaves out are those of that
+    variant, and overrides without a choice add to that variant's.
 
     Parameters
     ----------
     name : str
-        Of the variant.
+        Name of the variant.
     entries : mapping of str to mapping
-        Its entry and those that may be its base.
+        The variant's entry, and those of variants that may be its base.
     where : str
         Where the entries stand, for messages.
     users : tuple of str
-        The variants that are built on this one; callers leave it empty.
+        Variants with this one as base; callers leave it empty.
 
     Returns
     -------
@@ -206,7 +205,7 @@ def variant_from(name: str, entries: Mapping[str, Any], where: str, users: tuple
     Raises
     ------
     SepiError
-        If the entry is no such mapping, misses a stage, names what does not exist, or is built on itself.
+        If the entry is not such a mapping, lacks a stage, has an unknown name, or has itself as base.
 
     Examples
     --------
@@ -236,7 +235,7 @@ def variant_from(name: str, entries: Mapping[str, Any], where: str, users: tuple
 
 
 def _chosen(stage: str, given: Any, base: Variant | None, where: str) -> tuple[str, dict[str, Any]]:
-    """A stage's choice and what is overridden."""
+    """A stage's choice and its overrides."""
     values = {_CHOICE: given} if isinstance(given, str) else given
     if not isinstance(values, Mapping):
         raise SepiError(f"{where}.{stage}: expected a choice, or parameters of one, got {given!r}")
@@ -249,24 +248,24 @@ def _chosen(stage: str, given: Any, base: Variant | None, where: str) -> tuple[s
     else:
         raise SepiError(f"{where}: no choice for stage '{stage}' (one of {', '.join(STAGES[stage])})")
     checked = validated(STAGES[stage][choice].parameters, own, f"{where}.{stage}")
-    # as the model holds them: where a number is a float, 0 is 0.0
+    # values as the model converts them, such as 0 to 0.0
     return choice, {key: getattr(checked, key) for key in own}
 
 
 VARIANT_ENTRIES: dict[str, dict[str, Any]] = ENTRIES
-"""The built-in variants as :func:`variant_from` reads them: the paper's method, the other four columns of its table 4
-in their order, and the text's other occlusion stage; then the most accurate variant, a quick one, and the most accurate
-one with one part switched off or put back to the paper's; then the compared methods
-(:mod:`sepi.compared`)."""
+"""The built-in variants as entries for :func:`variant_from`: the paper's method, the other four columns of its table 4
+in order, the text's other occlusion stage, and the paper's method without noise correction; then the most accurate
+variant, a fast one, and the most accurate one with a part switched off or replaced by the paper's; then the compared
+methods (:mod:`sepi.compared`)."""
 
 
 def variant_named(name: str) -> Variant:
-    """A built-in variant.
+    """The built-in variant of this name.
 
     Raises
     ------
     SepiError
-        If there is none of this name.
+        If there is none.
     """
     require_known("variant", [name], VARIANTS)
     return VARIANTS[name]
@@ -275,7 +274,7 @@ def variant_named(name: str) -> Variant:
 def stage_parameters(
     variant: Variant, parameters: Mapping[str, Mapping[str, Any]] | None = None
 ) -> dict[str, Parameters]:
-    """Parameters of each stage of a variant: the defaults, but for what the variant and then the caller override.
+    """Parameters of each stage of a variant: defaults, overridden first by the variant, then by the caller.
 
     Parameters
     ----------
@@ -317,7 +316,7 @@ def stage_parameters(
 
 
 class _BuiltIn(Mapping[str, Variant]):
-    """Made when looked up: a compared method's loads its module."""
+    """Variants made when looked up, since compared methods load their modules."""
 
     def __getitem__(self, name: str) -> Variant:
         return _built_in(name)

@@ -1,7 +1,7 @@
-"""What stages make of a light field's views and use again, and how much memory they may take for it.
+"""Intermediate results of a light field's views that stages share, and the memory for them.
 
 A workspace goes with its light field from stage to stage (:attr:`sepi.lightfield.LightField.workspace`). Without one,
-or where the views are others, everything is made anew: results are the same.
+or for other views, stages compute them again, with the same results.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from sepi.lightfield import LightField
 
 USUAL_BAND_BYTES = 2**29
-"""What bands of rows (:mod:`sepi.matching.row_bands`) may take unless somebody says otherwise."""
+"""Default memory for bands of rows (:mod:`sepi.matching.row_bands`), bytes."""
 
 
 @dataclass
 class OfViews:
-    """What is kept of some views, seen from a reference view; what a kind adds is empty at first."""
+    """Kept results for some views and a reference view; fields of subclasses are empty at first."""
 
     views: npt.NDArray[np.generic]
     reference: tuple[int, int]
@@ -32,16 +32,16 @@ _Kept = TypeVar("_Kept", bound=OfViews)
 
 @dataclass
 class Workspace:
-    """What is kept for one light field.
+    """Kept results of one light field, and limits of memory.
 
     Attributes
     ----------
     band_bytes : int
-        What bands of rows take at a time, about, or as little as they can.
+        Approximate memory for a band of rows, bytes; a band takes more if it cannot take less.
     detail_bytes : int
-        What the detail of all views may take beside bands that need it again and again.
+        Memory for the detail of all views, which bands use repeatedly, bytes.
     kept : mapping of type to object
-        One of a kind: what is kept of other views goes.
+        Class to its only object; results of other views replace it.
     """
 
     band_bytes: int = USUAL_BAND_BYTES
@@ -50,10 +50,10 @@ class Workspace:
 
 
 def kept_of(light_field: LightField, kind: type[_Kept]) -> _Kept:
-    """What the light field's workspace keeps of a kind, empty at first; without one something that nobody keeps."""
+    """The object of this class in the light field's workspace, empty at first; without a workspace a new one."""
     views, reference, workspace = light_field.views, light_field.reference_position, light_field.workspace
     known: _Kept | None = None if workspace is None else workspace.kept.get(kind)
-    # stages may be given the same views as another light field
+    # the same workspace may come with other views
     if known is None or known.views is not views or known.reference != reference:
         known = kind(views, reference)
         if workspace is not None:
@@ -62,5 +62,5 @@ def kept_of(light_field: LightField, kind: type[_Kept]) -> _Kept:
 
 
 def band_bytes_of(light_field: LightField) -> int:
-    """What bands of the light field's rows may take at a time."""
+    """Memory for a band of the light field's rows, bytes."""
     return USUAL_BAND_BYTES if light_field.workspace is None else light_field.workspace.band_bytes
