@@ -1,1 +1,1 @@
-"""Makes the report from scores, timings and stage files: tables beside the published figures, and pictures."""
+"""The report: tables beside the published figures, charts, pictures and the page."""

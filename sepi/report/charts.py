@@ -21,7 +21,7 @@ _STAGES = ("#3b5b92", "#2a8c8c", "#7ab648", "#d9b430", "#b25d2c", "#7d4f9e")
 
 
 def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
-    """A panel of bars for each group of :func:`sepi.report.web.page_data.ablation_bars`; a sentence without any."""
+    """Write bars for each group of :func:`sepi.report.web.page_data.ablation_bars`; without groups, a sentence."""
     if not groups:
         figure = new_figure(4.2, 1)
         figure.text(0.5, 0.5, "no scene with ground truth", ha="center", va="center", fontsize=8)
@@ -56,7 +56,7 @@ def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
 
 
 def write_times(folder: Path, name: str, rows: Sequence[StageTimes]) -> None:
-    """Seconds of the stages, stacked, beside the peak memory of each; a bar per scene and variant."""
+    """Write stacked seconds of the stages beside their peak memory, a bar per scene and variant."""
     figure = new_figure(9, 1.2 + 0.3 * len(rows))
     time, memory = figure.subplots(1, 2, sharey=True)
     positions = np.arange(len(rows))
@@ -79,7 +79,7 @@ def write_times(folder: Path, name: str, rows: Sequence[StageTimes]) -> None:
 
 
 def error_bars(folder: Path, name: str, runs: Runs) -> None:
-    """What the table of this name says of all scenes and of each, as a chart."""
+    """Write the chart of the error bars, of all scenes together and of each."""
     pairs = runs.scored_pairs()
     found = [
         VariantBars(

@@ -1,6 +1,6 @@
-"""Pictures of a scene, and what the page needs of it.
+"""Pictures of a scene, and its data for the page.
 
-Every panel as PNG; a sheet of them, the confidence's curves and single pixels as figures (PNG and PDF).
+Every panel becomes a PNG. A sheet of panels, curves of the confidence and single pixels become figures (PNG and PDF).
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from sepi.report.web.viewer import viewer_json
 
 
 def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
-    """Everything that is shown of a scene, from its files."""
-    # variants that begin alike share files
+    """All results of a scene that the report shows, from its files."""
+    # variants with the same first stages share files
     read = cache(read_stage)
     maps = {
         variant: {stage: read(plan.stage_file(dataset, scene, variant, stage)) for stage in plan.stages}
@@ -64,7 +64,7 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
 
 
 def write_scene(results: SceneResults, panels: Sequence[Panel], title: str, folder: Path) -> None:
-    """Write every panel of a scene below ``folder``, and the sheet ``overview``, a row for each group."""
+    """Write every panel of a scene below ``folder``, and the sheet ``overview`` with a row for each group."""
     for variant in results.detailed:
         error = results.evaluations[variant].error
         if error is not None and np.isfinite(error).any():
@@ -84,7 +84,7 @@ def write_scene(results: SceneResults, panels: Sequence[Panel], title: str, fold
 def page_json(
     results: SceneResults, panels: Sequence[Panel], dataset: str, scene: str, probes: Sequence[Probe]
 ) -> dict[str, Any]:
-    """What the page needs of a scene."""
+    """Data of a scene for the page."""
     shown = [panel for panel in panels if panel.in_page]
     return {
         "dataset": dataset,
@@ -114,7 +114,7 @@ def command(
     panels = panels_of(found)
     asked = [InterestingPixel(int(y), int(x), "asked for") for y, x in json.loads(pixels)]
     probes = scene_probes(found, plan.stage_file(dataset, scene, MAIN_VARIANT, plan.stages[-1]), asked)
-    # some pictures without the others would count as made
+    # an incomplete set of pictures would count as made
     with atomic_folder(output, replace=True) as folder:
         write_scene(found, panels, f"{dataset}/{scene}", folder)
         if probes:

@@ -1,6 +1,6 @@
-"""The workflow's own rule graph, as Snakemake tells it, drawn as SVG for the page.
+"""The workflow's rule graph from Snakemake, drawn as SVG for the page.
 
-The graph is that of one built-in scene: rules, not jobs, are drawn, and every scene takes the same ones.
+One built-in scene is enough: the graph shows rules, not jobs, and all scenes have the same rules.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import atomic_path
 
 Edges = Iterable[tuple[str, str]]
-"""Pairs of rules: the one that makes something, and the one that needs it."""
+"""Pairs of rules: the one that makes a file, and the one that needs it."""
 
-# of a rule's box, between boxes, and of the gap through which an edge passes a row
+# sizes of a rule's box, between boxes, and of the gap through which an edge passes a row
 _WIDTH, _HEIGHT, _ACROSS, _DOWN, _PASSING = 118, 32, 22, 30, 30
 
 
@@ -36,25 +36,24 @@ def rule_edges(snakefile: Path, external: bool = False, rules: Iterable[Path] = 
     Parameters
     ----------
     snakefile : Path
-        It includes files of a folder ``rules``.
+        The Snakefile, which includes files of a folder ``rules``.
     external : bool
         Whether maps of external methods are configured, which adds a rule.
     rules : iterable of Path
-        These files, wherever they are; without them, those in the folder beside the Snakefile.
+        Paths of these files; default: those in the folder beside the Snakefile.
 
     Raises
     ------
     SepiError
-        If Snakemake does not say.
+        If Snakemake fails.
     """
-    # a copy, which is not locked by the run that asks, with a configuration of its own: the scenes and relative paths
-    # of the user's mean nothing here
+    # a copy is not locked by the running workflow, and its own configuration has no scenes or paths of the user
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder)
         shutil.copy(snakefile, copy / "Snakefile")
         (copy / "rules").mkdir()
         for path in rules or (snakefile.parent / "rules").glob("*.*"):
-            # Snakemake's copies of what lies elsewhere may be called NAME@REVISION
+            # Snakemake may name its copies of remote files NAME@REVISION
             shutil.copy(path, copy / "rules" / path.name.partition("@")[0])
         config = {"builtin": {"scenes": ["dots"]}, "external": {"other": "maps"} if external else {}}
         (copy / "config.yaml").write_text(json.dumps(config))
@@ -79,9 +78,9 @@ def parsed(text: str) -> list[tuple[str, str]]:
 
 
 def drawn(edges: Edges) -> str:
-    """SVG of a rule graph, in the colours of the page: each rule below all that it needs.
+    """SVG of a rule graph, in the colours of the page, with each rule below the rules that it needs.
 
-    Edges that a longer way implies are left out.
+    Edges that follow from others are left out.
     """
     graph = nx.transitive_reduction(nx.DiGraph(edges))
     words = "; ".join(f"{user} needs {maker}" for maker, user in sorted(graph.edges))
@@ -108,7 +107,7 @@ _Place = str | tuple[str, str, int]
 
 
 def _rows(graph: nx.DiGraph) -> list[list[_Place]]:
-    """Rules by the longest way that leads to them; edges of the graph that pass rows then go through places in them."""
+    """Rows of rules by their longest path from the start; an edge that passes a row has a place in it."""
     rows: list[list[_Place]] = [sorted(names) for names in nx.topological_generations(graph)]
     row_of = {name: number for number, row in enumerate(rows) for name in row}
     for maker, user in list(graph.edges):
@@ -122,7 +121,7 @@ def _rows(graph: nx.DiGraph) -> list[list[_Place]]:
 
 
 def _middles(graph: nx.DiGraph, rows: list[list[_Place]]) -> dict[_Place, tuple[float, float]]:
-    """Middle of every place: near what it needs, all rows centred at 0."""
+    """Middle of every place, near the places that it needs, with all rows centred at 0."""
     middle: dict[_Place, tuple[float, float]] = {}
 
     def pull(place: _Place) -> tuple[float, str]:
@@ -142,7 +141,7 @@ def _room(place: _Place) -> int:
 
 
 def _line(upper: tuple[float, float], lower: tuple[float, float], passes: bool) -> str:
-    """An edge from below one place to above another, or, where it passes that row, straight on to below it."""
+    """An edge from below one place to above another, or if it passes that row, to below that place."""
     (x, y), (to_x, to_y) = upper, lower
     begin, half, end = y + _HEIGHT / 2, (y + to_y) / 2, to_y - _HEIGHT / 2
     on = f" v{_HEIGHT:.1f}" if passes else ""
@@ -155,11 +154,11 @@ def _line(upper: tuple[float, float], lower: tuple[float, float], passes: bool) 
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="SVG file to write.")
 @click.argument("rules", nargs=-1, type=click.Path(path_type=Path))
 def command(snakefile: Path, external: bool, output: Path, rules: tuple[Path, ...]) -> None:
-    """Draw the rules that 'snakemake all' runs; RULES are the files that the Snakefile includes."""
+    """Draw the rules that 'snakemake all' runs. RULES are the files that the Snakefile includes."""
     try:
         picture = drawn(rule_edges(snakefile, external, rules))
     except SepiError as error:
-        # the page is worth more than its graph
+        # the page is useful without its graph
         warnings.warn(str(error), SepiWarning, stacklevel=1)
         picture = '<p class="soft">Snakemake gave no rule graph; logs/graph.log says why.</p>\n'
     with atomic_path(output) as temporary:

@@ -1,6 +1,6 @@
-"""All numbers of the report in one JSON file: the command that collects them, and what they are made of.
+"""All numbers of the report in one JSON file, and the command that collects them.
 
-The tables, and the page that shows them, are made from this file and from nothing else.
+Tables and page are made from this file alone.
 """
 
 from __future__ import annotations
@@ -42,24 +42,24 @@ def collect(plan: Plan, parts: bool = False) -> dict[str, Any]:
     plan : Plan
         Scenes, variants and external methods.
     parts : bool
-        Collect what the ablation of the best variant needs, instead of what all other tables need.
+        Collect the numbers for the ablation of the best variant, instead of those for all other tables.
 
     Returns
     -------
     dict
-        As JSON has it: text, numbers, None (also for NaN), lists and dictionaries. ``made``: date of the newest
-        result, and the machines that the stages ran on, with their versions; ``protocols``: name to border; ``plan``;
-        ``parameters``: stage to choice to what it ran with, a list, as scenes may differ; ``scenes``: a list, each
+        Values of JSON: text, numbers, None (also for NaN), lists and dictionaries. ``made``: date of the newest
+        result, and machines of the stages with versions; ``protocols``: name to border; ``plan``; ``parameters``:
+        stage to choice to a list of the parameters used, since scenes may differ; ``scenes``: a list, each
         with ``dataset``, ``scene``, ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``,
         ``seconds``, ``peak_memory_mb``, ``reliability``, None without error bars) and ``external`` (method to
-        ``problem``, ``source``, ``sha256``, ``scores``); of the rendered scenes ``pooled_q25``
+        ``problem``, ``source``, ``sha256``, ``scores``); for rendered scenes ``pooled_q25``
         (:data:`sepi.report.pooled.Pooled`); ``tables``: name to :func:`sepi.report.tabular.layout.as_json`. With
-        ``parts``, scenes have ``stages`` only, and ``scores`` is None but after the last stage.
+        ``parts``, scenes have ``stages`` only, and ``scores`` is None except after the last stage.
 
     Raises
     ------
     SepiError
-        If a file is missing or not what it should be.
+        If a file is missing or has other contents.
     """
     machines, parameters = _made_by(plan, parts)
     numbers: dict[str, Any] = {
@@ -78,13 +78,13 @@ def collect(plan: Plan, parts: bool = False) -> dict[str, Any]:
 
 
 def _newest(files: Sequence[Path]) -> str:
-    """When the newest of the files was made; not the time of day: equal results give equal numbers."""
+    """Date of the newest file, without the time of day."""
     newest = max((file.stat().st_mtime for file in files if file.is_file()), default=0.0)
     return datetime.fromtimestamp(newest).astimezone().isoformat(timespec="seconds")
 
 
 def _made_by(plan: Plan, parts: bool) -> tuple[list[Any], dict[str, dict[str, list[Any]]]]:
-    """Provenance from the stage files: machines that the stages ran on, and parameters by stage and choice."""
+    """Machines of the stages, and parameters by stage and choice, from the stage files."""
     machines: list[Any] = []
     parameters: dict[str, dict[str, list[Any]]] = {stage: {} for stage in plan.stages}
     for (dataset, scene), variant, stage in itertools.product(plan.pairs, plan.collected(parts), plan.stages):
@@ -98,13 +98,13 @@ def _made_by(plan: Plan, parts: bool) -> tuple[list[Any], dict[str, dict[str, li
 
 
 def _timing(path: Path, stage: str) -> dict[str, Any]:
-    """What a stage took, where, and with which parameters."""
+    """Time and memory of a stage, its machine and its parameters."""
     keys = {"seconds", "peak_memory_mb", "machine", "parameters"}
     return read_json(path, keys, "the time of a stage", f"sepi.{stage}")
 
 
 def as_text(value: Any) -> str:
-    """JSON with a number per line, so that a difference is easy to read."""
+    """JSON with one number per line, for readable differences."""
     return json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
@@ -127,7 +127,7 @@ def _light_field(path: Path, truth: Path) -> dict[str, Any]:
         "grid": list(found.grid),
         "row_spacing": found.row_spacing,
         "positions": "grid" if found.positions is None else "given",
-        # from the reference view, where the grid does not say it
+        # from the reference view, if positions are known
         "baselines": None if found.positions is None else found.baselines[found.present].tolist(),
         "shape": list(found.shape),
         "channels": found.views.shape[4],
@@ -145,13 +145,13 @@ def _light_field(path: Path, truth: Path) -> dict[str, Any]:
 
 
 def _stages(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
-    """Scores and times by the path of a stage's choices; a stage that variants share is there once."""
+    """Scores and times by the path of a stage's choices; a stage that variants share occurs once."""
     files = {
         plan.stage_key(variant, stage): plan.stage_file(dataset, scene, variant, stage, "time.json")
         for variant in plan.collected(parts)
         for stage in plan.stages
     }
-    # of the parts, only the last stage is scored
+    # in the ablation of parts, only the last stage is scored
     last = [plan.stage_key(variant, plan.stages[-1]) for variant in plan.collected(parts)]
     scored, wanted = plan.scores_file(dataset, scene, parts), last if parts else files.keys()
     scores, reliability = read_scores(scored, wanted), read_reliability(scored, wanted)
@@ -169,7 +169,7 @@ def _stages(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]
 
 
 def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
-    """Scores of the external methods, or what is wrong with their maps."""
+    """Scores of the external methods, or the problems of their maps."""
     if not plan.external:
         return {}
     path = plan.external_file(dataset, scene)

@@ -1,4 +1,4 @@
-"""The page ``reports/index.html``: everything in one file, which opens from disk and asks for nothing else."""
+"""The page ``reports/index.html``, one file that opens from disk and loads nothing else."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from sepi.report.web import page_data
 from sepi.workflow.rendered_scenes import DATASET
 
 SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "tables.js", "page.js")
-"""Scripts of a page, in the order in which they are run."""
+"""Scripts of a page, in the order in which they run."""
 
 
 def environment() -> Environment:
-    """Jinja2's environment for the templates beside this module; a name that is not given is an error."""
+    """Jinja2's environment for the page's templates; an undefined name is an error."""
     made = Environment(
         loader=PackageLoader("sepi.report.web"),
         autoescape=True,
@@ -48,12 +48,12 @@ def embedded(value: Any) -> Markup:
 
 
 def prose(text: str) -> Markup:
-    """Text whose words in backticks are names in code."""
+    """HTML of a text; words in backticks become code."""
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def breakable(name: str) -> Markup:
-    """A name that may go on in the next line after ``_`` and ``/``."""
+    """HTML of a name that may break after ``_`` and ``/``."""
     return Markup(re.sub("([_/])", r"\1<wbr>", str(escape(name))))
 
 
@@ -74,13 +74,13 @@ def page_of(
     Parameters
     ----------
     numbers : mapping
-        As ``sepi.report.numbers`` collects them.
+        From ``sepi.report.numbers``.
     scenes : sequence of mapping
-        As ``sepi.report.figures`` writes them.
+        From ``sepi.report.figures``.
     graph : str
         SVG of the rule graph.
     parts : mapping, optional
-        The numbers of the best variant's parts.
+        Numbers of the ablation of the best variant.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def page_of(
         HTML.
     """
     runs = Runs(numbers)
-    # averages over all of the rendered scenes and levels of noise would say nothing, and nothing is published of them
+    # averages over rendered scenes and levels of noise mean nothing, and no published figures exist
     averaged = runs.plan.report != DATASET
     first_title = page_data.first_scene(runs)
     shown = [scene for scene in scenes if f"{scene['dataset']}/{scene['scene']}" == first_title] or scenes
@@ -123,7 +123,7 @@ def page_of(
 
 
 def embedded_scenes(scenes: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Scenes as the template takes them: an identifier, a title, and the JSON."""
+    """Scenes for the template: identifier, title, and JSON."""
     return [
         {"id": f"scene-{number}", "title": f"{scene['dataset']}/{scene['scene']}", "text": embedded(scene)}
         for number, scene in enumerate(scenes)
@@ -131,12 +131,12 @@ def embedded_scenes(scenes: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
 
 
 def read_scene(path: Path) -> dict[str, Any]:
-    """Read what ``sepi.report.figures`` wrote of a scene for the page.
+    """Data of a scene for the page, from the file that ``sepi.report.figures`` wrote.
 
     Raises
     ------
     SepiError
-        If the file is missing or not such a file.
+        If the file is missing or has other contents.
     """
     return read_json(path, {"dataset", "scene", "panels", "arrays"}, "a scene of a report", "sepi.report.figures")
 

@@ -1,4 +1,4 @@
-"""The panels of a scene: what there is to look at, for the pictures, the sheet of them all, and the page."""
+"""The panels of a scene: views of its maps for the pictures, their sheet, and the page."""
 
 from __future__ import annotations
 
@@ -17,42 +17,42 @@ from sepi.scoring.scores import OWN_BAD_PIXEL, WHOLE_MAP
 from sepi.stage import StageMaps
 
 Kind = Literal["picture", "disparity", "error", "change", "confidence", "sigma", "grey", "mask", "outline"]
-"""How a panel is drawn: the reference view; a map on the scale of disparity; a map minus another; how much larger the
-error of a map is than that of another; a map from 0 to 1; a standard deviation, by its logarithm; a mask, or the
-borders between labels, over the view."""
+"""How a panel is drawn: the reference view; a map on the scale of disparity; an error (a map minus another); a change
+(how much larger the error of a map is than that of another); a map from 0 to 1; the logarithm of a standard deviation;
+a map in grey; a mask, or borders between labels, over the view."""
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A way to look at one map or two.
+    """A picture of one or two maps.
 
     Attributes
     ----------
     key : str
-        Its name, which no other panel of the scene has, and the path of its picture below the scene's folder.
+        Unique name in the scene, and the path of its picture below the scene's folder.
     title, group : str
-        The group is the heading that it stands under.
+        The group is the heading above the panel.
     kind : Kind
     values : ndarray, shape (H, W), or None
         Map, mask or labels; None for the reference view.
     minus : ndarray, shape (H, W), or None
         The map that an error or a change subtracts.
     ground_truth : ndarray, shape (H, W), or None
-        What both maps of a change are compared with.
+        The truth for both maps of a change.
     confidence : ndarray, shape (H, W), or None
-        Read out beside the map.
+        Shown beside the value of a pixel.
     bars : StageMaps or None
-        Maps with error bars, which are read out beside the map, too.
+        Maps with error bars, which are shown there, too.
     no_interval : str
-        What is read out where the page holds none, unless that there is none.
+        Text in place of an interval that the page does not hold; empty: there is none.
     note : str
-        What is to be said of it.
+        Text below the panel.
     ends : (str, str) or None
-        Words for the low and the high end of its scale, where they are not those of its kind.
+        Words for the low and the high end of the scale; None: those of the kind.
     precise : bool
-        Whether the page holds the map as finely as it can.
+        Whether the page holds the map in fine steps.
     in_page : bool
-        Whether it is on the page and on the sheet.
+        Whether the panel is on the page and on the sheet.
     """
 
     key: str
@@ -73,7 +73,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class SceneResults:
-    """Everything that is shown of a scene.
+    """Results of a scene that the report shows.
 
     Attributes
     ----------
@@ -81,13 +81,13 @@ class SceneResults:
     maps : mapping of str to mapping of str to StageMaps
         Variant to stage to maps, in order.
     evaluations : mapping of str to Evaluation
-        Of each variant's final map.
+        Evaluation of each variant's final map.
     detailed : list of str
-        Variants of which every stage is on the page.
+        Variants whose stages are all on the page.
     external : mapping of str to (ndarray (H, W), Evaluation)
-        Other methods' maps.
+        External methods' maps.
     problems : mapping of str to str
-        Other methods without a map, and why.
+        External methods without a map, and the reason.
     """
 
     light_field: LightField
@@ -103,12 +103,12 @@ class SceneResults:
 
     @property
     def variants(self) -> list[str]:
-        """All variants, those that are shown in detail first."""
+        """All variants, detailed ones first."""
         return [*self.detailed, *(name for name in self.maps if name not in self.detailed)]
 
 
 def panels_of(results: SceneResults) -> list[Panel]:
-    """All panels of a scene, in the order of the page; without ground truth there are neither errors nor changes."""
+    """All panels of a scene, in the order of the page; errors and changes need ground truth."""
     return [
         *_scene_panels(results),
         *(panel for variant in results.variants for panel in _stage_panels(results, variant)),
@@ -125,7 +125,7 @@ def first_final(panels: list[Panel]) -> str:
 
 
 def note_of(evaluation: Evaluation) -> str:
-    """The scores of a final map in one line, and a second for thresholds of the user's; empty without ground truth."""
+    """Scores of a final map in one line, and a second for the user's thresholds; empty without ground truth."""
     if not evaluation.scores:
         return ""
     scores = evaluation.scores["paper"][WHOLE_MAP]
@@ -144,7 +144,7 @@ def _scene_panels(results: SceneResults) -> Iterator[Panel]:
 
 
 def _stage_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
-    """Disparity after every stage; of most variants the page has the final map alone."""
+    """Disparity after every stage for detailed variants; the final map for others."""
     detailed, stages = variant in results.detailed, results.maps[variant]
     for number, (stage, found) in enumerate(stages.items(), start=1):
         final = number == len(stages)
@@ -190,9 +190,9 @@ def _external_panels(results: SceneResults) -> Iterator[Panel]:
 
 
 def _change_panels(results: SceneResults) -> Iterator[Panel]:
-    """Panels that show where a variant is less or more accurate than the one it is compared with.
+    """Panels of where one variant is less or more accurate than another.
 
-    The paper's method is compared with its reductions, the best one with the paper's.
+    They compare the paper's method with its reductions, and the best variant with the paper's method.
     """
     ground_truth = results.light_field.ground_truth
     for variant in results.variants if ground_truth is not None else ():
@@ -211,10 +211,10 @@ def _change_panels(results: SceneResults) -> Iterator[Panel]:
 
 
 def _detail_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
-    """Confidence, error bars, and what was taken for occluded and textureless, with the superpixels that were used."""
+    """Confidence, error bars, superpixels, and the pixels detected as occluded and textureless."""
     final, shown = results.final(variant), variant in results.detailed
     kinds: dict[str, tuple[str, Kind]] = {
-        # what was detected need not be the region that is scored
+        # the detected pixels differ from the region that is scored
         "occluded": ("occluded, detected", "mask"),
         "textureless": ("textureless, detected", "mask"),
         UNKNOWN: ("unknown to all views", "mask"),

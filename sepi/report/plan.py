@@ -1,6 +1,6 @@
 """Plan of a report: its scenes, variants and external methods, and the paths of their files.
 
-The workflow declares the inputs of the report's numbers from here, and they are collected from nothing else.
+The workflow's rule and the report's numbers take their inputs from here.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 from sepi.workflow.result_paths import PARTS_ENDING, SceneFiles, key_of, scene_files
 
 MAIN_VARIANT = "paper"
-"""The variant that does what the paper describes; its figures stand beside the published ones."""
+"""The method as published; tables compare its figures with the published ones."""
 
 BEST_VARIANT = "best"
-"""The most accurate variant, whose figures stand there too."""
+"""The most accurate variant, which tables compare, too."""
 
 FAST_VARIANT = "fast"
-"""The quick variant, which stands beside them in the comparison."""
+"""The fast variant, which the comparison shows, too."""
 
 COMPARISON = "comparison"
-"""The report of the compared methods; that of the rendered scenes is called as they are, the main one nothing."""
+"""Name of the report of the compared methods; that of rendered scenes is ``rendered``, the main one's is empty."""
 
 TABLES = (
     "table1_mse",
@@ -48,7 +48,7 @@ TABLES = (
 """Names of the tables, in the order of the page."""
 
 COMPARISON_TABLES = ("methods", "table1_mse", "table2_q25", "table3_regions", "edges", "runtime")
-"""Tables of the comparison with the methods that are computed here, in the order of its page."""
+"""Tables of the comparison with the compared methods, in the order of its page."""
 
 RENDERED_TABLES = ("properties_mse", "properties_q25", "properties_badpix", "scenes_mse", "scenes_badpix", "error_bars")
 """Tables of the rendered scenes, in the order of their page."""
@@ -56,14 +56,14 @@ RENDERED_TABLES = ("properties_mse", "properties_q25", "properties_badpix", "sce
 TEMPLATES = sorted(
     path for path in (Path(__file__).parent / "web" / "templates").iterdir() if path.suffix in (".j2", ".js", ".css")
 )
-"""Files that the page is put together from."""
+"""Files that make up the page."""
 
 PARTS_TABLES = ("ablation_best",)
-"""Tables of the best variant's parts; they are made from numbers of their own."""
+"""Tables of the ablation of the best variant, made from a file of numbers of their own."""
 
 
 Names = Annotated[Sequence[str], AfterValidator(tuple)]
-"""A list of names; a single text is none."""
+"""A list of names; a single text is refused."""
 
 
 @dataclass(frozen=True)
@@ -83,11 +83,11 @@ class Plan:
     report : str
         :data:`COMPARISON`, ``rendered``, or empty for the main one.
     choosing : sequence of str
-        Rendered scenes, without their noise, that parameters may be chosen on.
+        Rendered scenes, without their noise, on which parameters may be chosen.
     missing : sequence of str
-        ``DATASET/SCENE`` of those that are left out, since a job of theirs failed.
+        ``DATASET/SCENE`` of scenes that are left out because a job failed.
     bad_thresholds : sequence of float
-        Those that the user chose to score (:func:`sepi.scoring.scores.score`).
+        The user's thresholds (:func:`sepi.scoring.scores.score`).
     """
 
     results: Path
@@ -134,7 +134,7 @@ class Plan:
         return replace(self, variants={name: self.variants[name] for name in names}, report=COMPARISON)
 
     def rendered(self, scenes: Sequence[str], choosing: Sequence[str], variants: Sequence[str] | None = None) -> Plan:
-        """The plan of the rendered scenes: of these variants and the paper's, those of the comparison unless given."""
+        """The plan of the rendered scenes, with these variants and the paper's; default: those of the comparison."""
         names = self.comparison().variants if variants is None else dict.fromkeys([*variants, MAIN_VARIANT])
         return replace(
             self,
@@ -145,13 +145,13 @@ class Plan:
         )
 
     def without(self, scenes: Collection[tuple[str, str]]) -> Plan:
-        """The plan of the other scenes, which says that these are missing."""
+        """The plan without these scenes, with their names in ``missing``."""
         left = [pair for pair in self.pairs if pair not in scenes]
         there = {dataset: [name for other, name in left if other == dataset] for dataset, _ in left}
         return replace(self, scenes=there, missing=tuple("/".join(pair) for pair in self.pairs if pair in scenes))
 
     def tables(self, parts: bool = False) -> tuple[str, ...]:
-        """Names of the tables that are made of one of the files of numbers, in the order of the page."""
+        """Names of the tables from one of the two files of numbers, in the order of the page."""
         if self.report:
             return COMPARISON_TABLES if self.report == COMPARISON else RENDERED_TABLES
         return tuple(name for name in TABLES if (name in PARTS_TABLES) == parts)
@@ -168,52 +168,52 @@ class Plan:
 
     @property
     def pictured(self) -> list[tuple[str, str]]:
-        """Every ``(dataset, scene)`` but those whose noise alone is another."""
+        """Every ``(dataset, scene)``, with one level of noise per rendered scene."""
         return [pair for pair in self.pairs if pair[0] != DATASET or rendered_scene(pair[1]).seed == 1]
 
     def files(self, dataset: str, scene: str) -> SceneFiles:
-        """Where the files of a scene lie."""
+        """Paths of a scene's files."""
         return scene_files(dataset, scene, self.results)
 
     def light_field_file(self, dataset: str, scene: str) -> Path:
-        """The light field of a scene."""
+        """Path of a scene's light field."""
         return self.files(dataset, scene).light_field
 
     def truth_file(self, dataset: str, scene: str) -> Path:
-        """The ground truth of a scene."""
+        """Path of a scene's ground truth."""
         return self.files(dataset, scene).truth
 
     def stage_file(self, dataset: str, scene: str, variant: str, stage: str, ending: str = "h5") -> Path:
-        """The file with a variant's maps after a stage, or one beside it: ``ending`` is ``"time.json"``."""
+        """Path of a variant's maps after a stage; with the ending ``"time.json"``, of the stage's time."""
         return self.files(dataset, scene).stage(self.variants[variant], stage, ending)
 
     def scores_file(self, dataset: str, scene: str, parts: bool = False) -> Path:
-        """The scores of a scene's maps; with ``parts``, of those that the ablation of the best variant needs."""
+        """Path of the scores of a scene's maps; with ``parts``, for the ablation of the best variant."""
         return self.files(dataset, scene).scores(self.ending(parts))
 
     def ending(self, parts: bool = False) -> str:
-        """What ends the names of the files of scores and numbers."""
+        """Ending of the names of files of scores and numbers."""
         return PARTS_ENDING if parts else f"_{self.report}" if self.report else ""
 
     def external_file(self, dataset: str, scene: str) -> Path:
-        """The maps and scores of all external methods for a scene."""
+        """Path of the external methods' maps and scores for a scene."""
         return self.files(dataset, scene).external
 
     def stage_key(self, variant: str, stage: str) -> str:
-        """What names a variant's maps after a stage, in numbers and scores."""
+        """Key of a variant's maps after a stage, in numbers and scores."""
         return key_of(self.variants[variant], stage)
 
     def runs_stage(self, variant: str, stage: str) -> bool:
-        """Whether a stage of a variant does anything; else it hands on what it is given."""
+        """Whether a stage of a variant is switched on."""
         return self.variants[variant][stage] != HANDED_ON
 
     def number_inputs(self, parts: bool = False) -> list[Path]:
-        """The files that the numbers are collected from, each once.
+        """Input files of the numbers, each once.
 
         Parameters
         ----------
         parts : bool
-            The numbers of :data:`PARTS_TABLES`, instead of those of all other tables.
+            For :data:`PARTS_TABLES`, instead of all other tables.
         """
         files: list[Path] = []
         for dataset, scene in self.pairs:
@@ -226,40 +226,38 @@ class Plan:
         return list(dict.fromkeys(files))
 
     def scored_files(self, dataset: str, scene: str, parts: bool = False) -> list[Path]:
-        """The stage files whose maps are scored, each once: after every stage, with ``parts`` after the last one."""
+        """Stage files whose maps are scored, each once: of every stage, with ``parts`` of the last one."""
         stages = self.stages[-1:] if parts else self.stages
         every = itertools.product(self.collected(parts), stages)
         return list(dict.fromkeys(self.stage_file(dataset, scene, *variant_stage) for variant_stage in every))
 
     @property
     def compared(self) -> list[str]:
-        """Variants that stand beside the published figures, where the plan has them."""
+        """Variants of the plan that tables compare with the published figures."""
         return list(self.variants) if self.report else self.detailed
 
     @property
     def detailed(self) -> list[str]:
-        """Variants of which every stage is on the page, where the plan has them."""
+        """Variants of the plan whose stages are all on the page."""
         return [variant for variant in (BEST_VARIANT, MAIN_VARIANT) if variant in self.variants]
 
     @property
     def parts(self) -> list[str]:
-        """The best variant and those with one part of it switched off, where the plan has them."""
+        """Variants of the plan in the ablation of the best variant."""
         return [v for v in PARTS_OF_BEST if v in self.variants] if BEST_VARIANT in self.variants else []
 
     @property
     def listed(self) -> list[str]:
-        """All variants but those with one part of the best one switched off, which have a table of their own, the
-        compared methods, which have a report of their own, and what is for noisy light fields alone.
-        """
+        """Variants of the main tables: all but the ablation of ``best``, the compared methods, and one for noise."""
         elsewhere = {*PARTS_OF_BEST, *METHODS, *LEARNED, UNCORRECTED} - {BEST_VARIANT, *self.compared}
         return [variant for variant in self.variants if variant not in elsewhere]
 
     def collected(self, parts: bool) -> list[str]:
-        """The variants of one of the two files of numbers."""
+        """Variants of one of the two files of numbers."""
         return self.parts if parts else self.listed
 
     def map_inputs(self, dataset: str, scene: str) -> list[Path]:
-        """The files that the pictures of a scene are made from, each once."""
+        """Input files of the pictures of a scene, each once."""
         known = self.files(dataset, scene)
         files = [known.light_field, known.truth, known.scores(self.ending())]
         files += self.scored_files(dataset, scene)

@@ -1,4 +1,4 @@
-"""Q25 pooled over several scenes: the error that a quarter of all their pixels stay below."""
+"""Q25 pooled over scenes: the error that a quarter of all their pixels stay below."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sepi.scoring.scores import WHOLE_MAP
 from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 
 Pooled = dict[str, dict[str, dict[str, float]]]
-"""Method to level of noise with seed, such as ``low 1``, to region to Q25 x100."""
+"""Method to level of noise and seed, such as ``low 1``, to region to Q25 x100."""
 
 
 def pooled_q25(plan: Plan) -> Pooled:
@@ -36,7 +36,7 @@ def pooled_q25(plan: Plan) -> Pooled:
 
 
 def level_of(noise: str, seed: int) -> str:
-    """What names the scenes of a level of noise and a seed."""
+    """Name of a level of noise and a seed."""
     return f"{noise} {seed}"
 
 
@@ -54,7 +54,7 @@ def _quarters(evaluations: Iterable[Evaluation]) -> dict[str, float]:
 
 
 def _quarter(errors: Sequence[np.ndarray], pixels: int) -> float:
-    """What a quarter of the pixels stay below, as in :func:`sepi.scoring.scores.score`; the unknown are the worst."""
+    """Q25 as in :func:`sepi.scoring.scores.score`; errors that are not finite are the largest."""
     known = np.concatenate(errors)
     place = pixels // 4
     return 100 * float(np.partition(known, place)[place]) if place < known.size else float("nan")

@@ -1,4 +1,4 @@
-"""The figures that the paper [1]_ prints, typed in once as CSV files in the folder ``published`` beside this module.
+"""The figures that the paper [1]_ prints, from CSV files in the folder ``published`` beside this module.
 
 References
 ----------
@@ -17,7 +17,7 @@ from pathlib import Path
 from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 FOLDER = Path(__file__).parent / "published"
-"""Where the data files are."""
+"""Folder of the data files."""
 
 AVERAGE = "Average"
 """Name of the average rows in the paper's tables 1 and 2."""
@@ -26,16 +26,16 @@ PAPERS_METHOD = "zhou"
 """Key of the paper's own method."""
 
 DATASETS: dict[str, str] = {"hci": "HCI 4D light field benchmark", "hci_2013": "HCI Blender (2013)"}
-"""Datasets of the paper, under the names that this project gives them."""
+"""Datasets of the paper by their names in this project."""
 
-# folders of the archive of 2013 whose names are not those that the paper prints
+# folders of the archive of 2013 with other names than in the paper
 _ARCHIVE_NAMES = {("hci_2013", "monasroom"): "Monas"}
 
-# the averages of the learned methods follow from their other four scenes only
+# the averages of the learned methods are without this scene
 _LEFT_OUT_OF_TABLE2 = frozenset({"Boxes", "Cotton", "Dino", "Sideboard"})
 
 RegionTable = dict[str, dict[str, float]]
-"""Method or variant to region of :data:`sepi.scoring.scores.REGIONS` to average 100 x MSE; no key where none stands."""
+"""Method or variant to region of :data:`sepi.scoring.scores.REGIONS` to average 100 x MSE, if the paper has one."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,13 @@ class Method:
     key : str
         Name in the data files.
     column : str
-        Letter of its column in tables 1 and 2; empty where it is in table 3 only.
+        Letter of its column in tables 1 and 2; empty if it is in table 3 only.
     authors, name : str
-        As the paper calls it; ``name`` is empty where the paper gives none.
+        As in the paper; ``name`` is empty if the paper gives none.
     learning : str
         ``"none"``, ``"supervised"`` or ``"unsupervised"``.
     variant : str
-        The variant that computes it; empty where none does.
+        The variant that computes it, if any; else empty.
     """
 
     key: str
@@ -65,7 +65,7 @@ class Method:
 
     @property
     def label(self) -> str:
-        """Authors and name, for a table's header."""
+        """Authors and name for a table's header."""
         return f"{self.authors} ({self.name})" if self.name else self.authors
 
 
@@ -76,12 +76,12 @@ class SceneTable:
     Attributes
     ----------
     cells : mapping
-        ``(dataset, scene)`` to ``{method key: figure}``, in the paper's order; a method that was trained on the scene
-        has no figure.
+        ``(dataset, scene)`` to ``{method key: figure}``, in the paper's order. A method trained on the scene has no
+        figure.
     averages : mapping
-        Dataset to ``{method key: figure}``: the average rows as printed.
+        Dataset to ``{method key: figure}``, the average rows as printed.
     left_out : set
-        Scenes that are not in the averages of methods without figures of all.
+        Scenes outside the averages of methods that lack figures.
     """
 
     cells: Mapping[tuple[str, str], Mapping[str, float]]
@@ -93,17 +93,17 @@ class SceneTable:
         return [scene for name, scene in self.cells if name == dataset]
 
     def averaged(self, dataset: str, method: str) -> int:
-        """How many scenes of a dataset a method's printed average is over; 0 for one without figures."""
+        """Number of scenes in a method's printed average for a dataset; 0 without figures."""
         scenes = self.scenes(dataset)
         known = [scene for scene in scenes if method in self.cells[dataset, scene]]
         return len(known) if len(known) == len(scenes) else len({*known} - self.left_out)
 
 
 def paper_scene(dataset: str, scene: str) -> str | None:
-    """The paper's name of a scene, or None where the paper does not have it.
+    """The paper's name of a scene; None if the paper does not have it.
 
-    Only datasets named as in :data:`DATASETS` are looked up, so that a built-in scene called ``dots`` is not taken
-    for the benchmark's; within them, capitals do not matter.
+    Only datasets in :data:`DATASETS` count, so that the built-in scene ``dots`` is not mistaken for the benchmark's.
+    Capitals do not matter.
     """
     named = {name.lower(): name for name in table1().scenes(dataset)}
     return named.get(scene.lower(), _ARCHIVE_NAMES.get((dataset, scene.lower())))
@@ -111,12 +111,12 @@ def paper_scene(dataset: str, scene: str) -> str | None:
 
 @cache
 def methods() -> dict[str, Method]:
-    """Every method of tables 1 to 3, by key: the columns (a) to (k), then those of table 3 only."""
+    """Methods of tables 1 to 3 by key: columns (a) to (k), then those of table 3 only."""
     return {row["key"]: Method(**row) for row in _rows("methods.csv")}
 
 
 def counterpart(variant: str) -> Method:
-    """The published method that a variant's figures are compared with: its own, or the paper's for all of ours."""
+    """The published method with which a variant is compared: a compared method's own, else the paper's."""
     return next((one for one in methods().values() if one.variant == variant), methods()[PAPERS_METHOD])
 
 
@@ -134,7 +134,7 @@ def table2() -> SceneTable:
 
 @cache
 def table3() -> dict[str, RegionTable]:
-    """Table 3, by dataset: methods in the occluded and the textureless region."""
+    """Table 3 by dataset: methods in occluded and textureless regions."""
     return {
         dataset: {
             row["method"]: {region: float(row[f"{dataset}_{region}"]) for region in REGIONS if region != WHOLE_MAP}
@@ -146,7 +146,7 @@ def table3() -> dict[str, RegionTable]:
 
 @cache
 def table4() -> dict[str, RegionTable]:
-    """Table 4 and the text's figures for Wang's occlusion stage, by dataset: variants over map and regions."""
+    """Table 4 by dataset, with the text's figures for Wang's occlusion stage: variants over map and regions."""
     table: dict[str, RegionTable] = {dataset: {} for dataset in DATASETS}
     for row in _rows("table4_ablation.csv"):
         table[row["dataset"]][row["variant"]] = {region: float(row[region]) for region in REGIONS if row[region]}
@@ -155,7 +155,7 @@ def table4() -> dict[str, RegionTable]:
 
 @cache
 def runtime() -> dict[str, float]:
-    """Seconds per stage, and ``"total"``: 512 x 512 pixels, 9 x 9 views, Intel Core i7-8700, nothing in parallel."""
+    """Seconds per stage and ``"total"``, for 512 x 512 pixels and 9 x 9 views on one core of an Intel Core i7-8700."""
     return {row["stage"]: float(row["seconds"]) for row in _rows("runtime.csv")}
 
 

@@ -1,4 +1,4 @@
-"""The scores and timings that the tables are made of, looked up in the numbers of a report."""
+"""Scores and timings for the tables, looked up in the numbers of a report."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from sepi.scoring.error_bars import Reliability
 from sepi.scoring.scores import WHOLE_MAP
 
 Numbers = Mapping[str, Any]
-"""What :func:`sepi.report.numbers.collect` found, as JSON has it."""
+"""Result of :func:`sepi.report.numbers.collect`."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """What a stage took: wall-clock seconds and peak memory in MB."""
+    """Wall-clock seconds and peak memory of a stage, MB."""
 
     seconds: float
     peak_memory_mb: float
@@ -32,7 +32,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Runs:
-    """The scores and timings of a plan, from the numbers of a report."""
+    """Scores and timings of a plan, from the numbers of a report."""
 
     numbers: Numbers
 
@@ -42,22 +42,22 @@ class Runs:
         return Plan.from_json(Path(), json.dumps(self.numbers["plan"]))
 
     def light_field(self, dataset: str, scene: str) -> dict[str, Any]:
-        """What is known about a light field: ``grid``, ``shape``, ``range``, ``sha256`` and more."""
+        """Facts about a light field: ``grid``, ``shape``, ``range``, ``sha256`` and more."""
         found: dict[str, Any] = self._scenes[dataset, scene]["light_field"]
         return found
 
     def scores(self, dataset: str, scene: str, variant: str, stage: str | None = None) -> AllScores:
-        """Protocol to region to scores after a stage, the last unless given; empty without ground truth."""
+        """Protocol to region to scores after a stage (default: the last); empty without ground truth."""
         found: AllScores = _with_nan(self._stage(dataset, scene, variant, stage or self.plan.stages[-1])["scores"])
         return found
 
     def scored(self, dataset: str, variant: str = MAIN_VARIANT) -> list[str]:
-        """Scenes of a dataset that have ground truth, and so scores; looked for with one of the variants."""
+        """Scenes of a dataset with scores of this variant, that is, with ground truth."""
         scenes = self.plan.scenes.get(dataset, ())
         return [scene for scene in scenes if self.scores(dataset, scene, variant)]
 
     def scored_pairs(self, variant: str = MAIN_VARIANT) -> list[tuple[str, str]]:
-        """Every ``(dataset, scene)`` that has scores."""
+        """Every ``(dataset, scene)`` with scores."""
         return [(dataset, scene) for dataset in self.plan.scenes for scene in self.scored(dataset, variant)]
 
     def final(
@@ -67,7 +67,7 @@ class Runs:
         return self.scores(dataset, scene, variant)["paper"][region][score]
 
     def timing(self, dataset: str, scene: str, variant: str, stage: str) -> Timing:
-        """What a stage took; nothing where it hands on what it is given."""
+        """Time and memory of a stage; 0 for one that is switched off."""
         if not self.plan.runs_stage(variant, stage):
             return Timing(0.0, 0.0)
         values = self._stage(dataset, scene, variant, stage)
@@ -84,7 +84,7 @@ class Runs:
         return found
 
     def external_problem(self, dataset: str, scene: str, method: str) -> str:
-        """Why an external map has no scores, in a few words; empty where it has some or there is no ground truth."""
+        """Reason why an external map has no scores; empty if it has scores or there is no ground truth."""
         return str(self._scenes[dataset, scene]["external"][method]["problem"])
 
     def pooled_q25(self, method: str, level: str, region: str) -> float:
@@ -105,23 +105,23 @@ class Runs:
 
 
 def read_numbers(path: Path) -> dict[str, Any]:
-    """Read the numbers that ``python -m sepi.report.numbers`` wrote.
+    """The numbers in a file that ``python -m sepi.report.numbers`` wrote.
 
     Raises
     ------
     SepiError
-        If the file is missing or not such a file.
+        If the file is missing or has other contents.
     """
     return read_json(path, {"plan", "scenes", "tables"}, "the numbers of a report", "sepi.report.numbers")
 
 
 def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, Any]:
-    """Read a JSON object that must have certain keys: ``what``, written by ``module``.
+    """The JSON object in a file of ``module``; messages call it ``what``.
 
     Raises
     ------
     SepiError
-        If the file is missing or not such a file.
+        If the file is missing or lacks one of the keys.
     """
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
@@ -135,7 +135,7 @@ def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, A
 
 
 def _with_nan(value: Any) -> Any:
-    """JSON has no NaN: a score over no pixels is null there."""
+    """A value with NaN for None, which is JSON's score over no pixels."""
     if isinstance(value, dict):
         return {key: _with_nan(inner) for key, inner in value.items()}
     if isinstance(value, list):

@@ -45,7 +45,7 @@ BUILDERS: dict[str, Callable[[Runs], Report]] = {
 
 
 def table(name: str, runs: Runs) -> Report:
-    """One of the tables; its caption says which scenes are left out."""
+    """One of the tables; its caption names the scenes that are left out."""
     report = BUILDERS[name](runs)
     missing = ", ".join(f"`{scene}`" for scene in runs.plan.missing)
     return replace(report, caption=f"{report.caption} Without {missing}, not computed yet.") if missing else report

@@ -1,4 +1,4 @@
-"""More contrast for the pictures of a probe, whose colours mostly lie close together; hues stay as they are."""
+"""More contrast for the pictures of a probe, with unchanged hues."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from sepi.lightfield import BoolMap
 from sepi.report.plots.pictures import Picture
 
-# darkest and brightest are stretched to black and white, but noise is not blown up beyond this
+# the brightness is stretched to black and white, by at most this factor because of noise
 _MOST_CONTRAST = 4.0
-# colours of grey surfaces would glare
+# most gain of colours, which would glare on grey surfaces
 _MOST_COLOUR = 1.5
 
 
 def contrast_of(pictures: Sequence[tuple[Picture, BoolMap]]) -> tuple[float, float]:
-    """Brightness in pictures, where their masks hold, that is to be drawn black, and white; 0..255."""
+    """Brightness within the masks that becomes black, and that which becomes white; 0..255."""
     seen = np.concatenate([pixels[inside].mean(axis=1) for pixels, inside in pictures])
     low, high = np.percentile(seen, (0.5, 99.5)) if seen.size else (0.0, 255.0)
     missing = max(0.0, 255 / _MOST_CONTRAST - (high - low)) / 2
@@ -24,7 +24,7 @@ def contrast_of(pictures: Sequence[tuple[Picture, BoolMap]]) -> tuple[float, flo
 
 
 def stretched(picture: Picture, inside: BoolMap, limits: tuple[float, float]) -> Picture:
-    """The picture (H, W, 3) with another brightness and the same hues; unchanged outside the mask (H, W)."""
+    """The picture (H, W, 3) with stretched brightness inside the mask (H, W)."""
     low, high = limits
     brightness = picture.mean(axis=2, keepdims=True)
     gain = 255 / (high - low)

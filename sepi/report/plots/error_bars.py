@@ -12,16 +12,16 @@ from sepi.report.plots.saving import new_figure, save
 from sepi.scoring.error_bars import Reliability
 
 INTERVAL = 90
-"""Percent of the pixels whose truth an interval should hold."""
+"""Percentage of the pixels whose truth an interval should hold."""
 
-# Okabe and Ito's colours, told apart by every kind of eye
+# Okabe and Ito's colours, which colour-blind people can distinguish
 _COLOURS = ("#0072b2", "#e69f00", "#009e73")
 _MARKERS = ("o", "s", "^")
 
 
 @dataclass(frozen=True)
 class VariantBars:
-    """What the chart shows of a variant: over all scenes together, and for each of them, in the same order."""
+    """Figures of a variant in the chart, over all scenes together and for each, in the order of the scenes."""
 
     variant: str
     reliability: Reliability
@@ -30,7 +30,7 @@ class VariantBars:
 
 
 def write_error_bars(folder: Path, name: str, scenes: Sequence[str], variants: Sequence[VariantBars]) -> None:
-    """The reliability diagram beside coverage and width by scene; a sentence where no scene has both truth and bars."""
+    """Write the reliability diagram, and coverage and width by scene; without truth and error bars, a sentence."""
     if not variants:
         figure = new_figure(4.2, 1)
         figure.text(0.5, 0.5, "no scene with ground truth and error bars", ha="center", va="center", fontsize=8)

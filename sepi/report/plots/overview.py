@@ -20,7 +20,7 @@ _DOTS = 100
 def write_overview(
     folder: Path, name: str, title: str, rows: Sequence[Sequence[tuple[str, Picture]]], endings: Sequence[str] = BOTH
 ) -> None:
-    """All pictures of one size on one sheet, with their titles; equal pictures give equal bytes."""
+    """Write pictures of one size onto one sheet, with their titles; equal pictures give equal bytes."""
     height, width = rows[0][0][1].shape[:2]
     size = (_PANEL - _GAP, (_PANEL - _GAP) * height / width)
     lines = max(words.count("\n") + 1 for row in rows for words, _ in row)
@@ -28,7 +28,7 @@ def write_overview(
     head = _TITLE if title else 0.0
     sheet_size = (_PANEL * max(map(len, rows)), row_height * len(rows) + head)
     figure = new_figure(*sheet_size, layout=None)
-    # one frame for all pictures, whose unit is an inch: many frames are slow to draw
+    # one frame for all pictures, in inches, since many frames are slow
     sheet = figure.add_axes((0, 0, 1, 1))
     sheet.set_axis_off()
     sheet.text(sheet_size[0] / 2, sheet_size[1] - 0.1, title, fontsize=12, ha="center", va="top", parse_math=False)
@@ -39,7 +39,7 @@ def write_overview(
         for column, (words, picture) in enumerate(row):
             left = column * _PANEL + _GAP / 2
             extent = (left, left + size[0], bottom, bottom + size[1])
-            # in the size at which it is drawn; matplotlib would take longer, and once for each file
+            # resized here, since matplotlib is slower and would do it for each file
             way = cv2.INTER_AREA if dots[0] < width else cv2.INTER_LINEAR
             drawn = np.asarray(cv2.resize(picture, dots, interpolation=way), np.uint8)
             image = sheet.imshow(drawn, extent=extent, aspect="auto", interpolation="none")
@@ -47,11 +47,11 @@ def write_overview(
                 enlarged.append((image, picture))
             place = (left + size[0] / 2, bottom + size[1] + 0.04)
             sheet.text(*place, words, fontsize=8, ha="center", va="bottom", parse_math=False)
-    # pictures set limits of their own
+    # drawing pictures has changed the limits
     sheet.set_xlim(0, sheet_size[0])
     sheet.set_ylim(0, sheet_size[1])
     save(figure, folder, name, [ending for ending in endings if ending != "pdf"])
-    # who looks at it enlarges a picture as well, and what is smaller is packed sooner
+    # readers enlarge single pictures anyway, and a smaller sheet is written faster
     for image, picture in enlarged:
         image.set_data(picture)
     save(figure, folder, name, [ending for ending in endings if ending == "pdf"])

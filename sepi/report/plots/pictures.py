@@ -1,4 +1,4 @@
-"""From maps to pictures: arrays in, RGB arrays out."""
+"""Pictures of maps, as RGB arrays."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ Picture = npt.NDArray[np.uint8]
 """RGB, (H, W, 3)."""
 
 ERROR_LIMIT = 0.2
-"""Error in pixels per view step at the ends of the colour scale of error maps, the same in all of them."""
+"""Error at the ends of the colour scale of all error maps, pixels per view step."""
 
 SIGMA_LIMITS = (-3.0, 0.0)
 """Logarithms to base 10 of the standard deviations at the ends of their colour scale, pixels per view step."""
 
-# smaller ones are told as this
+# least standard deviation on the scale
 _LEAST = 1e-4
 
-# ends of the scale of errors: too far and too near; blue and red-brown are told apart by every kind of eye
+# ends of the scale of errors, too far and too near; colour-blind people can distinguish blue and red-brown
 _FAR, _NEAR = (0, 62, 150), (150, 40, 0)
 
 _UNKNOWN = (1.0, 0.0, 1.0)  # magenta is in none of the colour scales
@@ -39,25 +39,25 @@ _OUTLINE = np.array([255, 220, 0], np.uint8)
 
 @cache
 def error_scale() -> ListedColormap:
-    """Colours of signed errors: lightness falls evenly from white in the middle to both ends (CIELAB)."""
+    """Colours of signed errors, with lightness falling evenly from white in the middle to both ends (CIELAB)."""
     ends = rgb2lab(np.array([_FAR, _NEAR], np.float64) / 255)
     white = np.array([100.0, 0.0, 0.0])
     share = np.linspace(0, 1, 128)[:, None]
     half = [white + share * (end - white) for end in ends]
-    # the middle stands once: zero is white exactly
+    # the middle occurs once, so that zero is exactly white
     colours = np.concatenate([half[0][::-1], half[1][1:]])
     return ListedColormap(np.clip(lab2rgb(colours), 0, 1).tolist(), name="error")
 
 
 def scale_colours(scale: str | Colormap) -> npt.NDArray[np.uint8]:
-    """The 256 colours of a scale, (256, 3) uint8, from its low end to its high one."""
+    """The 256 colours of a scale, low end first; shape (256, 3), uint8."""
     colours = colormaps[scale] if isinstance(scale, str) else scale
     levels: npt.NDArray[np.uint8] = colours(np.linspace(0, 1, 256), bytes=True)
     return levels[:, :3]
 
 
 def disparity_limits(light_field: LightField) -> tuple[float, float]:
-    """Ends of the colour scale of a scene: those of its ground truth, else, or where it is flat, of its range."""
+    """Ends of the colour scale of a scene: those of its ground truth; if unknown or flat, of its disparity range."""
     if light_field.ground_truth is not None and np.isfinite(light_field.ground_truth).any():
         known = light_field.ground_truth[np.isfinite(light_field.ground_truth)]
         if known.min() < known.max():
@@ -67,7 +67,7 @@ def disparity_limits(light_field: LightField) -> tuple[float, float]:
 
 
 def reference_picture(light_field: LightField) -> Picture:
-    """The reference view."""
+    """The reference view as RGB."""
     return as_rgb(light_field.reference_view)
 
 
@@ -78,7 +78,7 @@ def as_rgb(colours: FloatMap) -> Picture:
 
 
 def picture_uri(picture: Picture, kind: str, options: Sequence[int] = ()) -> str:
-    """A picture as an address that holds it; ``kind`` is ``"png"`` or ``"webp"``, ``options`` are OpenCV's."""
+    """A picture as a data URI; ``kind`` is ``"png"`` or ``"webp"``, ``options`` are OpenCV's."""
     _, data = cv2.imencode(f".{kind}", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), list(options))
     return f"data:image/{kind};base64,{base64.b64encode(data.tobytes()).decode('ascii')}"
 
@@ -104,7 +104,7 @@ def panel_picture(panel: Panel, view: Picture, limits: tuple[float, float]) -> P
 
 
 def map_picture(values: FloatMap, limits: tuple[float, float], scale: str | Colormap = "viridis") -> Picture:
-    """A map (H, W) in matplotlib's colour scale ``scale``, which spans ``limits``; unknown values are magenta."""
+    """A map (H, W) in a colour scale of matplotlib over ``limits``; values that are not finite are magenta."""
     low, high = limits
     unit = (values.astype(np.float64) - low) / max(high - low, 1e-9)
     unit[~np.isfinite(unit)] = np.nan
@@ -120,7 +120,7 @@ def logarithms(values: FloatMap) -> FloatMap:
 
 
 def error_picture(error: FloatMap) -> Picture:
-    """A signed error map (H, W): red where the estimate is too near, blue where too far, magenta where unknown."""
+    """A signed error map (H, W): red where too near, blue where too far, magenta where not finite."""
     return map_picture(error, (-ERROR_LIMIT, ERROR_LIMIT), error_scale())
 
 

@@ -12,8 +12,8 @@ from sepi.scoring.confidence import STEPS, oracle, sparsification
 
 
 def write_curves(folder: Path, confidence: FloatMap, error: FloatMap) -> None:
-    """Plot the sparsification curve of a map beside the oracle's as ``sparsification.png`` and ``.pdf``."""
-    # margins by hand: a layout engine takes longer than the rest
+    """Write the sparsification curve of a map beside the oracle's, as ``sparsification.png`` and ``.pdf``."""
+    # fixed margins, since a layout engine takes longer than the rest
     figure = new_figure(5, 3.5, layout=None)
     axis = figure.add_axes((0.14, 0.14, 0.83, 0.83))
     taken = np.arange(STEPS)

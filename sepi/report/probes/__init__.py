@@ -1,1 +1,1 @@
-"""The method at work on single pixels."""
+"""Probes: SEPIs and cost curves of single pixels."""

@@ -1,7 +1,7 @@
-"""The cost curves of a single pixel: what the sweep minimises there (Eq. 3-5 of [1]_).
+"""Cost curves of a single pixel, whose minimum the sweep finds (Eq. 3-5 of [1]_).
 
-:func:`sepi.matching.plane_sweep.sweep` never holds a cost curve; here those of one pixel are computed again, in plain
-NumPy on the few samples that its aggregation window meets.
+:func:`sepi.matching.plane_sweep.sweep` keeps no cost curves. This module computes those of one pixel again, in NumPy,
+from the few samples in its aggregation window.
 
 References
 ----------
@@ -36,12 +36,12 @@ class Curves:
     names : tuple of str, length N
         Subsets of the views, as :func:`sepi.matching.view_subsets.halves_and_quarters` names them.
     costs : ndarray, shape (N, K), float32
-        Aggregated mean of the robust photo-consistency (Eq. 3), 0..1 (or a little below 0, where noise is corrected); 1
-        where no view of the subset sees the pixel.
+        Aggregated mean of the robust photo-consistency (Eq. 3), 0..1 (or slightly below 0 with the correction for
+        noise); 1 if no view of the subset sees the pixel.
 
     Examples
     --------
-    A pixel with an occluder on its right is hidden from views to the right, and seen well by those to the left:
+    An occluder on the right of a pixel hides it from views on the right; views on the left see it well:
 
     >>> from sepi import initial
     >>> from sepi.report.probes.curves import Curves, cost_curves
@@ -60,21 +60,21 @@ class Curves:
     costs: FloatMap
 
     def minimum(self, name: str = "full") -> tuple[float, float]:
-        """Where a subset's cost is lowest (Eq. 4).
+        """Disparity of a subset's lowest cost (Eq. 4), and that cost.
 
-        As the sweep takes it: the first of equal minima; no parabola at the ends or through a perfect match.
+        As in the sweep, the first of equal minima counts, and the ends and perfect matches are not refined.
 
         Parameters
         ----------
         name : str
-            Of the subset.
+            Name of the subset.
 
         Returns
         -------
         disparity : float
-            Refined below the candidate step by a parabola; pixels per view step.
+            Refined by a parabola, pixels per view step.
         cost : float
-            The lowest.
+            Lowest cost.
         """
         costs = self.costs[self.names.index(name)].astype(np.float64)
         best = int(costs.argmin())
@@ -87,20 +87,17 @@ class Curves:
         return float(self.disparities[best]) + offset * step, float(costs[best])
 
     def best_subset(self) -> str:
-        """The subset of views that sees the pixel best.
+        """Name of the subset with the lowest cost; the first of equal ones.
 
         Returns
         -------
         str
-            Name of that with the lowest cost of all; the first of equal ones.
         """
         return self.names[int(self.costs.min(axis=1).argmin())]
 
 
 def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParameters) -> Curves:
-    """Cost of every candidate at one pixel, as the initial depth (:func:`sepi.initial.sepi`) minimises it.
-
-    Eq. 3 of [1]_, aggregated over the window of the sweep.
+    """Cost of every candidate at one pixel, as in the initial depth (:func:`sepi.initial.sepi`; Eq. 3 of [1]_).
 
     Parameters
     ----------
@@ -160,7 +157,7 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
         if (t, s) == (t0, s0):
             continue
         top, left = rows + down[t, s][:, None], columns + across[t, s][:, None]
-        # as the sweep counts: a sample on the last row or column needs none beyond it
+        # as in the sweep, a sample on the last row or column needs no pixel beyond
         inside_y = (top >= 0) & ((top < H - 1) | ((top == H - 1) & (fy[t, s] == 0)[:, None]))
         inside_x = (left >= 0) & ((left < W - 1) | ((left == W - 1) & (fx[t, s] == 0)[:, None]))
         squared = _squared_residuals(compared[t, s], reference_view, top, left, fy[t, s], fx[t, s])
@@ -199,8 +196,8 @@ def _squared_residuals(
 ) -> FloatMap:
     """Squared colour differences (K, h, w) of the window (C, h, w) to its bilinear samples in a view (H, W, C).
 
-    ``top (K, h)`` and ``left (K, w)`` are the samples' whole pixels, ``fy`` and ``fx (K,)`` their fractions. What lies
-    outside the view is sampled at its edge.
+    ``top (K, h)`` and ``left (K, w)`` are the samples' whole pixels, ``fy`` and ``fx (K,)`` their fractions. Samples
+    outside the view are taken at its border.
     """
     H, W, _ = view.shape
     rows = np.clip(np.arange(top.min(), top.max() + 2), 0, H - 1)

@@ -1,4 +1,4 @@
-"""The figure of probed pixels: where each is, its SEPIs, its cost curves (figures 3 and 4 of the paper)."""
+"""Figure of probes: position, SEPIs, angular patch and cost curves (figures 3 and 4 of the paper)."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from sepi.report.plots.pictures import Picture
 from sepi.report.plots.saving import new_figure, save
 from sepi.report.probes.probe import Probe
 
-# colours that the colour-blind can tell apart: Okabe and Ito, https://jfly.uni-koeln.de/color/
+# colours that colour-blind people can distinguish: Okabe and Ito, https://jfly.uni-koeln.de/color/
 _CURVES = {"full": "#000000", "left": "#E69F00", "right": "#56B4E9", "up": "#009E73", "down": "#D55E00"}
 _QUARTER = "#999999"
-# disparities of final maps: colour, dashes, width and name; narrow upon wide, since they often coincide
+# disparities of final maps: colour, dashes, width and name; the narrow line lies on the wide one, as many coincide
 _MARKS: dict[str, tuple[str, Literal["-", "--", ":"], float, str]] = {
     "chosen": ("#0072B2", "-", 3.0, "chosen (final map)"),
     "best": ("#CC79A7", "--", 1.6, "variant best, 90 % interval"),
@@ -45,11 +45,11 @@ _PLOT = _MARGIN + _PICTURES + 0.6
 def write_probes(path: Path, probes: Sequence[Probe], view: Picture) -> None:
     """Draw probes, a row each, into ``path`` with ``.png`` and with ``.pdf`` added; equal probes give equal bytes.
 
-    A row shows the surroundings of the pixel; its SEPI at the worst candidate, at that of the lowest cost and at the
-    final disparity, sheared so that the candidate's line stands upright between the two ticks; the angular patch at the
-    final disparity; and the cost curves of all views and of the halves. Bars beside the SEPIs mark the rows of the
-    views that the occlusion stage kept, where it dropped any, in the colour of their curve. SEPIs and patch have the
-    same contrast within a row, stretched.
+    A row shows the surroundings of the pixel; its SEPI at the worst candidate, at the candidate of lowest cost and at
+    the final disparity, sheared so that the candidate's line is upright between the two ticks; the angular patch at the
+    final disparity; and the cost curves of all views and of the halves. If the occlusion stage dropped views, bars
+    beside the SEPIs mark the rows of the views kept, in the colour of their curve. SEPIs and patch of a row have the
+    same stretched contrast.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def write_probes(path: Path, probes: Sequence[Probe], view: Picture) -> None:
         raise SepiError(f"{path}: a figure of probes needs at least one")
     height = _HEAD + _ROW * len(probes) + _FOOT
     figure = new_figure(_WIDTH, height, layout=None)
-    # one frame for all pictures, whose unit is an inch: many frames are slow to draw
+    # one frame for all pictures, in inches, since many frames are slow
     sheet = figure.add_axes((0, 0, 1, 1))
     sheet.set_axis_off()
     for number, found in enumerate(probes):
@@ -77,7 +77,7 @@ def write_probes(path: Path, probes: Sequence[Probe], view: Picture) -> None:
         _draw_pictures(sheet, found, view, bottom)
         area = (_PLOT / _WIDTH, bottom / height, 1 - (_PLOT + _MARGIN) / _WIDTH, _HEIGHT / height)
         _draw_curves(figure.add_axes(area), found, last=number == len(probes) - 1)
-    # pictures set limits of their own
+    # drawing pictures has changed the limits
     sheet.set_xlim(0, _WIDTH)
     sheet.set_ylim(0, height)
     _draw_legend(figure, probes)
@@ -107,7 +107,7 @@ def _draw_pictures(sheet: Axes, found: Probe, view: Picture, bottom: float) -> N
 
 
 def _place(sheet: Axes, picture: Picture, left: float, bottom: float, width: float, height: float) -> None:
-    # pixels are to be seen as such, unless there are more of them than dots
+    # pixels stay visible unless there are more of them than dots
     few = picture.shape[0] <= height * _DPI
     sheet.imshow(
         picture,

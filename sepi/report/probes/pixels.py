@@ -1,6 +1,6 @@
-"""Pixels worth a look, chosen from the maps of a variant: sure, occluded on each side, textureless, wrong, unsure.
+"""Pixels to show, chosen from the maps of a variant: sure, occluded on each side, textureless, wrong, unsure.
 
-Ground truth only helps to find the largest error; this is for display, no estimator calls it.
+This is for display only; ground truth is used to find the largest error.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ APART = 12
 """Least distance between two of them, pixels."""
 
 BORDER = 8
-"""Distance from the picture's border that they keep where the picture is large enough, pixels."""
+"""Least distance from the picture's border if the picture is large enough, pixels."""
 
-# side in pixels of the windows over which a property must hold, lest a single odd pixel is chosen
+# side of the windows over which a property must hold, so that no odd single pixel is chosen, pixels
 _WINDOW = 5
-# distance within which the occluder of a pixel is looked for, and a sure pixel has no depth discontinuity, pixels
+# distance within which an occluder is searched, and a sure pixel has no depth discontinuity, pixels
 _REACH = 10
-# disparity from end to end of a neighbourhood beyond which it has a depth discontinuity, pixels per view step
+# least spread of disparities round a depth discontinuity, pixels per view step
 _DISCONTINUITY = 0.3
-# difference to the occluder beyond which a larger one is no clearer, pixels per view step
+# depth step to the occluder beyond which a larger one scores no more, pixels per view step
 _CLEAR_DIFFERENCE = 2.0
-# gradient (full range per pixel) beyond which more texture is no better to look at
+# gradient beyond which more texture scores no more, full range per pixel
 _CLEAR_TEXTURE = 0.03
 
 
 class InterestingPixel(NamedTuple):
-    """A pixel of the reference view and why it is worth a look."""
+    """A pixel of the reference view, and why it was chosen."""
 
     y: int
     x: int
@@ -42,30 +42,30 @@ class InterestingPixel(NamedTuple):
 
 
 def kept_subsets(maps: StageMaps) -> npt.NDArray[np.uint8]:
-    """Number of the subset of the views that the occlusion stage kept at each pixel, (H, W); 0, all, without it."""
+    """Number of the view subset that the occlusion stage kept at each pixel, (H, W); 0 (all views) without it."""
     return maps.extra.get("view_subset", np.zeros(maps.disparity.shape, np.uint8))
 
 
 def interesting_pixels(
     light_field: LightField, maps: StageMaps, ground_truth: FloatMap | None
 ) -> list[InterestingPixel]:
-    """Choose pixels that show how the method works and where it fails.
+    """Pixels that show how the method works and where it fails.
 
-    In order, as far as the scene has them: textured and sure; occluded, by the half of the views that is kept, the
-    clearest first; textureless; of the largest error; unsure. Equal input gives equal pixels.
+    In order, if the scene has them: textured and sure; occluded, one for each half of the views that is kept, the
+    clearest first; textureless; with the largest error; unsure. Equal input gives equal pixels.
 
     Parameters
     ----------
     light_field : LightField
     maps : StageMaps
-        Final maps of a variant; its masks and ``view_subset`` are used where it has them.
+        Final maps of a variant, with its masks and ``view_subset`` if it has them.
     ground_truth : ndarray, shape (H, W), float32, or None
         True disparity; may hold values that are not finite.
 
     Returns
     -------
     list of InterestingPixel
-        Distinct, at least ``APART`` from each other, and ``BORDER`` from the picture's border where it is large enough.
+        At least ``APART`` pixels from each other, and ``BORDER`` from the border of a picture that is large enough.
     """
     texture = _texture(light_field.reference_view)
     scores = [
@@ -80,7 +80,7 @@ def interesting_pixels(
     for label, score in scores:
         if not free.any():
             break
-        # a score of zero is no case of its kind
+        # a score of zero means that there is no such pixel
         values = np.where(free, np.nan_to_num(score), 0)
         y, x = (int(place) for place in np.unravel_index(values.argmax(), values.shape))
         if values[y, x] > 0:
@@ -111,13 +111,13 @@ def _sure(texture: FloatMap, maps: StageMaps) -> FloatMap:
 def _occluded(texture: FloatMap, maps: StageMaps) -> list[tuple[str, FloatMap]]:
     """A label and score for each half of the views that is kept somewhere, the highest score first."""
     names, subset = HALVES_AND_QUARTERS, kept_subsets(maps)
-    # a map that changes from pixel to pixel has been smoothed over the edge, or is not sure which side is which
+    # a map that changes from pixel to pixel is smoothed over the edge, or uncertain
     even = 1 / (1 + _spread(maps.disparity, 1) / _DISCONTINUITY)
     clear = even * np.minimum(texture / _CLEAR_TEXTURE, 1) * np.nan_to_num(maps.confidence)
     scores = []
     for name, (dt, ds) in SIDES.items():
         kept = subset == names.index(name)
-        # the views kept lie towards (dt, ds), so the occluder lies the other way
+        # the views kept lie towards (dt, ds), so the occluder lies on the opposite side
         nearer = _nearest_towards(maps.disparity, -dt, -ds) - maps.disparity
         nearer = np.clip(np.nan_to_num(nearer), 0, _CLEAR_DIFFERENCE)
         score = np.where(kept, _blurred(kept.astype(np.float32)) * nearer * clear, 0).astype(np.float32)
@@ -126,7 +126,7 @@ def _occluded(texture: FloatMap, maps: StageMaps) -> list[tuple[str, FloatMap]]:
 
 
 def _nearest_towards(disparity: FloatMap, dy: int, dx: int) -> FloatMap:
-    """Largest disparity on the stretch from each pixel in direction ``(dy, dx)``, itself included."""
+    """Largest disparity from each pixel on, within reach in direction ``(dy, dx)``."""
     kernel = np.zeros((2 * _REACH + 1, 2 * _REACH + 1), np.uint8)
     steps = np.arange(_REACH + 1)
     kernel[_REACH + dy * steps, _REACH + dx * steps] = 1
@@ -141,11 +141,11 @@ def _spread(disparity: FloatMap, radius: int) -> FloatMap:
 
 
 def _textureless(texture: FloatMap, maps: StageMaps) -> tuple[str, FloatMap]:
-    """A label, and how far inside the textureless regions; without any, how little texture there is."""
+    """A label and a score: depth inside textureless regions; without any, lack of texture."""
     mask = maps.mask("textureless")
     if not mask.any():
         return "least texture", np.asarray(1 / (1 + texture / _CLEAR_TEXTURE), np.float32)
-    # a frame, so that a picture without any texture has a middle too
+    # with a frame, so that a picture without texture has a middle, too
     framed = np.pad(mask.astype(np.uint8), 1)
     inside = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
     return "textureless", np.asarray(inside, np.float32)
@@ -168,7 +168,7 @@ def _blurred(values: FloatMap) -> FloatMap:
 
 
 def _inner(shape: tuple[int, int]) -> BoolMap:
-    """Pixels away from the border, as far as the picture has any."""
+    """Mask of pixels away from the border; of a small picture, of its middle."""
     inner: npt.NDArray[np.bool_] = np.zeros(shape, bool)
     y, x = (min(BORDER, (size - 1) // 2) for size in shape)
     inner[y : shape[0] - y, x : shape[1] - x] = True

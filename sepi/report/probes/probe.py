@@ -29,21 +29,21 @@ from sepi.report.probes.pixels import InterestingPixel, kept_subsets
 from sepi.stage import StageMaps
 
 GREY = 128
-"""Value of all channels where a picture shows nothing: outside the view, or no such view."""
+"""Value of all channels where a picture has no sample: outside the view, or of a missing view."""
 
 HALF_WIDTH = 24
-"""Pixels that a SEPI picture shows on each side of the line."""
+"""Pixels of a SEPI picture on each side of the line."""
 
-# of the SEPI pictures in a page
+# quality of the SEPI pictures on a page
 _WEBP = [cv2.IMWRITE_WEBP_QUALITY, 60]
 _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 9]
 
 
 @dataclass(frozen=True)
 class SepiPicture:
-    """A SEPI cut out around a pixel's column, sheared so that the candidate's line stands upright in the middle.
+    """Part of a SEPI around a pixel's column, sheared so that the candidate's line is upright in the middle.
 
-    The right candidate shows upright stripes, a wrong one a saw-tooth, a tooth for each row of views.
+    The right candidate shows upright stripes, a wrong one a saw-tooth with a tooth for each row of views.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class SepiPicture:
 
 @dataclass(frozen=True)
 class Probe:
-    """What there is to show of one pixel; all disparities in pixels per view step.
+    """Data of one pixel to show; all disparities in pixels per view step.
 
     Attributes
     ----------
@@ -72,22 +72,22 @@ class Probe:
     chosen : float
         Disparity in the final map.
     kept_subset : str
-        Subset of the views that the occlusion stage kept; ``full`` where it kept all, or did not run.
+        Subset of the views that the occlusion stage kept; ``full`` if it kept all, or did not run.
     kept : ndarray, shape (T, S), bool
         Views of that subset that are present.
     best : float or None
-        Disparity in the final map of the most accurate variant, if it was given.
+        Disparity in the final map of the most accurate variant, if given.
     interval : (float, float) or None
-        What holds the disparity with a probability of 90 % by that variant's error bars, where it has some.
+        Interval of that variant's error bars, which holds the disparity with a probability of 90 %, if it has some.
     ground_truth : float or None
-        None where it is unknown.
+        None if unknown.
     confidence : float
-        Of the final map, 0..1.
+        Confidence of the final map, 0..1.
     occluded, textureless : bool
-        What the stages took the pixel for.
+        Values of the stages' masks.
     pictures : mapping of str to SepiPicture
-        SEPIs at ``minimum`` (lowest cost over all views: what the initial stage sees), ``chosen``, ``wrong`` (highest
-        cost over all views) and, where it is known, ``ground_truth``.
+        SEPIs at ``minimum`` (lowest cost over all views, as in the initial stage), ``chosen``, ``wrong`` (highest cost
+        over all views) and, if known, ``ground_truth``.
     """
 
     pixel: InterestingPixel
@@ -105,13 +105,13 @@ class Probe:
 
     @cached_property
     def stretched(self) -> dict[str, Picture]:
-        """The SEPIs with more contrast, the same in all."""
+        """The SEPIs with stretched contrast, the same in all."""
         limits = contrast_of([(picture.pixels, picture.inside) for picture in self.pictures.values()])
         return {name: stretched(found.pixels, found.inside, limits) for name, found in self.pictures.items()}
 
     @property
     def patch(self) -> Picture:
-        """The sample of each view at the chosen disparity (angular patch), (T, S, 3), with more contrast."""
+        """Angular patch: the sample of each view at the chosen disparity, with stretched contrast; shape (T, S, 3)."""
         return self.stretched["chosen"][:, HALF_WIDTH].reshape(*self.kept.shape, 3)
 
 
@@ -143,7 +143,7 @@ def sepi_picture(light_field: LightField, y: int, x: int, disparity: float) -> S
     position = columns + (-disparity * sepi.positions - sepi.offsets)[:, None]
     width = sepi.rows.shape[1]
     inside = sepi.inside[:, None] & (position >= 0) & (position <= width - 1)
-    # far outside, whole numbers would overflow
+    # far outside, integers would overflow
     position = np.clip(position, 0, width - 1)
     left = np.minimum(np.floor(position).astype(np.int64), width - 2)
     weight = (position - left).astype(np.float32)[:, :, None]
@@ -160,7 +160,7 @@ def probe(
     parameters: SweepParameters,
     best: StageMaps | None = None,
 ) -> Probe:
-    """Everything there is to show of one pixel.
+    """The probe of one pixel.
 
     Parameters
     ----------
@@ -169,9 +169,9 @@ def probe(
     pixel : InterestingPixel
         Pixel of the reference view.
     maps : StageMaps
-        Final maps of a variant whose occlusion stage is ``half_sepi`` or ``none``: others have other subsets.
+        Final maps of a variant whose occlusion stage is ``half_sepi`` or ``none``.
     parameters : SweepParameters
-        Of its initial or occlusion stage.
+        Parameters of its initial or occlusion stage.
     best : StageMaps, optional
         Final maps of the most accurate variant.
 
@@ -223,12 +223,12 @@ def probe(
 
 
 def to_json(found: Probe) -> dict[str, Any]:
-    """A probe for a page, compact.
+    """A probe as compact JSON for a page.
 
     Returns
     -------
     dict
-        The fields of :class:`Probe`, and ``best_subset``, that of the lowest cost of all, whether or not it was kept.
+        The fields of :class:`Probe`, and ``best_subset``, the subset of lowest cost, kept or not.
         ``range`` is the first and last candidate; ``costs`` maps the names of the subsets to base64 of little-endian
         uint16, ``65535 * cost`` of each candidate; ``kept`` has a character per view, ``1`` or ``0``; ``sepi`` maps
         the names of the pictures to their ``disparity`` and ``src``, a data URI (WebP), whose middle column is the
@@ -272,8 +272,8 @@ def _finite(value: float) -> float | None:
 
 
 def _short(value: float | None) -> float | None:
-    """To seven decimals; None where it is not a number.
+    """A value with seven decimals; None if it is not finite.
 
-    The page shows three: had it four, what is rounded twice would not be what other tables show.
+    The page shows three. With four here, double rounding would differ from the tables.
     """
     return None if value is None or not math.isfinite(value) else round(float(value), 7)

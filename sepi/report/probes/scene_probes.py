@@ -1,4 +1,4 @@
-"""Single pixels of a scene that the report looks into: those asked for, and a few that show how the method works."""
+"""Probes of a scene for the report: of the user's pixels, and of a few that show how the method works."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from sepi.report.probes.probe import Probe, probe
 
 
 def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[InterestingPixel]) -> list[Probe]:
-    """What the paper's method sees at single pixels of a scene.
+    """Probes of the paper's method at single pixels of a scene.
 
     Parameters
     ----------
     results : SceneResults
     final_file : Path
-        File of the last stage of the paper's method: it knows the sweep's parameters.
+        File of the last stage of the paper's method, with the sweep's parameters.
     asked : sequence of InterestingPixel
-        Pixels to look into beside the automatic ones.
+        Pixels of the user.
 
     Returns
     -------
     list of Probe
-        Those asked for first; pixels without a depth are left out.
+        The user's pixels first, then automatic ones; pixels without a depth are left out.
     """
     maps = results.final(MAIN_VARIANT)
-    # as the stages saw it
+    # as in the stages
     light_field = equally_bright(results.light_field)
     pixels = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
     parameters = sweep_parameters(final_file)
@@ -51,6 +51,6 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
 
 
 def sweep_parameters(final_file: Path) -> SweepParameters:
-    """The parameters of the sweep that a final map of the paper's method began with."""
+    """Parameters of the sweep from which a final map of the paper's method was made."""
     known = history_of(final_file)[0]["parameters"]
     return SweepParameters(**{name: known[name] for name in SweepParameters.model_fields if name in known})

@@ -1,4 +1,4 @@
-"""Table 4, the error of every variant over the map and both regions, and the ablation of variant ``best``."""
+"""Table 4 (error of every variant over the map and both regions) and the ablation of variant ``best``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sepi.report.tabular.layout import Column, Kind, Record, Report, line, print
 from sepi.scoring.scores import REGIONS, WHOLE_MAP, own_bad_pixel, score_heads
 
 _Means = dict[str, dict[str, methods.Mean]]
-"""Region to variant to figure; of a published one no count is known."""
+"""Region to variant to figure; published figures have no count."""
 
 _SCORES = ("mse100", "q25", "badpix007")
 
@@ -30,7 +30,7 @@ def ablation_table(runs: Runs) -> Report:
                 over = max((mean.scenes for mean in means[region].values()), default=0)
                 scene = methods.average_label(over) if kind == methods.AVERAGE else name
                 records.append({"dataset": dataset, "scene": scene, "row": kind, "region": region, **figures})
-            # the regions of a variant in one cell, as the paper has them; a figure published without these stands alone
+            # a variant's regions share a cell, as in the paper; a figure published without them is alone
             cells = {v: [means[r][v] for r in REGIONS if v in means[r]] for v in variants}
             texts = {v: "/".join(filter(None, (short(mean.value) for mean in cells[v]))) for v in variants}
             scenes = len(runs.scored(dataset)) if kind == methods.AVERAGE else 1
@@ -51,7 +51,7 @@ def ablation_table(runs: Runs) -> Report:
 
 
 def _rows(runs: Runs, dataset: str) -> list[tuple[str, str, _Means]]:
-    """Name, kind, and figures: of the scenes, their average, and the paper's."""
+    """Name, kind and figures of each row: scenes, their average, and the paper's average."""
     scenes = runs.scored(dataset)
     rows = [(scene, methods.SCENE, _averages(runs, dataset, [scene])) for scene in scenes]
     if scenes:
@@ -71,7 +71,7 @@ def _averages(runs: Runs, dataset: str, scenes: list[str]) -> _Means:
 
 
 def parts_table(runs: Runs) -> Report:
-    """Scores and seconds of the best variant and of those with one part of it switched off."""
+    """Scores and seconds of the best variant and of the variants with one part switched off or replaced."""
     own = runs.plan.bad_thresholds
     heads = {name: score_heads(own)[name] for name in (*_SCORES, *own_bad_pixel(own))}
     columns = {

@@ -1,4 +1,4 @@
-"""Tables 1 to 3: this project's figures beside those the paper prints, and beside those of other methods' maps."""
+"""Tables 1 to 3: this project's figures beside the published ones, and those of external methods' maps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 
 def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report:
-    """Table 1 or 2: a row per scene; our figure, the published one of every method, and those of other methods' maps.
+    """Table 1 or 2, a row per scene: our figures, the published ones, and those of external methods' maps.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
     paper : SceneTable
         The published figures.
     title : str
-        Of the page.
+        Title on the page.
     """
     plan = runs.plan
     elsewhere = {method.key for method in published.methods().values() if not method.column}
@@ -61,29 +61,29 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
 
 
 def _counterparts(plan: Plan) -> str:
-    """Whose published figures ours are divided by, for the caption."""
+    """The methods whose published figures divide ours, for the caption."""
     papers = f"the paper's method, {published.methods()[PAPERS_METHOD].label}"
     return f"the same method, for this project's own variants {papers}" if plan.report else papers
 
 
 def _is_shown(runs: Runs, dataset: str, method: Method, rows: Sequence[Record]) -> bool:
-    """Whether a method has a column on a dataset's page: ours always, others where something stands in it."""
+    """Whether a method has a column on a dataset's page: ours always, others if it is not empty."""
     if method.kind == Kind.EXTERNAL and not methods.has_column(runs, dataset, method.name):
         return False
     return method.kind == Kind.OURS or any(row.get(method.key) is not None for row in rows)
 
 
 def _own_names(runs: Runs, dataset: str) -> dict[str, str]:
-    """Name of a scene in the tables, the paper's where it has one, to that of its folder."""
+    """Name of each scene in the tables (the paper's if it has one) to the name of its folder."""
     return {published.paper_scene(dataset, scene) or scene: scene for scene in runs.scored(dataset)}
 
 
 def _scene_records(
     runs: Runs, dataset: str, score: str, paper: SceneTable, compared: Sequence[Method]
 ) -> list[tuple[Record, Mapping[str, str]]]:
-    """The paper's scenes in its order, those it does not have, the average of those available, and the paper's.
+    """Rows of the paper's scenes, of others, of the average of those available, and of the paper's average.
 
-    Each with what must be known of its figures, by method.
+    Each row comes with notes on its figures, by method.
     """
     own_names = _own_names(runs, dataset)
     external = [method for method in compared if method.kind == Kind.EXTERNAL]
@@ -114,7 +114,7 @@ def _scene_records(
 
 
 def _figure(method: Method, figures: Record) -> Cell:
-    """Of a method; of a ratio, ours divided by the published one."""
+    """Figure of a method, or for a ratio, ours divided by the published one."""
     if method.kind != Kind.RATIO:
         return figures.get(method.key)
     ours = figures.get(f"ours{method.key.removeprefix('ratio')}")
@@ -123,13 +123,13 @@ def _figure(method: Method, figures: Record) -> Cell:
 
 
 def _average(method: Method, figures: Sequence[Cell]) -> Mean:
-    """Mean; of other methods None where a figure is missing: an average over other scenes would not compare."""
+    """Mean of figures; None for other methods with a figure missing, since scenes must be the same."""
     mean = methods.mean(figures)
     return mean if method.kind == Kind.OURS or mean.scenes == len(figures) else Mean(None, 0)
 
 
 def region_table(runs: Runs) -> Report:
-    """Table 3: average MSE x100 over occluded and textureless regions, ours, published and of other methods' maps."""
+    """Table 3: average MSE x100 in occluded and textureless regions: ours, published, and of external methods' maps."""
     plan = runs.plan
     datasets = [one for one in methods.datasets_of(plan) if one in published.DATASETS or runs.scored(one)]
     cells = {f"{dataset}_{region}": (dataset, region) for dataset in datasets for region in REGIONS[1:]}
@@ -165,7 +165,7 @@ def region_table(runs: Runs) -> Report:
 
 
 def _region_average(runs: Runs, method: Method, dataset: str, region: str) -> Mean:
-    """The published average, over the scenes that the paper has figures of; or that over the scenes available."""
+    """A method's published average, or ours over the scenes available."""
     if method.is_here:
         return _own_figure(runs, method, dataset, runs.scored(dataset), "mse100", region)
     figure = published.table3().get(dataset, {}).get(method.key, {}).get(region)
@@ -173,13 +173,13 @@ def _region_average(runs: Runs, method: Method, dataset: str, region: str) -> Me
 
 
 def _region_note(runs: Runs, method: Method, mean: Mean, dataset: str) -> str:
-    """Over how many scenes an average is, where that is not what the caption says."""
+    """Note on the number of scenes in an average, if the caption says another."""
     scenes = runs.scored(dataset) if method.is_here else published.table1().scenes(dataset)
     return methods.count_note([mean.scenes], len(scenes))
 
 
 def _own_figure(runs: Runs, method: Method, dataset: str, scenes: Sequence[str], score: str, region: str) -> Mean:
-    """Average of what was scored here; where another method's map is missing, the problem, or how many are there."""
+    """Average of scores; if an external map is missing, its problem, or the number of maps."""
     if not scenes:
         return Mean(None, 0)
     if method.kind == Kind.OURS:
@@ -194,7 +194,7 @@ def _own_figure(runs: Runs, method: Method, dataset: str, scenes: Sequence[str],
 
 
 def _ranked(runs: Runs, rows: Sequence[Method], dataset: str) -> list[Method]:
-    """Methods that are ranked in a column: ours among published averages only if they are over the same scenes."""
+    """Methods ranked in a column; ours rank among published averages only if the scenes are the same."""
     of_paper = published.table1().scenes(dataset)
     compares = not of_paper or sorted(of_paper) == sorted(_own_names(runs, dataset))
     return [method for method in rows if method.learning == "none" and (compares or not method.is_here)]

@@ -1,4 +1,4 @@
-"""The compared methods side by side: what is computed here, what is published, and how the two compare."""
+"""Table of the compared methods: figures computed here, published ones, and their ratios."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _TOOK = {"seconds": Column("time / s"), "peak_memory_mb": Column("peak memory / 
 
 
 def computed_methods_table(runs: Runs) -> Report:
-    """A section per scene, a row per variant: scores, the published ones, their ratios, time and memory."""
+    """A section per scene with a row per variant: scores, published ones, ratios, time and memory."""
     heads = score_heads(runs.plan.bad_thresholds)
     bad = {name: Column(heads[name], Kind.OURS) for name in ("badpix007", *own_bad_pixel(runs.plan.bad_thresholds))}
     columns = _HEADS | bad | _REGIONS | _TOOK

@@ -1,4 +1,4 @@
-"""Scores at and away from depth discontinuities: where a map's error lies, and to which side its edges are shifted."""
+"""Table of scores beside depth discontinuities and away from them, and of the shift of a map's edges."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _COLUMNS = {
 
 
 def edge_table(runs: Runs) -> Report:
-    """Scores beside depth discontinuities and away from them, of the compared variants and other methods' maps."""
+    """Scores beside depth discontinuities and away from them, of the compared variants and external methods' maps."""
     records: list[Record] = []
     lines = []
     for dataset, scene in runs.scored_pairs():
@@ -63,7 +63,7 @@ def edge_budget(whole: Scores, there: Scores) -> dict[str, float]:
         Keys of the table's columns to figures; NaN over no pixels.
     """
     finite = {name: scores["pixels"] - scores["non_finite"] for name, scores in (("whole", whole), ("there", there))}
-    # a score over no pixels is none, and adds nothing
+    # a score over no pixels adds nothing
     squared_whole = finite["whole"] * whole["mse100"] if finite["whole"] else 0.0
     squared_there = finite["there"] * there["mse100"] if finite["there"] else 0.0
     bad_whole = whole["pixels"] * whole["badpix007"] if whole["pixels"] else 0.0
@@ -80,5 +80,5 @@ def edge_budget(whole: Scores, there: Scores) -> dict[str, float]:
 
 
 def _ratio(part: float, of: float) -> float:
-    # rounding must not make a mean of squares negative
+    # rounding may make a mean of squares negative
     return max(part, 0.0) / of if of else math.nan

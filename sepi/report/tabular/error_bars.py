@@ -1,4 +1,4 @@
-"""Table of the error bars: coverage and width of the intervals, and whether doubt lies where errors are.
+"""Table of the error bars: coverage and width of the intervals, and ranking of errors by the confidence.
 
 :mod:`sepi.scoring.error_bars` computes the scores.
 """
@@ -21,7 +21,7 @@ from sepi.scoring.error_bars import ERROR_BAR_SCORES, Reliability
 from sepi.scoring.scores import WHOLE_MAP
 from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 
-# widths are hundredths of a pixel, and less
+# widths are hundredths of a pixel or less
 _DECIMALS = {"width": 4}
 _COLUMNS = {
     "scene": Column("scene", Kind.TEXT),
@@ -31,13 +31,13 @@ _COLUMNS = {
 
 
 def variants_with_bars(runs: Runs) -> list[str]:
-    """Which of ``best``, ``fast`` and ``paper`` have error bars; all of their final maps have, or none."""
+    """Those of ``best``, ``fast`` and ``paper`` whose final maps have error bars."""
     named = [name for name in (BEST_VARIANT, FAST_VARIANT, MAIN_VARIANT) if name in runs.plan.listed]
     return [name for name in named if any("width" in whole(runs, pair, name) for pair in runs.scored_pairs())]
 
 
 def whole(runs: Runs, pair: tuple[str, str], variant: str, region: str = WHOLE_MAP) -> Scores:
-    """Scores of a final map by the paper's protocol; empty where the scene does not have the region."""
+    """Scores of a final map by the paper's protocol; empty if the scene lacks the region."""
     return runs.scores(*pair, variant)["paper"].get(region, {})
 
 
@@ -63,7 +63,7 @@ def error_bar_table(runs: Runs) -> Report:
 
 
 def _records(runs: Runs, pairs: Sequence[tuple[str, str]], variants: Sequence[str]) -> list[Record]:
-    """A row of the CSV file for each scene, variant and region; then those of all scenes of a level of noise."""
+    """Rows of the CSV file: each scene, variant and region, then all scenes of each level of noise together."""
     records: list[Record] = []
     levels: dict[str, list[tuple[str, str]]] = {}
     for pair in pairs:
@@ -85,12 +85,12 @@ def _records(runs: Runs, pairs: Sequence[tuple[str, str]], variants: Sequence[st
 
 
 def _together(dataset: str, scene: str) -> str:
-    """What the scenes are called that a scene is pooled with."""
+    """Name of the scenes with which a scene is pooled."""
     return f"all scenes, noise {rendered_scene(scene).noise}" if dataset == DATASET else "all scenes"
 
 
 def _pooled(scores: Sequence[Scores]) -> dict[str, Cell]:
-    """Means over the pixels of several scenes; none of the gap, which is one of all pixels together."""
+    """Means over the pixels of several scenes, without the gap, which is not a mean."""
     there = [one for one in scores if one["pixels"]]
     weights = [one["pixels"] for one in there]
     found: dict[str, Cell] = {"pixels": int(sum(weights))}
@@ -101,7 +101,7 @@ def _pooled(scores: Sequence[Scores]) -> dict[str, Cell]:
 
 
 def pooled_reliability(runs: Runs, variant: str, pairs: Sequence[tuple[str, str]]) -> Reliability:
-    """The reliability of a variant's confidence over the pixels of several scenes together."""
+    """Reliability of a variant's confidence over the pixels of several scenes together."""
     every = [runs.reliability(*pair, variant) for pair in pairs]
     pixels = np.sum([one.pixels for one in every], axis=0)
     there = np.where(pixels > 0, pixels, np.nan)
@@ -112,7 +112,7 @@ def pooled_reliability(runs: Runs, variant: str, pairs: Sequence[tuple[str, str]
 
 
 def _scene_lines(records: Sequence[Record], variants: Sequence[str]) -> list[Line]:
-    """Whole maps, the variants of a scene one below the other."""
+    """Lines of whole maps, with the variants of a scene one below the other."""
     shown = [record for record in records if record["region"] == WHOLE_MAP]
     rows: dict[str, list[Record]] = {}
     for record in shown:
@@ -121,7 +121,7 @@ def _scene_lines(records: Sequence[Record], variants: Sequence[str]) -> list[Lin
 
 
 def _region_section(records: Sequence[Record], variant: str) -> Section:
-    """A row for each scene, coverage and width of each region side by side."""
+    """A section with a row for each scene: coverage and width of each region."""
     own = [record for record in records if record["variant"] == variant]
     regions = dict.fromkeys(str(record["region"]) for record in own)
     pairs = {f"{region} {name}": (region, name) for region in regions for name in ("coverage", "width")}

@@ -1,4 +1,4 @@
-"""Tables as LaTeX with the package booktabs, one table environment per section, to be read with ``\\input``."""
+"""Tables as LaTeX with the package booktabs, one table environment per section, for ``\\input``."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 from sepi.report.tabular.layout import BEST, SECOND, Column, Entry, Kind, Line, Report, Section
 
-# more columns than fit upright on a page
+# largest number of columns on an upright page
 _MOST_UPRIGHT = 8
 
 _ESCAPES = str.maketrans(
     {
         **{character: f"\\{character}" for character in "{}$&#%_"},
-        # after the end of a row, these would belong to the command that ends it
+        # after the end of a row, LaTeX would read these as its options
         **{character: f"{{{character}}}" for character in "[]*"},
         "\\": r"\textbackslash{}",
         "~": r"\textasciitilde{}",
@@ -37,7 +37,7 @@ def as_latex(report: Report, name: str) -> str:
     report : Report
         The table.
     name : str
-        Of its file; the labels are ``tab:NAME``, followed by the heading of the section where there are several.
+        Name of the file; labels are ``tab:NAME``, followed by the section's heading if there are several.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def as_latex(report: Report, name: str) -> str:
 
 
 def escaped(text: str) -> str:
-    """Text that LaTeX sets as it is, in one line."""
+    """Text escaped for LaTeX, in one line."""
     safe = " ".join(text.splitlines()).translate(_ESCAPES)
     # two hyphens would become a dash
     return re.sub(r"-(?=-)", "-{}", safe)
@@ -82,7 +82,7 @@ def _environment(report: Report, section: Section, label: str) -> str:
 
 
 def _body(lines: Sequence[Line]) -> str:
-    """The rows; a rule stands before the first average."""
+    """The rows, with a rule before the first average."""
     text, before = "", "average"
     for line in lines:
         kind = line.kind.split()[0] if line.kind else ""
@@ -109,13 +109,13 @@ def _cell(entry: Entry) -> str:
 
 
 def _with_code(text: str) -> str:
-    """Names between backticks in typewriter type."""
+    """Text escaped for LaTeX, with names between backticks in typewriter type."""
     parts = re.split(r"`([^`]*)`", text)
     return "".join(rf"\texttt{{{escaped(part)}}}" if index % 2 else escaped(part) for index, part in enumerate(parts))
 
 
 def _labels(name: str, sections: Sequence[Section]) -> list[str]:
-    """A label for each section, made of letters, digits and hyphens after the table's name; no two are the same."""
+    """A unique label for each section: the table's name, then letters, digits and hyphens."""
     if len(sections) == 1:
         return [f"tab:{name}"]
     labels: list[str] = []

@@ -1,4 +1,4 @@
-"""What a table of the report is, as CSV and JSON; :mod:`.markdown` and :mod:`.latex` write the others."""
+"""Data model of the report's tables, and their CSV and JSON; :mod:`.markdown` and :mod:`.latex` write the others."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from typing import Any
 from sepi.io.files import atomic_path
 
 Cell = str | float | int | None
-"""Text (published figures too, as printed), a figure of ours, a count, or nothing (not available)."""
+"""Text (also a published figure as printed), a figure of ours, a count, or None (not available)."""
 
 Record = Mapping[str, Cell]
-"""A row: key to cell. A CSV file has the keys that are its heads, a page those that are its columns."""
+"""A row, key to cell. CSV files have the keys in their heads, pages those of their columns."""
 
 BEST, SECOND = "best", "second"
 """Marks of cells."""
@@ -27,23 +27,23 @@ _NOTHING: Mapping[str, Any] = {}
 
 
 class Kind(StrEnum):
-    """What a cell or column holds."""
+    """Kind of a cell or column."""
 
     TEXT = "text"
     FIGURE = "figure"
-    """A figure that nothing is compared with."""
+    """A figure without comparison."""
     OURS = "ours"
     PUBLISHED = "published"
-    """As printed by the paper."""
+    """A figure as printed in the paper."""
     EXTERNAL = "external"
-    """Of another method's map, scored here."""
+    """A figure of an external method's map, scored here."""
     RATIO = "ratio"
-    """Ours divided by a published one, or the reverse."""
+    """Our figure divided by a published one, or the reverse."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """Head and kind of a page's column, and how many decimals its figures have."""
+    """Head, kind and number of decimals of a page's column."""
 
     head: str
     kind: Kind = Kind.FIGURE
@@ -52,7 +52,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Entry:
-    """A cell of a page: its text, the figure to sort it by if it has one, its kind, and its mark if it has one."""
+    """A cell of a page: text, figure to sort by if any, kind, and mark if any."""
 
     text: str
     value: float | None
@@ -71,7 +71,7 @@ class Line:
     kind : str
         ``"scene"``, ``"average"``, ``"average printed"``, or empty.
     available : bool
-        False where all figures are published ones.
+        False if all figures are published ones.
     """
 
     cells: Sequence[Entry]
@@ -81,7 +81,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page: lines under a header, and under a heading where it is not empty."""
+    """A part of a page: lines under a header, and a heading that may be empty."""
 
     heading: str
     columns: Sequence[Column]
@@ -90,12 +90,12 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """One table of the report: machine-readable, and as a page to read.
+    """One table of the report, as records and as a page.
 
     Attributes
     ----------
     title, caption : str
-        For the page; the caption names the protocol. Words between backticks are names from the program.
+        For the page; the caption names the protocol. Words between backticks are code.
     heads : sequence of str
         Header of the CSV file.
     records : sequence of Record
@@ -103,7 +103,7 @@ class Report:
     sections : sequence of Section
         For the Markdown and LaTeX files and the web page.
     marked : str
-        Sentence that says what is marked as best and second best; empty where nothing is.
+        Sentence that explains the marks of best and second best; empty without marks.
     """
 
     title: str
@@ -115,13 +115,13 @@ class Report:
 
 
 def entry(cell: Cell, kind: Kind = Kind.FIGURE, mark: str | None = None, note: str = "", decimals: int = 2) -> Entry:
-    """A cell of a page; what must be known of its figure, the note, stands after it."""
+    """A cell of a page, with a note after its figure."""
     text = f"{short(cell, decimals)} ({note})" if note else short(cell, decimals)
     return Entry(text, _value(cell, kind), kind, mark)
 
 
 def section(heading: str, columns: Mapping[str, Column], lines: Iterable[Line]) -> Section:
-    """A part of a page; columns by their keys, as :func:`line` takes them."""
+    """A section of a page; ``columns`` by their keys, as for :func:`line`."""
     return Section(heading, [*columns.values()], [*lines])
 
 
@@ -133,9 +133,9 @@ def line(
     marks: Mapping[str, str | None] = _NOTHING,
     notes: Mapping[str, str] = _NOTHING,
 ) -> Line:
-    """A row of a page: what a record has for the keys of the columns, with marks and notes by these keys.
+    """A row of a page from a record, with marks and notes by the columns' keys.
 
-    Cells that are no words are of the kind ``figures`` where it is given, else of their columns'.
+    Figures have the kind ``figures`` if given, else that of their columns.
     """
     cells = []
     for key, column in columns.items():
@@ -151,22 +151,22 @@ def printed(value: float | None) -> str | None:
 
 
 def short(cell: Cell, decimals: int = 2) -> str:
-    """A cell as a page shows it: some decimals, empty where not available, ``n/a`` for a score over no pixels."""
+    """Text of a cell on a page: with decimals, empty if not available, ``n/a`` for a score over no pixels."""
     return _text(cell, decimals=decimals, no_pixels="n/a")
 
 
 def ranks(figures: Record) -> dict[str, str | None]:
-    """Mark the least and the second least of some errors, equal ones alike.
+    """Marks of the least and the second least error; equal errors have equal marks.
 
     Parameters
     ----------
     figures : Record
-        None and NaN take no part. Compared as printed, with two decimals: what looks equal is equal.
+        None and NaN do not count. Figures are compared as printed, with two decimals.
 
     Returns
     -------
     dict
-        Key to :data:`BEST`, :data:`SECOND` or None; no mark where there is nothing to compare.
+        Key to :data:`BEST`, :data:`SECOND` or None; all None if there is nothing to compare.
     """
     shown = {key: float(short(figure)) for key, figure in figures.items() if short(figure) not in ("", "n/a")}
     marks = dict(zip(sorted(set(shown.values())), (BEST, SECOND), strict=False)) if len(shown) > 1 else {}
@@ -180,7 +180,7 @@ def write(path: Path, text: str) -> None:
 
 
 def as_csv(report: Report) -> str:
-    """CSV with four decimals; an empty cell is not available, ``nan`` is a score over no pixels."""
+    """CSV with four decimals; an empty cell means not available, ``nan`` a score over no pixels."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(report.heads)
@@ -190,7 +190,7 @@ def as_csv(report: Report) -> str:
 
 
 def as_json(report: Report) -> dict[str, Any]:
-    """A page for a program that shows it; texts as in Markdown, but for marks and backslashes."""
+    """The page as JSON; texts are as in Markdown, without marks and backslashes."""
     return {
         "title": report.title,
         "caption": report.caption + (f" {report.marked}." if report.marked else ""),
@@ -205,7 +205,7 @@ def _text(cell: Cell, *, decimals: int, no_pixels: str) -> str:
 
 
 def _value(cell: Cell, kind: Kind) -> float | None:
-    """The figure; of several in a cell the first. None for words, nothing, and a score over no pixels."""
+    """The first figure of a cell; None for words, an empty cell, and a score over no pixels."""
     if isinstance(cell, str):
         first = re.match(r"-?\d+(\.\d+)?(?=/|$)", cell) if kind in (Kind.OURS, Kind.PUBLISHED) else None
         return float(first[0]) if first else None

@@ -1,4 +1,4 @@
-"""Tables as Markdown, their columns aligned."""
+"""Tables as Markdown with aligned columns."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import re
 
 from sepi.report.tabular.layout import BEST, SECOND, Entry, Kind, Report, Section
 
-# characters that Markdown reads as markup in the midst of a line; an underscore within a word is none
+# characters that are markup in the middle of a line; an underscore within a word is not
 _MARKUP = re.compile(r"[\\`*\[\]<>&|~]|(?<![^\W_])_|_(?![^\W_])")
 _SIGNS = {BEST: "**", SECOND: "*", None: ""}
 
 
 def as_markdown(report: Report) -> str:
-    """A page with two decimals; an empty cell is not available, ``n/a`` is a score over no pixels."""
+    """Markdown with two decimals; an empty cell means not available, ``n/a`` a score over no pixels."""
     marked = f" {report.marked} (**bold**, *italic*)." if report.marked else ""
     parts = [f"# {_plain(report.title)}", _with_code(report.caption) + marked]
     for section in report.sections:
@@ -41,12 +41,12 @@ def _cell(entry: Entry) -> str:
 
 
 def _plain(text: str) -> str:
-    """Text that Markdown shows as it is, in one line."""
+    """Text escaped for Markdown, in one line."""
     return _escaped(" ".join(text.splitlines()))
 
 
 def _with_code(text: str) -> str:
-    """Text that Markdown shows as it is, but for names between backticks."""
+    """Text escaped for Markdown, with names between backticks as code."""
     parts = re.split(r"(`[^`]*`)", text)
     return "".join(part if index % 2 else _escaped(part) for index, part in enumerate(parts))
 

@@ -1,4 +1,4 @@
-"""What tables 1 to 4 compare: this project's variants, the published methods, and other methods' maps."""
+"""Methods of tables 1 to 4: this project's variants, the published methods, and external methods' maps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sepi.report.tabular.layout import Cell, Kind, printed
 from sepi.scoring.scores import PROTOCOLS, WHOLE_MAP
 
 SCENE, AVERAGE, PRINTED_AVERAGE = "scene", "average", "average printed"
-"""What a row is, as the CSV files say it."""
+"""Kinds of rows in the CSV files."""
 
 PROTOCOL_NOTE = f"Protocol: paper (border {PROTOCOLS['paper']}, the whole map)."
 LEARNED_NOTE = "* learned, supervised; ** learned, unsupervised."
@@ -31,18 +31,18 @@ REGIONS_NOTE = (
 
 @dataclass(frozen=True)
 class Method:
-    """A method, or how it compares with the paper's.
+    """A method in a table, or a ratio to the paper's figures.
 
     Attributes
     ----------
     name : str
-        Of the variant or method.
+        Name of the variant or method.
     key, head : str
-        What the CSV files and the pages call it.
+        Its names in the CSV files and on the pages.
     kind : Kind
         ``OURS``, ``RATIO`` (of ours to the paper's), ``PUBLISHED`` or ``EXTERNAL``.
     learning : str
-        As :class:`sepi.report.published.Method` has it; empty where it is not known or not the question.
+        As in :class:`sepi.report.published.Method`; empty if unknown or not applicable.
     """
 
     name: str
@@ -57,12 +57,12 @@ class Method:
         return self.kind in (Kind.OURS, Kind.EXTERNAL)
 
     def shown(self, figure: Cell) -> Cell:
-        """A figure of this method as the tables have it."""
+        """A figure of this method as in the tables."""
         return printed(figure) if self.kind == Kind.PUBLISHED and isinstance(figure, float) else figure
 
 
 def compared_methods(plan: Plan) -> list[Method]:
-    """Every method, in the order of the tables: ours, their ratios to the paper's, published, external."""
+    """All methods in the order of the tables: ours, their ratios to published figures, published, external."""
     suffixes = {variant: "" if variant == MAIN_VARIANT else f"_{variant}" for variant in plan.compared}
     signs = {"none": "", "supervised": "*", "unsupervised": "**"}
     methods = [
@@ -76,7 +76,7 @@ def compared_methods(plan: Plan) -> list[Method]:
     taken = {"dataset", "scene", "row", "method", "learning", *(method.key for method in methods)}
     for name in plan.external:
         key = name
-        # one with the name of a column that is there anyway is told apart
+        # a name that a column has already gets a suffix
         while key in taken:
             key += " (external)"
         taken.add(key)
@@ -85,34 +85,34 @@ def compared_methods(plan: Plan) -> list[Method]:
 
 
 def unknown_note(runs: Runs, dataset: str, scene: str, method: str) -> str:
-    """How much of an external map is not finite, which its mean squared error does not show; empty where all is."""
+    """Note on the share of an external map that is not finite, which its MSE leaves out; empty if all is finite."""
     scores = runs.external_scores(dataset, scene, method)
     whole = scores["paper"][WHOLE_MAP] if scores else {"pixels": 0}
     return f"{100 * whole['non_finite'] / whole['pixels']:.0f} % unknown" if whole.get("non_finite") else ""
 
 
 def has_column(runs: Runs, dataset: str, method: str) -> bool:
-    """Whether an external method belongs on a dataset's page.
+    """Whether an external method has a column on a dataset's page.
 
-    One that has files, but none for this dataset, does not; one without any file does, or nobody would see that.
+    A method with files for other datasets only has none. A method without any file has one, to show the problem.
     """
     with_file = {name for name, scene in runs.plan.pairs if runs.external_problem(name, scene, method) != NO_FILE}
     return dataset in with_file or (not with_file and dataset in runs.plan.scenes)
 
 
 def own_names(plan: Plan) -> str:
-    """The variants whose figures are compared, for a caption."""
+    """Names of the compared variants, for a caption."""
     *names, last = (f"`{variant}`" for variant in plan.compared)
     return f"{', '.join(names)} and {last}" if names else last
 
 
 def datasets_of(plan: Plan) -> list[str]:
-    """Datasets available, then the paper's others."""
+    """Available datasets, then the paper's others."""
     return list(dict.fromkeys([*plan.scenes, *published.DATASETS]))
 
 
 def dataset_title(dataset: str) -> str:
-    """Name of a dataset, with the paper's where it has one."""
+    """Title of a dataset, with the paper's name if it has one."""
     return f"{dataset}: {published.DATASETS[dataset]}" if dataset in published.DATASETS else dataset
 
 
@@ -127,25 +127,25 @@ def printed_label(dataset: str) -> str:
 
 
 class Mean(NamedTuple):
-    """A mean, and how many figures it is of."""
+    """A mean, and the number of its figures."""
 
     value: Cell
     scenes: int
 
 
 def mean(figures: Iterable[Cell]) -> Mean:
-    """Mean of the scores that exist; NaN where none does (a scene may have no such region)."""
+    """Mean of the scores that exist; NaN without any, since scenes may lack a region."""
     known = [figure for figure in figures if isinstance(figure, float) and not math.isnan(figure)]
     return Mean(sum(known) / len(known) if known else math.nan, len(known))
 
 
 def average(runs: Runs, dataset: str, scenes: Iterable[str], score: str, region: str, variant: str) -> Mean:
-    """Mean of a score over some scenes, of those that have such a region."""
+    """Mean of a score over those of the scenes that have the region."""
     return mean(runs.final(dataset, scene, score, region, variant) for scene in scenes)
 
 
 def count_note(counts: Sequence[int], scenes: int) -> str:
-    """Over how many scenes the figures of a cell are, where those of one are over fewer than its row says."""
+    """Note on the numbers of scenes in a cell's figures, if one is lower than in its row."""
     if all(count in (0, scenes) for count in counts):
         return ""
     return f"{'/'.join(map(str, counts))} scene{'s' * (list(counts) != [1])}"

@@ -1,4 +1,4 @@
-"""Tables of the rendered scenes: scores of each method by property that cameras meet, and by scene."""
+"""Tables of the rendered scenes: scores of each method by property (such as gloss or noise) and by scene."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ PROPERTIES = {
     "alone": "alone",
     WHOLE_MAP: "whole",
 }
-"""Region to what the tables call it, in their order."""
+"""Region to its name in the tables, in their order."""
 
 _Figure = Callable[[Method, str, str, int], Cell]
-"""Of a method, for a column's key, a level of noise and a seed."""
+"""Figure of a method, for a column's key, a level of noise and a seed."""
 
 
 def property_table(runs: Runs, score: str) -> Report:
-    """A section per level of noise, a row per method, a column per property; the pixels of all scenes together."""
+    """A section per level of noise, a row per method, a column per property, over the pixels of all scenes."""
     pixels = _pixels(runs)
     shown = {region: title for region, title in PROPERTIES.items() if pixels.get(region)}
 
@@ -114,7 +114,7 @@ def _report(runs: Runs, title: str, caption: str, heads: Mapping[str, str], figu
 
 
 def split_note(runs: Runs) -> str:
-    """Which scenes parameters may be chosen on."""
+    """Sentence on the scenes on which parameters may be chosen."""
     worlds = dict.fromkeys(scene.world for scene in _scenes(runs))
     parts = (("For choosing parameters", True), ("held out from that", False))
     named = [(title, [world for world in worlds if (world in runs.plan.choosing) == chosen]) for title, chosen in parts]
@@ -126,13 +126,13 @@ def _scenes(runs: Runs) -> list[RenderedScene]:
 
 
 def _scores(runs: Runs, method: Method, scene: str) -> Mapping[str, Scores]:
-    """Region to scores of a method's final map; empty where there is none."""
+    """Region to scores of a method's final map; empty without a map."""
     of = runs.scores if method.kind == Kind.OURS else runs.external_scores
     return of(DATASET, scene, method.name).get("paper", {})
 
 
 def _pixels(runs: Runs) -> dict[str, float]:
-    """How many pixels each region has in all scenes, one level of noise alone."""
+    """Number of pixels of each region in all scenes of one level of noise."""
     found: dict[str, float] = {}
     first = _scenes(runs)[0]
     for scene in _scenes(runs):
@@ -143,14 +143,14 @@ def _pixels(runs: Runs) -> dict[str, float]:
 
 
 def _pooled(scores: Sequence[Scores], score: str) -> float:
-    """A mean over the pixels of several maps; the squared error is over finite estimates."""
+    """Mean of a score over the pixels of several maps; the squared error counts finite estimates only."""
     weights = [one["pixels"] - (one["non_finite"] if score == "mse100" else 0) for one in scores]
     known = [(one[score], weight) for one, weight in zip(scores, weights, strict=True) if weight]
     return sum(value * weight for value, weight in known) / sum(weights) if known else math.nan
 
 
 def _over_seeds(figures: Sequence[Cell]) -> tuple[Cell, float | None]:
-    """Mean and standard deviation, which one seed has none of; where a figure is missing, what is said in its place."""
+    """Mean and standard deviation over seeds (None for one seed); a text in place of a missing figure."""
     known = [figure for figure in figures if isinstance(figure, float)]
     if len(known) < len(figures):
         return next((figure for figure in figures if not isinstance(figure, float)), None), None

@@ -1,6 +1,6 @@
-"""Tables of each stage of each variant: scores after it, its seconds and peak memory.
+"""Tables of each stage of each variant: scores, seconds and peak memory.
 
-Other methods' maps stand among the scores as stage ``external``.
+External methods' maps are among the scores as stage ``external``.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from sepi.scoring.scores import COUNTS, PROTOCOLS, REGIONS, SCORES, WHOLE_MAP, s
 
 _PARTS = [region for region in REGIONS if region != WHOLE_MAP]
 
-# height and width of the views and number of view rows and columns that the published seconds are for
+# height and width of the views, and rows and columns of views, for which the seconds were published
 _PUBLISHED_SIZE = ([512, 512], [9, 9])
 
 
 def stage_table(runs: Runs) -> Report:
-    """Every score after every stage of every variant, and of other methods' maps, by both protocols."""
+    """All scores after each stage of each variant, and of external methods' maps, by both protocols."""
     heads = score_heads(runs.plan.bad_thresholds)
     columns = {
         "variant": Column("variant", Kind.TEXT),
@@ -55,7 +55,7 @@ def stage_table(runs: Runs) -> Report:
 
 
 def _score_records(runs: Runs, dataset: str, scene: str, protocol: str) -> list[Record]:
-    """A record for each map and region, with the page's columns too; other methods' maps have no choice."""
+    """A record for each map and region, with the page's columns; external methods' maps have no choice."""
     maps = [
         (variant, stage, choice, runs.scores(dataset, scene, variant, stage))
         for variant in runs.plan.listed
@@ -77,7 +77,7 @@ def _score_records(runs: Runs, dataset: str, scene: str, protocol: str) -> list[
 
 
 def runtime_table(runs: Runs) -> Report:
-    """Seconds and peak memory of every stage of every variant, beside the paper's seconds."""
+    """Seconds and peak memory of each stage of each variant, beside the paper's seconds."""
     steps = [*runs.plan.stages, "total"]
     columns = {
         "variant": Column("variant", Kind.TEXT),
@@ -93,7 +93,7 @@ def runtime_table(runs: Runs) -> Report:
         for variant in runs.plan.listed:
             found = _time_records(runs, dataset, scene, variant)
             records += found
-            # the total has the name, the ratio and the peak of the line
+            # name, ratio and peak of a line are those of its total
             lines.append(line(columns, {**found[-1], **{str(row["stage"]): row.get("seconds") for row in found}}))
         lines.append(line(columns, paper, Kind.PUBLISHED))
         sections.append(section(f"{dataset}/{scene}", columns, lines))
@@ -113,9 +113,9 @@ def runtime_table(runs: Runs) -> Report:
 
 
 def _time_records(runs: Runs, dataset: str, scene: str, variant: str) -> list[Record]:
-    """Every stage, then the total."""
+    """A record for each stage, then one for the total."""
     choices = runs.plan.variants[variant]
-    # the published seconds are those of the paper's method
+    # published seconds belong to the paper's method only
     paper = published.runtime() if variant == MAIN_VARIANT else {}
     light_field = runs.light_field(dataset, scene)
     compares = (light_field["shape"], light_field["grid"]) == _PUBLISHED_SIZE

@@ -1,4 +1,4 @@
-"""A small page about two disparity maps: the report's viewer, and their scores where there is ground truth."""
+"""A page that compares two disparity maps: the report's viewer, and with ground truth their scores."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from sepi.scoring.error_bars import ERROR_BAR_SCORES, ErrorBars
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, SCORES, region_masks, score_regions
 from sepi.stage import StageMaps
 
-# part of the pixels beyond each end of the colour scale, so that a few wrong ones do not use it up
+# share of the pixels beyond each end of the colour scale, so that a few wrong ones do not widen it
 _BEYOND = 0.005
 
 _SHOWN = ("mse100", "q25", "badpix007", "fattening", "thinning", "non_finite")
-# of intervals neither the widest nor the narrowest are best
+# scores without a best value: intervals should be neither wide nor narrow
 _WITH_BARS = ("coverage", "width")
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two maps of one view, and what is known about it.
+    """Two maps of one view, with its light field and ground truth if known.
 
     Attributes
     ----------
@@ -38,11 +38,11 @@ class Comparison:
         Pixels per view step.
     ground_truth : ndarray, shape (H, W), float32, or None
     light_field : LightField or None
-        Gives the reference view and the regions.
+        For the reference view and the regions.
     bars : (StageMaps or None, StageMaps or None)
-        The maps with error bars and confidence, of those that have any.
+        The maps with error bars and confidence, if they have any.
     truth_step : float
-        What the ground truth is a multiple of, pixels per view step; 0 unless it is rounded.
+        Rounding step of the ground truth, pixels per view step; 0: not rounded.
     """
 
     names: tuple[str, str]
@@ -54,7 +54,7 @@ class Comparison:
 
     @cached_property
     def scores(self) -> dict[str, AllScores]:
-        """Of each map, by its name; empty without ground truth."""
+        """Scores of each map by its name; empty without ground truth."""
         if self.ground_truth is None:
             return {}
         masks = None if self.light_field is None else region_masks(self.light_field)
@@ -72,7 +72,7 @@ class Comparison:
 
 
 def comparison_page(found: Comparison) -> str:
-    """The page, HTML."""
+    """The page as HTML."""
     scene = {
         "dataset": found.names[0],
         "scene": found.names[1],
@@ -126,7 +126,7 @@ def _panels(found: Comparison) -> Iterator[Panel]:
 
 
 def _limits(found: Comparison) -> tuple[float, float]:
-    """Ends of the scale of disparity: those of the ground truth, else what nearly all pixels of both maps span."""
+    """Ends of the scale of disparity: those of the ground truth, else of nearly all pixels of both maps."""
     shown = found.maps if found.ground_truth is None else (found.ground_truth,)
     known = np.concatenate([values[np.isfinite(values)] for values in shown])
     if known.size == 0:
@@ -136,7 +136,7 @@ def _limits(found: Comparison) -> tuple[float, float]:
 
 
 def _score_section(found: Comparison) -> dict[str, Any] | None:
-    """A table for the page: a row per protocol and region, each score of both maps, the better one marked."""
+    """A table for the page: for each protocol and region, the scores of both maps, with the better one marked."""
     if not found.scores:
         return None
     heads = SCORES | EDGE_SCORES | ERROR_BAR_SCORES | COUNTS

@@ -1,8 +1,8 @@
-"""Maps as text small enough for a page: whole steps, differences to the row above, deflated, in base64.
+"""Maps as short text for a page: whole steps, differences to the row above, deflated, in base64.
 
-A browser undoes it with what it has: base64, ``DecompressionStream("deflate")``, and a sum down the columns
-(``templates/unpack.js``). Values are whole multiples of a step that the map names, so a page shows exactly the value
-that the map holds, rounded to that step.
+A browser unpacks them with base64, ``DecompressionStream("deflate")``, and a sum down the columns
+(``templates/unpack.js``). Values are whole multiples of the map's step, so a page shows the map's value exactly rounded
+to this step.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-# largest number of levels that two bytes tell apart, one of them being the unknown
+# number of levels of two bytes, without the one for unknown
 _LEVELS = 2**16 - 1
-# largest whole number of steps that is counted exactly
+# largest exact whole number of steps
 _LARGEST = 2**52
 
 
@@ -28,12 +28,12 @@ def packed(values: npt.NDArray[Any], step: float) -> dict[str, Any]:
     values : ndarray, shape (H, W), float or bool
         Values that are not finite are unknown.
     step : float
-        Grows tenfold, or by more such factors, where 65533 steps do not span the values.
+        Step in the values' unit; it grows by factors of ten if 65533 steps do not span the values.
 
     Returns
     -------
     dict
-        ``step``; ``base``, the level of the smallest value; ``data``: base64 of the deflated differences.
+        ``step``; ``base``: level of the smallest value; ``data``: base64 of the deflated differences.
     """
     known = np.isfinite(values)
     exact = np.where(known, values, 0).astype(np.float64)
@@ -45,9 +45,9 @@ def packed(values: npt.NDArray[Any], step: float) -> dict[str, Any]:
     base = round(low * (1 / step))
     # counted from 1, with 0 for unknown
     levels = np.where(known, whole - base + 1, 0).astype(np.uint16)
-    # modulo 2^16, as the sum is
+    # modulo 2^16, like the sum
     change = np.diff(levels, axis=0, prepend=np.zeros_like(levels[:1])).view(np.int16)
-    # signs folded in, 0, -1, 1, -2, ... as 0, 1, 2, 3, ..., so that high bytes are mostly zero
+    # 0, -1, 1, -2, ... as 0, 1, 2, 3, ..., so that high bytes are mostly zero
     folded = ((change << 1) ^ (change >> 15)).view(np.uint16)
     planes = (folded & 255).astype(np.uint8).tobytes() + (folded >> 8).astype(np.uint8).tobytes()
     compressor = zlib.compressobj(6, strategy=zlib.Z_FILTERED)

@@ -1,4 +1,4 @@
-"""Contents of the page beside the tables, from the numbers: headline figures, ablation, times, provenance."""
+"""Contents of the page apart from the tables: headline figures, ablation, times, provenance."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 
 def headline(runs: Runs) -> list[dict[str, Any]]:
-    """Scenes that the paper has too: our figures beside the published ones; then the averages of the others.
+    """Our figures beside the published ones for the paper's scenes, then averages over the other scenes.
 
     Returns
     -------
     list of dict
-        ``scene``; ``published``: MSE x100 and Q25 x100; ``ours``: variant to the same two; ``notes``: variant to over
-        how many scenes they are, where over fewer than the row says.
+        ``scene``; ``published``: MSE x100 and Q25 x100; ``ours``: variant to the same two; ``notes``: variant to the
+        number of scenes, if lower than in the row.
     """
 
     def ours(dataset: str, scenes: Sequence[str]) -> dict[str, Any]:
@@ -59,7 +59,7 @@ def missing_scenes(runs: Runs) -> dict[str, list[str]]:
 
 @dataclass(frozen=True)
 class Bar:
-    """MSE x100 of a variant; None where there is no figure. A note where ours is over fewer scenes than its group's."""
+    """MSE x100 of a variant (None if not available), with a note if ours is over fewer scenes than the group's."""
 
     variant: str
     ours: float | None
@@ -69,14 +69,14 @@ class Bar:
 
 @dataclass(frozen=True)
 class BarGroup:
-    """Bars that are drawn to one scale.
+    """Bars with one scale.
 
     Attributes
     ----------
     dataset, region : str
-        What they are about.
+        Dataset and region of the figures.
     scenes, available : int
-        How many scenes our figures are averages of, and how many there are: not all have every region.
+        Number of scenes in our averages, and number available; not all have each region.
     rows : list of Bar
     """
 
@@ -88,24 +88,24 @@ class BarGroup:
 
     @property
     def over(self) -> str:
-        """Which scenes our figures are averages of; empty where it is the one that there is, or none."""
+        """Text on the scenes in our averages; empty if there is one scene or none."""
         if self.scenes in (0, self.available):
             return f"{self.scenes} scenes" if self.scenes > 1 else ""
         return f"{self.scenes} of {self.available} scenes"
 
     @property
     def figures(self) -> list[float]:
-        """All figures that there are."""
+        """All figures that are available."""
         return [figure for row in self.rows for figure in (row.ours, row.published) if figure is not None]
 
     @property
     def largest(self) -> float:
-        """The figure of the longest bar; 1 where all are zero."""
+        """The largest figure; 1 if all are zero."""
         return max(self.figures) or 1.0
 
 
 def ablation_bars(runs: Runs) -> list[BarGroup]:
-    """Average MSE x100 of every listed variant beside the published one, a group per dataset and region."""
+    """Average MSE x100 of each listed variant beside the published one, a group per dataset and region."""
     groups = []
     for dataset in datasets_of(runs.plan):
         scenes = runs.scored(dataset)
@@ -123,7 +123,7 @@ def ablation_bars(runs: Runs) -> list[BarGroup]:
 
 
 def part_bars(parts: Runs) -> list[BarGroup]:
-    """MSE x100 of the best variant and of those with a part of it switched off, a group per scene."""
+    """MSE x100 of the variants in the ablation of ``best``, a group per scene."""
     names = parts.plan.parts
     pairs = [pair for pair in parts.plan.pairs if names and parts.scores(*pair, names[0])]
     return [
@@ -140,7 +140,7 @@ def part_bars(parts: Runs) -> list[BarGroup]:
 
 @dataclass(frozen=True)
 class StageTimes:
-    """What every stage of a variant took on a scene: seconds and peak memory in MB, by stage."""
+    """Seconds and peak memory in MB of a variant on a scene, by stage."""
 
     scene: str
     variant: str
@@ -159,7 +159,7 @@ class StageTimes:
 
 
 def stage_times(runs: Runs) -> list[StageTimes]:
-    """What every stage of the compared variants took, per scene."""
+    """Seconds and memory of the compared variants' stages, per scene."""
     rows = []
     for dataset, scene in runs.plan.pairs:
         for variant in runs.plan.compared:
@@ -176,7 +176,7 @@ def stage_times(runs: Runs) -> list[StageTimes]:
 
 
 def total_seconds(*reports: Numbers) -> float:
-    """Seconds of all stage processes in some numbers, each once."""
+    """Total seconds of all stages in these numbers, each counted once."""
     seconds = {
         (scene["dataset"], scene["scene"], key): stage["seconds"]
         for numbers in reports
@@ -187,7 +187,7 @@ def total_seconds(*reports: Numbers) -> float:
 
 
 def parameter_rows(numbers: Numbers) -> list[tuple[str, list[tuple[str, Any]]]]:
-    """Stage and choice, and its parameters; more than once where scenes were made with different ones."""
+    """Stage and choice with its parameters; repeated if scenes have different ones."""
     return [
         (
             f"{stage}: {choice}",
@@ -200,13 +200,13 @@ def parameter_rows(numbers: Numbers) -> list[tuple[str, list[tuple[str, Any]]]]:
 
 
 def shown_variants(runs: Runs, parts: Numbers | None) -> dict[str, dict[str, str]]:
-    """Variants that the page has figures of, and their choice for each stage."""
+    """Variants with figures on the page, and their choices of stages."""
     names = [*runs.plan.listed, *(runs.plan.parts if parts is not None else ())]
     return {name: dict(runs.plan.variants[name]) for name in dict.fromkeys(names)}
 
 
 def first_scene(runs: Runs) -> str:
-    """The scene that is shown first: one that the paper has, else the last, the built-in ones being ordered so."""
+    """The scene to show first: one of the paper's, else the last one, by the order of built-in scenes."""
     known = [pair for pair in runs.plan.pairs if published.paper_scene(*pair) is not None]
     return "/".join(known[0] if known else runs.plan.pairs[-1])
 

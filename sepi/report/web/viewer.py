@@ -1,6 +1,6 @@
-"""Data of a page's viewer: panels that refer to arrays, and the arrays, each packed once.
+"""Data of a page's viewer: arrays, each packed once, and panels that refer to them.
 
-An error is a map minus the ground truth, and a page takes that difference itself. ``templates/viewer.js`` draws them.
+``templates/viewer.js`` draws the panels, and computes errors as map minus ground truth.
 """
 
 from __future__ import annotations
@@ -27,39 +27,39 @@ STEPS = (
     (0.001, 0.05, 0.05),
     (0.01, 0.2, 0.2),
 )
-"""Steps of precise maps, of confidences and of other maps, from the finest; a page has the first of them that
-keep a scene within its share."""
+"""Steps of precise maps, confidences and other maps, finest first; the first steps that keep a scene within its share
+are used."""
 
 PRECISE, CONFIDENCE, OTHER, MASK, LOGARITHM = range(5)
-"""What an array is held for: its place in a row of :data:`STEPS`. A mask has steps of 1, a logarithm those of 12 %."""
+"""Role of an array, its place in a row of :data:`STEPS`; masks have steps of 1, logarithms of 12 %."""
 
 _FIXED = (1.0, 0.05)
 
-# characters for each pixel of an array, on average: ten scenes of 512x512 and the page round them stay below 20 MB; a
-# small scene may take as much as one of 512x512
+# mean number of characters per pixel of an array, so that a page with ten scenes of 512x512 stays below 20 MB; a small
+# scene may take as much as one of 512x512
 _SHARE = 0.255
 _LEAST_PIXELS = 2**18
 
-# larger pictures are thinned out, so that a browser can hold all their maps
+# of larger pictures, only some rows and columns are kept, so that a browser can hold all their maps
 _MOST_PIXELS = 2**20
 
-# of the reference view
+# quality of the reference view's picture
 _WEBP = [cv2.IMWRITE_WEBP_QUALITY, 90]
 
 
 class _Arrays:
-    """Arrays by their content, thinned out, with what each is held for."""
+    """Arrays, each once, with every ``stride``-th row and column, and their roles."""
 
     def __init__(self, stride: int) -> None:
         self.stride = stride
         self.held: dict[str, tuple[npt.NDArray[Any], int]] = {}
 
     def thinned(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """The rows and columns of an array that are held."""
+        """The rows and columns of an array that are kept."""
         return np.ascontiguousarray(values[:: self.stride, :: self.stride])
 
     def number(self, thinned: npt.NDArray[Any], role: int) -> int:
-        """Hold an array; returns the number that panels call it by. Equal maps are one, as fine as any needs it."""
+        """Number of an array, added unless an equal one is there; the finest of several roles counts."""
         values = thinned if role == MASK else thinned.astype(np.float32)
         key = values.dtype.name + hashlib.sha256(values.tobytes()).hexdigest()
         _, before = self.held.get(key, (None, role))
@@ -67,8 +67,8 @@ class _Arrays:
         return list(self.held).index(key)
 
     def packed(self, pixels: int) -> list[dict[str, Any]]:
-        """All arrays, in the finest steps that keep them within their shares of characters, or the coarsest."""
-        # error bars have no share: a page does not grow by them, other maps are a little coarser where it is full
+        """All arrays, in the finest steps that keep them within their share of characters, or the coarsest."""
+        # error bars have no share of their own, so other maps of a full page get slightly coarser
         budget = _SHARE * pixels * sum(role != LOGARITHM for _, role in self.held.values())
         for steps in STEPS:
             found = [packed(values, (*steps, *_FIXED)[role]) for values, role in self.held.values()]
@@ -85,11 +85,11 @@ def viewer_json(
     Parameters
     ----------
     panels : sequence of Panel
-        Of maps of one size; one of them at least has values.
+        Panels of maps of one size; at least one has values.
     limits : (float, float)
         Ends of the scale of disparity, pixels per view step.
     light_field : LightField, optional
-        Gives the reference view, and the camera for a cloud in metres.
+        For the reference view, and the camera of a point cloud in metres.
     """
     full_height, full_width = next(panel.values.shape for panel in panels if panel.values is not None)
     stride = max(1, math.ceil(math.sqrt(full_height * full_width / _MOST_PIXELS)))
@@ -112,7 +112,7 @@ def viewer_json(
 
 
 def _entry(panel: Panel, arrays: _Arrays) -> dict[str, Any]:
-    """A panel with the numbers of its arrays, without what it does not have."""
+    """A panel with the numbers of its arrays, without empty fields."""
     entry: dict[str, Any] = {"key": panel.key, "title": panel.title, "group": panel.group, "kind": panel.kind}
     texts = {"note": panel.note, "ends": panel.ends, "no_interval": panel.no_interval}
     entry |= {name: text for name, text in texts.items() if text}
@@ -129,16 +129,16 @@ def _entry(panel: Panel, arrays: _Arrays) -> dict[str, Any]:
     for name, (values, held_for) in shown.items():
         if values is not None:
             thinned = arrays.thinned(values)
-            # thinned out first: borders of one pixel would break
+            # reduced before drawing, since borders of one pixel would break
             thinned = outlines(thinned) if panel.kind == "outline" else thinned
             entry[name] = arrays.number(thinned, held_for)
     return entry
 
 
 def _bars(panel: Panel) -> dict[str, tuple[npt.NDArray[Any], int]]:
-    """The logarithms of a standard deviation, and of how many of these the interval reaches below and above a map.
+    """Logarithms of the standard deviation, and of the interval's extent below and above the map as multiples of it.
 
-    As such they are nearly the same everywhere, and take a fourth of the characters that widths would.
+    These multiples vary little, and take a quarter of the characters of the widths.
     """
     values, bars = panel.values, panel.bars
     if values is None or bars is None or bars.sigma is None or bars.low is None or bars.high is None:
