@@ -44,7 +44,7 @@ def main() -> None:
     "--scene", default="curved_occluders", show_default=True, help="Built-in scene, or path of a light field."
 )
 @click.option("--repeats", type=click.IntRange(min=1), default=5, show_default=True, help="Timed calls of each case.")
-@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 @click.option(
     "--group", "groups", type=click.Choice(list(GROUPS)), multiple=True, help="Measure only this; repeatable."
 )
@@ -186,7 +186,7 @@ def digests(scene: str, size: int, views: int, threads: tuple[int, ...], variant
 )
 @click.option("--noise", type=click.Choice(NOISE_LEVELS), default="low", show_default=True, help="Of rendered scenes.")
 @click.option("--score", type=click.Choice(list(SCORES)), default="mse100", show_default=True, help="What is compared.")
-@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 def sweep(
     parameter: str,
     values: tuple[str, ...],
@@ -226,7 +226,7 @@ def sweep(
 @click.option("--variant", "variants", type=click.Choice(list(VARIANTS)), multiple=True, help="Repeatable.")
 @click.option("--score", "scores", type=click.Choice(list(DIGITS)), multiple=True, help="Repeatable; all unless given.")
 @click.option("--allowed", is_flag=True, help="Beside them what noise allows: Q25 / BadPix 0.07 %.")
-@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 def noise(
     scenes: tuple[str, ...],
     sigmas: tuple[float, ...],
@@ -260,7 +260,7 @@ def noise(
 @click.option("--views", type=click.IntRange(min=3), default=5, show_default=True, help="Rows and columns of cameras.")
 @click.option("--seeds", type=click.IntRange(min=1), default=3, show_default=True, help="Arrays of each kind.")
 @click.option("--variant", type=click.Choice(list(VARIANTS)), default="best", show_default=True)
-@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 def cameras(scenes: tuple[str, ...], size: int, views: int, seeds: int, variant: str, threads: int | None) -> None:
     """Print scores of scenes seen by calibrated cameras, over those of perfect cameras in their place.
 
@@ -291,7 +291,7 @@ def cameras(scenes: tuple[str, ...], size: int, views: int, seeds: int, variant:
 )
 @click.option("--leave-out", is_flag=True, help="Judge each scene by a fit to all others.")
 @click.option("--kept", type=_PATH, help="Folder where pixels are kept for the next time.")
-@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 def errors(
     scenes: tuple[str, ...],
     rounded: tuple[tuple[str, float], ...],

@@ -216,7 +216,7 @@ def require_part(part: Part, shape: tuple[int, ...]) -> None:
     (width, height, x, y), (rows, columns) = part, shape
     if min(x, y) < 0 or x + columns > width or y + rows > height:
         raise SepiError(
-            f"{columns}x{rows} pixels (width x height) from column {x}, row {y} on do not lie inside {width}x{height}"
+            f"{columns}x{rows} pixels (width x height) from column {x}, row {y} do not fit into {width}x{height}"
         )
 
 
@@ -239,9 +239,9 @@ def warn_of_infinity(where: object, camera: Camera, disparity: Map, sigma: Map |
     share = float(np.mean(farthest[~unknown] < -camera.offset)) if not unknown.all() else 0.0
     if share > _BEYOND:
         warnings.warn(
-            f"{where}: {100 * share:.0f} % of the pixels lie beyond infinity, where disparity is below "
-            f"{0.0 - camera.offset:.3g} by the camera: look at --baseline (millimetres), --focus-distance (metres; inf "
-            "where no disparity is below 0), and whether near and far are exchanged (sepi check)",
+            f"{where}: {100 * share:.0f} % of the pixels lie beyond infinity, below a disparity of "
+            f"{0.0 - camera.offset:.3g} with this camera; check --baseline (millimetres), --focus-distance (metres; "
+            "inf if no disparity is below 0), and whether near and far are exchanged (sepi check)",
             SepiWarning,
             stacklevel=3,
         )

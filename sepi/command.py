@@ -70,7 +70,7 @@ bad_thresholds = click.option(
     type=click.FloatRange(min=0, min_open=True),
     multiple=True,
     metavar="T",
-    help="Score the pixels with a larger error than T pixels per view step, too; repeatable.",
+    help="Also score the share of pixels with an error above T pixels per view step; repeatable.",
 )
 
 
@@ -133,7 +133,7 @@ def shown_errors() -> Iterator[None]:
     except Exception as error:
         if not _is_of_memory(error):
             raise
-        raise _Shown(one_line(f"not enough memory ({str(error) or 'no more is to be had'})")) from error
+        raise _Shown(one_line(f"not enough memory ({str(error) or 'the system has no more'})")) from error
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -237,12 +237,14 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
 
     @click.command(name=f"python -m sepi.{stage}", cls=SepiCommand, help=f"Run the stage '{stage}' on one light field.")
     @click.option("--light-field", "light_field_path", type=existing, required=True, help="HDF5 file from ingest.")
-    @click.option("--previous", type=existing, help="File of the stage before; the first stage has none.")
-    @click.option("--choice", type=click.Choice(list(choices)), required=True, help="Algorithm of this stage.")
-    @click.option("--parameters", default="{}", show_default=True, help="JSON object; the rest has its default.")
+    @click.option("--previous", type=existing, help="File of the stage before; not for the first stage.")
+    @click.option("--choice", type=click.Choice(list(choices)), required=True, help="Choice of this stage.")
+    @click.option(
+        "--parameters", default="{}", show_default=True, help="JSON object of parameters; others have defaults."
+    )
     @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
     @click.option("--output", type=existing, required=True, help="Stage file to write.")
-    @click.option("--timing", type=existing, help="JSON file to write: what it took, and where.")
+    @click.option("--timing", type=existing, help="JSON file to write: seconds, peak memory, machine.")
     def command(
         light_field_path: Path,
         previous: Path | None,
@@ -260,7 +262,8 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
         maps = None if previous is None else read_stage(previous)
         if maps is not None and maps.disparity.shape != light_field.shape:
             raise SepiError(
-                f"{previous}: maps of {maps.disparity.shape} do not belong to {light_field_path} of {light_field.shape}"
+                f"{previous}: maps have shape {maps.disparity.shape}; expected {light_field.shape}, that of "
+                f"{light_field_path}"
             )
         compared = replace(equally_bright(light_field), workspace=Workspace())
         with progress_bar(f"{light_field.name} {stage}") as progress:

@@ -21,7 +21,7 @@ _PATH = click.Path(path_type=Path)
 @click.command(cls=SepiCommand)
 @click.option("--light-field", "light_field_path", type=_PATH, required=True, help="HDF5 file from ingest.")
 @click.option("--maps", type=_PATH, required=True, help="File of the last stage.")
-@click.option("--variant", required=True, help="Name of the variant, for the attributes.")
+@click.option("--variant", required=True, help="Name of the variant, for the attributes of the files.")
 @click.option("--output", type=_PATH, required=True, help="Folder to write.")
 def main(light_field_path: Path, maps: Path, variant: str, output: Path) -> None:
     """Write disparity.pfm, result.h5 and pictures of a stage file, with unknown pixels marked."""

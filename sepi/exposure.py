@@ -62,7 +62,7 @@ def equally_bright(light_field: LightField) -> LightField:
         else:
             views[t, s] = np.rint(np.minimum(bright, full_scale(views.dtype)))
     percent = 100 * np.expm1(np.abs(np.log(factors)).max())
-    note = f"brightness and colour differed from view to view, by up to {percent:.2g} %: made equal"
+    note = f"brightness and colour differed by up to {percent:.2g} % between views, and were made equal"
     return replace(light_field, views=views, notes=(*light_field.notes, note))
 
 

@@ -118,10 +118,10 @@ def _sources(text: str) -> dict[str, ExternalSource]:
 @click.option(
     "--truth",
     type=click.Path(path_type=Path),
-    help="Ground truth, from sepi.truth; the light field's own unless given.",
+    help="Ground truth from sepi.truth; default: the light field's own.",
 )
 @click.option("--maps", required=True, help='JSON: {"METHOD": {"path": FILE, "scale": NUMBER, "offset": NUMBER}, ...}.')
-@click.option("--scene", default="", help="What messages call the scene; the light field's own name unless given.")
+@click.option("--scene", default="", help="Name of the scene in messages; default: the light field's own.")
 @bad_thresholds
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="File to write (HDF5).")
 def command(

@@ -255,8 +255,8 @@ class LightField:
         which = "centre view" if self.reference_position == (v.shape[0] // 2, v.shape[1] // 2) else "view"
         if self.arranged and not self.present[self.reference_position]:
             raise SepiError(
-                f"{self.name}: the {which} (t, s) = {self.reference_position} is missing; depth is made for it "
-                "unless --view (view=) names another"
+                f"{self.name}: the {which} (t, s) = {self.reference_position} is missing, but depth is estimated for "
+                "it; choose another by --view (view=)"
             )
         if self.missing is not None and (self.missing.shape != v.shape[:4] or self.missing.dtype != bool):
             raise SepiError(f"{self.name}: missing must be bool of shape {v.shape[:4]}, got {self.missing.shape}")
@@ -315,7 +315,7 @@ class LightField:
         if max(abs(known.minimum), abs(known.maximum)) > _GENEROUS * farthest:
             raise SepiError(
                 f"{self.name}: disparity range ({known.source}): {known.minimum:g} to {known.maximum:g} pixels per "
-                f"view step; from {farthest:g} on no other view shows what the reference view does"
+                f"view step; expected less than {farthest:g}, beyond which no other view shows the same points"
             )
 
     @property
@@ -394,7 +394,7 @@ class LightField:
             If it is unknown.
         """
         if self.disparity_range is None:
-            raise SepiError(f"{self.name}: disparity range unknown; give one (MIN MAX, pixels per view step)")
+            raise SepiError(f"{self.name}: disparity range unknown; expected one (MIN MAX, pixels per view step)")
         return self.disparity_range
 
     def with_range(self, disparity_range: DisparityRange) -> LightField:

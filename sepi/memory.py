@@ -30,7 +30,7 @@ def require_memory(number: int) -> None:
         # allocated without being written to, and freed at once
         np.empty(number, np.uint8)
     except MemoryError as error:
-        raise MemoryError(f"{number // 10**6} MB more are needed than a limit on this process leaves") from error
+        raise MemoryError(f"{number // 10**6} MB more are needed than the limit on this process allows") from error
 
 
 def take_blas_buffer() -> None:

@@ -120,7 +120,7 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     @model_validator(mode="after")
     def _does_something(self) -> Self:
         if self.refinements + self.solves == 0:
-            raise ValueError("refinements and solves cannot both be 0; the choice 'none' hands the depth on")
+            raise ValueError("refinements and solves cannot both be 0; the choice 'none' switches the stage off")
         return self
 
 

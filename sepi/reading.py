@@ -129,8 +129,8 @@ def read_light_field(
         give_back_memory()
         if light_field.rig is not None and checked.clear and checked.warning():
             raise SepiError(
-                f"{path}: the views do not fit the poses, but would turned over; expected poses of cameras that look "
-                "along their z axis, y pointing down, and rotations from the world to the camera (OpenCV, COLMAP)"
+                f"{path}: the views fit the poses only if turned over; expected poses of cameras that look along their "
+                "z axis, with y down, and rotations from the world to the camera (OpenCV, COLMAP)"
             )
         found += [*odd_views(light_field), checked.warning()]
         if light_field.rig is None and (note := checked.note()):
@@ -150,7 +150,7 @@ def _with_axes(path: Path, options: ReadOptions, file_format: str | None, unclea
     if axes is None:
         raise unclear
     light_field = read(path, replace(options, axes=axes), file_format)
-    note = f"axes taken as {' '.join(axes)}, by how the views fit together; --axes sets them otherwise"
+    note = f"axes taken as {' '.join(axes)}, for which the views fit together; set others by --axes"
     return replace(light_field, notes=(note, *light_field.notes))
 
 
@@ -245,8 +245,8 @@ def _depth_warning(light_field: LightField) -> str | None:
     if brightest >= _NARROW:
         return None
     bits = brightest.bit_length()
-    advice = f"if the files hold {bits} bits, give --white {2**bits - 1}"
-    return f"its brightest pixel is {brightest} of 65535; {advice}"
+    advice = f"if the files have {bits} bits, give --white {2**bits - 1}"
+    return f"the brightest pixel is {brightest} of 65535; {advice}"
 
 
 def _require_contrast(path: Path, light_field: LightField) -> None:
@@ -255,12 +255,12 @@ def _require_contrast(path: Path, light_field: LightField) -> None:
         colour = "black" if not reference_view.any() else "of one colour"
         raise SepiError(
             f"{path}: view {','.join(map(str, light_field.reference_position))} is all {colour}; depth needs views "
-            "that show something"
+            "with contrast"
         )
     views = light_field.views
     places = np.argwhere(light_field.present)
     if all(np.array_equal(views[t, s], views[light_field.reference_position]) for t, s in places):
         raise SepiError(
-            f"{path}: all {len(places)} views are the same picture; depth needs views of different places, so look "
-            "whether one was copied over the others"
+            f"{path}: all {len(places)} views are the same picture; expected views from different places (was one "
+            "copied over the others?)"
         )

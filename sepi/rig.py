@@ -122,9 +122,9 @@ class Lens:
         # the smaller picture is the rounded one
         if abs(x - y) >= max(1, x) / self.width + max(1, y) / self.height:
             raise SepiError(
-                f"the picture is {width}x{height}, but its camera has {self.width}x{self.height}; expected pictures as "
-                "they were calibrated, or scaled alike both ways; where they were cut out of those, --crop-of "
-                f"{self.width}x{self.height}+X+Y tells where"
+                f"the picture is {width}x{height}, but its camera has {self.width}x{self.height}; expected the size of "
+                "the calibrated pictures, or the same scale both ways; for crops of them, give --crop-of "
+                f"{self.width}x{self.height}+X+Y"
             )
         (fx, fy), (cx, cy) = self.focal, self.principal
         principal = (cx + 0.5) * x - 0.5, (cy + 0.5) * y - 0.5
@@ -400,7 +400,7 @@ class Rig:
             if not (sound and np.isfinite([*rotation.ravel(), *origin, step]).all()):
                 raise ValueError("no rotation, place and length")
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError) as error:
-            raise SepiError("damaged: it does not say where its cameras stood") from error
+            raise SepiError("damaged: it does not tell the poses of its cameras") from error
         return Rig(rotation, origin, step, units, views)
 
 

@@ -487,8 +487,8 @@ def require_costs(previous: StageMaps | None) -> tuple[StageMaps, CostVolume]:
     before = require_previous(previous)
     if before.cost_volume is None:
         raise SepiError(
-            "this stage chooses among the candidates of a cost volume, and the stages before it hand on none; see "
-            "docs/reproduce/compared.md for those that do"
+            "this stage needs a cost volume, but the stage before it returns none; docs/reproduce/compared.md names "
+            "the choices that return one"
         )
     return before, before.cost_volume
 

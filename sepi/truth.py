@@ -21,7 +21,7 @@ _PATH = click.Path(path_type=Path)
 @scene_flags
 @reading_flags
 @truth_flags
-@click.option("--light-field", type=_PATH, help="From ingest: what --truth has to have the size of.")
+@click.option("--light-field", type=_PATH, help="HDF5 file from ingest, whose size --truth must have.")
 @click.option("--output", type=_PATH, required=True, help="HDF5 file to write.")
 def main(
     path: Path | None,

@@ -45,7 +45,7 @@ def require_known(where: str, names: Iterable[str], known: Iterable[str]) -> Non
         return
     near = difflib.get_close_matches(unknown, allowed, n=1, cutoff=0.5)
     hint = f"did you mean '{near[0]}'? " if near else ""
-    raise SepiError(f"{where}: unknown '{unknown}'; {hint}known: {', '.join(allowed) or 'nothing can be set here'}")
+    raise SepiError(f"{where}: unknown '{unknown}'; {hint}known: {', '.join(allowed) or 'none'}")
 
 
 def require_type(where: str, value: object, kind: type | tuple[type, ...], expected: str) -> None:

@@ -94,7 +94,7 @@ def add_choice(stage: str, name: str, choice: Choice) -> None:
     if not re.fullmatch(r"\w+", name, re.ASCII):
         raise SepiError(f"stage {stage}: a choice's name has letters, digits and '_' only, got {name!r}")
     if name in STAGES[stage] and (stage, name) not in _ADDED:
-        raise SepiError(f"stage {stage}: '{name}' is a choice that the package brings; take another name")
+        raise SepiError(f"stage {stage}: '{name}' is a built-in choice; expected another name")
     STAGES[stage][name] = replace(choice, own_steps=True)
     _ADDED.add((stage, name))
 
@@ -227,7 +227,7 @@ def variant_from(name: str, entries: Mapping[str, Any], where: str, users: tuple
     if _BASE in entry:
         require_known(f"{here}.{_BASE}", [entry[_BASE]], entries)
         if entry[_BASE] in (name, *users):
-            raise SepiError(f"{here}.{_BASE}: the variant would be built on itself")
+            raise SepiError(f"{here}.{_BASE}: a variant cannot have itself as base")
         base = variant_from(entry[_BASE], entries, where, (name, *users))
     chosen = {stage: _chosen(stage, entry.get(stage, {}), base, here) for stage in STAGES}
     overrides = {stage: values for stage, (_, values) in chosen.items() if values}

@@ -132,7 +132,8 @@ class TestErrors:
         with h5py.File(tmp_path / "small.h5", "w") as file:
             file["disparity"] = file["confidence"] = np.zeros((4, 4), np.float32)
         base = ["--light-field", light_field, "--choice", "constant", "--output", tmp_path / "o.h5"]
-        assert "do not belong to" in error_of(call(SECOND, *base, "--previous", tmp_path / "small.h5"))
+        error = error_of(call(SECOND, *base, "--previous", tmp_path / "small.h5"))
+        assert "small.h5: maps have shape (4, 4); expected" in error
 
     def test_a_file_that_is_no_stage_file_is_refused(self, light_field: Path, tmp_path: Path) -> None:
         with h5py.File(tmp_path / "maps.h5", "w") as file:

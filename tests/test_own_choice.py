@@ -58,7 +58,7 @@ def test_adding_again_replaces() -> None:
     ("stage", "name", "message"),
     [
         ("smoothing", "mine", "stages: unknown 'smoothing'"),
-        ("optimize", "wls", "stage optimize: 'wls' is a choice that the package brings"),
+        ("optimize", "wls", "stage optimize: 'wls' is a built-in choice"),
         ("optimize", "a/b", "stage optimize: a choice's name"),
     ],
 )

@@ -81,7 +81,7 @@ class PosedViews:
         """Units of positions and depth, in a few words."""
         if self.rig is not None:
             return self.rig.units
-        return "metres" if self.metric else "nominal units, not to scale: the camera is not known"
+        return "metres" if self.metric else "nominal units, not to scale, since the camera is unknown"
 
     @property
     def rotation(self) -> Points:

@@ -229,7 +229,7 @@ def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
         others = light_field.present.copy()
         others[light_field.reference_position] = False
         raise SepiError(
-            f"{light_field.name}: an aperture of {aperture:g} view steps holds no view but the reference view; the "
+            f"{light_field.name}: an aperture of {aperture:g} view steps has no view but the reference view; the "
             f"nearest other is {distance[others].min():g} away"
         )
     return np.asarray(chosen, bool)
@@ -259,7 +259,7 @@ def focal_stack(disparity: FloatMap, count: int, unknown: BoolMap | None = None)
     """
     counted = np.isfinite(disparity) if unknown is None else np.isfinite(disparity) & ~unknown
     if not counted.any():
-        raise SepiError("the map has no pixel of known disparity to focus at")
+        raise SepiError("the map has no pixel with a known disparity to focus at")
     low, high = np.quantile(disparity[counted].astype(np.float64), (BEYOND, 1 - BEYOND)).tolist()
     return evenly_spaced(low, high, count)
 

@@ -199,14 +199,14 @@ def pictures_in(folder: Path) -> list[Path]:
         If there are fewer than two.
     """
     if not folder.is_dir():
-        raise SepiError(f"{folder}: no folder of pictures")
+        raise SepiError(f"{folder}: no such folder; expected one of pictures")
     found = [path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES and path.name[0] != "."]
     if len(found) < 2:
         what = "no pictures" if not found else "one picture alone"
-        raise SepiError(f"{folder}: {what}; expected two or more of one scene, from different places, by one camera")
+        raise SepiError(f"{folder}: {what}; expected two or more pictures of one scene from different places")
     odd = next((path for path in found if not path.name.isprintable() or re.search(r"\s", path.name)), None)
     if odd is not None:
-        raise SepiError(f"{odd}: COLMAP's files take no names with spaces; expected a name without them")
+        raise SepiError(f"{odd}: the name has spaces, which COLMAP's files cannot hold; expected a name without them")
     return sorted(found, key=lambda path: [int(part) if part.isdigit() else part for part in _parts(path.name)])
 
 
@@ -234,8 +234,8 @@ def _placed(pycolmap: Any, folder: Path, database: Path, camera: Any, count: int
         progress(_MATCHED + (1 - _MATCHED) * attempt / len(_FIRST_ANGLES))
     if best is None:
         raise SepiError(
-            f"{folder}: no two pictures tell where their cameras stood; the camera moved too little, or the way it "
-            "looks, or the pictures have too little in common; expected a sweep sideways past a scene with texture"
+            f"{folder}: no two pictures tell the positions of their cameras: the camera moved too little or along its "
+            "viewing direction, or the pictures share too little; expected a sweep sideways past a scene with texture"
         )
     return best
 

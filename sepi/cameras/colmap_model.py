@@ -68,7 +68,7 @@ def require_pycolmap(where: str) -> Any:
     try:
         import pycolmap
     except ImportError as error:
-        raise SepiError(f"{where}: COLMAP's models need pycolmap: pip install 'sepi[colmap]'") from error
+        raise SepiError(f"{where}: reading a COLMAP model needs pycolmap: pip install 'sepi[colmap]'") from error
     # it ends the program by itself where that is to end, and unfinished files stay
     before = signal.getsignal(signal.SIGTERM)
     if before is not None and threading.current_thread() is threading.main_thread():

@@ -143,8 +143,8 @@ def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
             principal = seeing.principal[0] - box[2], seeing.principal[1] - box[0]
             return Frame(seeing.focal, principal, seeing.offset, (height, width)), kept
     raise SepiError(
-        f"{seeing.model.path}: the cameras have next to nothing of the picture of {reference.name} in common; they are "
-        "turned too far from each other, or stand too far apart"
+        f"{seeing.model.path}: the cameras share hardly anything of the picture of {reference.name}; they look in too "
+        "different directions, or stand too far apart"
     )
 
 

@@ -99,7 +99,7 @@ class CameraModel:
         for one, other in combinations(range(len(names)), 2):
             if np.linalg.norm(centres[one] - centres[other]) <= _SAME_PLACE * extent:
                 raise SepiError(
-                    f"{self.path}: {names[one]} and {names[other]} stand at one place; leave one of them out "
+                    f"{self.path}: {names[one]} and {names[other]} were taken from one position; leave one of them out "
                     f"(--exclude {names[other]})"
                 )
         turned = np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)))
@@ -107,10 +107,10 @@ class CameraModel:
         if turned[one, other] > _MOST_TURNED:
             raise SepiError(
                 f"{self.path}: {names[one]} and {names[other]} look {turned[one, other]:.0f} degrees apart; expected "
-                f"cameras that look much the same way, at most {_MOST_TURNED:.0f} degrees apart"
+                f"similar viewing directions, at most {_MOST_TURNED:.0f} degrees apart"
             )
         if len(self.points) and np.mean((self.points - centres.mean(axis=0)) @ axes.mean(axis=0) > 0) < _BEFORE:
             raise SepiError(
                 f"{self.path}: the scene's points lie behind the cameras; expected poses of cameras that look along "
-                "their z axis, y pointing down (OpenCV), not backwards with y up (OpenGL)"
+                "their z axis, with y down (OpenCV), not against it with y up (OpenGL)"
             )

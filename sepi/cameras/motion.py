@@ -70,7 +70,7 @@ def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], findin
         poor = [path.name for path, count in zip(looked_at, counts, strict=True) if count < _FEATURES]
         if 2 * len(poor) > len(counts):
             raise SepiError(
-                f"{folder}: hardly anything to recognise in {_listed(poor)}; expected pictures with texture, in focus "
+                f"{folder}: hardly any features in {_listed(poor)}; expected pictures with texture, in focus "
                 "and well lit"
             )
         with pycolmap.Database.open(str(database)) as file:
@@ -87,27 +87,27 @@ def require_sideways(folder: Path, names: Sequence[str], steps: Sequence[Step], 
     """Raise for steps of a camera that make no light field; ``unit`` is the width of a pixel that was looked at."""
     if not steps:
         raise SepiError(
-            f"{folder}: no two of {_listed(names)} show the same; expected pictures of one scene in which nothing "
-            "moves, each from a little beside the last"
+            f"{folder}: no two of {_listed(names)} match; expected pictures of one static scene, each from a position "
+            "a little beside the last"
         )
     widest = max(steps, key=lambda step: step.parallax)
     if widest.parallax < _NARROW * unit:
         raise SepiError(
-            f"{folder}: from {widest.names[0]} to {widest.names[1]} things move by {widest.parallax:.1f} pixels "
-            "against each other: the camera turned but hardly moved, or the scene is flat; expected a camera that "
-            f"moves sideways, so that near things move by {4 * _NARROW * unit:.0f} pixels or more against far ones"
+            f"{folder}: from {widest.names[0]} to {widest.names[1]} the parallax is {widest.parallax:.1f} pixels: the "
+            "camera turned but hardly moved, or the scene is flat; expected a camera that moves sideways, with a "
+            f"parallax of at least {4 * _NARROW * unit:.0f} pixels between near and far points"
         )
     turned = max(steps, key=lambda step: step.turned)
     if turned.turned > _TURNED:
         raise SepiError(
             f"{folder}: {turned.names[0]} and {turned.names[1]} look about {turned.turned:.0f} degrees apart; expected "
-            f"a camera that looks much the same way in all pictures, at most {_TURNED:.0f} degrees apart"
+            f"similar viewing directions in all pictures, at most {_TURNED:.0f} degrees apart"
         )
     firm = [step.ahead for step in steps if step.ahead is not None and step.parallax >= _FIRM * unit]
     if firm and np.median(firm) < _AHEAD:
         raise SepiError(
-            f"{folder}: the camera moves along the way that it looks (about {np.median(firm):.0f} degrees from it); "
-            "expected it to move across it, by 45 to 90 degrees"
+            f"{folder}: the camera moves along its viewing direction (at about {np.median(firm):.0f} degrees to it); "
+            "expected it to move sideways, at 45 to 90 degrees"
         )
 
 

@@ -64,7 +64,9 @@ class Pictures:
         if tried[0] not in within:
             raise SepiError(f"{self._model}: picture '{tried[0]}': expected a path within the folder of pictures")
         where = " nor ".join(map(str, self._places[:3]))
-        raise SepiError(f"{self._model}: no picture '{names[0]}' in {where}; --images names the folder of the pictures")
+        raise SepiError(
+            f"{self._model}: no picture '{names[0]}' in {where}; name the folder of the pictures by --images"
+        )
 
     def size(self, file: Path) -> tuple[int, int]:
         """Width and height of a picture, or of that which it is a part of."""
@@ -111,9 +113,9 @@ class Pictures:
         if 0 < low <= high < _ALIKE * low and not 1 / _OTHER < low < _OTHER:
             raise SepiError(
                 f"{self._model}: the principal points are those of pictures about {low:.2g} times as large; expected "
-                "the size of the pictures that were calibrated, w and h, or --crop-of where these are parts of them"
+                "w and h, the size of the calibrated pictures, or --crop-of if these pictures are crops of them"
             )
-        return (f"{self._scaled}; where they are cut, not scaled, --crop-of says so",) if self._scaled else ()
+        return (f"{self._scaled}; if the pictures are crops, give --crop-of",) if self._scaled else ()
 
 
 def mask_of(picture: Path, name: str) -> Path | None:

@@ -69,8 +69,8 @@ def plane_through(model: CameraModel, reference: int | None) -> Plane:
     angle = np.degrees(np.arctan2(np.median(np.linalg.norm(beside, axis=1)), np.median(np.abs(ahead))))
     if angle < _LEAST_ANGLE:
         raise SepiError(
-            f"{model.path}: the cameras move along the way that they look ({angle:.0f} degrees from it); expected them "
-            f"to move across it, by {_LEAST_ANGLE:.0f} to 90 degrees"
+            f"{model.path}: the cameras move along their viewing direction (at {angle:.0f} degrees to it); expected "
+            f"them to move sideways, at {_LEAST_ANGLE:.0f} to 90 degrees"
         )
     z = _unit(looking - slope)
     right = np.mean([shot.rotation[0] for shot in model.shots], axis=0)

@@ -79,24 +79,24 @@ def rectification_of(
         worst = int(errors.argmax())
         if len(kept) < len(model.shots):
             left = [shot.name for n, shot in enumerate(model.shots) if n not in kept]
-            notes.append(f"left out, as they look elsewhere: {', '.join(left)}")
+            notes.append(f"left out, since they look elsewhere: {', '.join(left)}")
             reference = model.shots[plane.reference].name
             model = model.of(kept)
         elif errors[worst] > _TOO_MUCH:
             name = model.shots[worst].name
             if len(model.shots) <= _FEWEST:
                 raise SepiError(
-                    f"{model.path}: the cameras do not stand in a plane: {name} is so far off that disparities err by "
-                    f"{errors[worst]:.2g} pixels; expected at most {_TOO_MUCH:g}"
+                    f"{model.path}: the cameras do not stand in a plane: {name} is so far off that the disparity error "
+                    f"is {errors[worst]:.2g} pixels; expected at most {_TOO_MUCH:g}"
                 )
             notes.append(
-                f"left out, as it stands {_off(plane, worst)}: {name} (disparity errs by {errors[worst]:.2g} pixels)"
+                f"left out, since it stands {_off(plane, worst)}: {name} (disparity error {errors[worst]:.2g} pixels)"
             )
             model = model.of([n for n in range(len(model.shots)) if n != worst])
         else:
             break
         if len(model.shots) < 2:
-            raise SepiError(f"{model.path}: too few cameras are left: {'; '.join(notes)}")
+            raise SepiError(f"{model.path}: expected at least two cameras, too few are left: {'; '.join(notes)}")
     return Rectification(model, plane, frame, seeing, known, errors, (*notes, *_told(plane, errors, known)))
 
 
@@ -110,8 +110,8 @@ def _told(plane: Plane, errors: Floats, known: tuple[float, float] | None) -> tu
     flat = f"the cameras stand within {float(np.abs(places).max()) / plane.step:.2g} view steps of a plane"
     if known is None:
         return (flat,)
-    off = "; worth knowing where hundredths of a pixel count" if errors.max() > _TOLD else ""
-    return (f"{flat}, which errs by at most {errors.max():.2g} pixels of disparity over the scene's depth{off}",)
+    off = "; mind this if hundredths of a pixel matter" if errors.max() > _TOLD else ""
+    return (f"{flat}, so disparity errors over the scene's depth are at most {errors.max():.2g} pixels{off}",)
 
 
 def _of_points(model: CameraModel, plane: Plane) -> tuple[float, float] | None:
@@ -129,7 +129,7 @@ def _of_points(model: CameraModel, plane: Plane) -> tuple[float, float] | None:
     if len(depth) > 1 and moved < _NOTHING:
         raise SepiError(
             f"{model.path}: the cameras stand too close together for the scene: its points move by {moved:.2g} pixels "
-            "at most; expected more, and positions in the units of the points (metres of one, kilometres of the other?)"
+            "at most; expected a longer baseline (are positions and points in the same unit?)"
         )
     return low, high
 

@@ -72,7 +72,7 @@ def read_table(path: Path, pictures: Pictures) -> CameraModel:
         text = path.read_text(encoding="utf-8-sig")
         told = {"cameras": _rows(text)} if path.suffix.lower() == ".csv" else yaml.safe_load(text)
         if not isinstance(told, dict):
-            raise SepiError("expected a key 'cameras' with a list of cameras, and where needed 'shared' and 'units'")
+            raise SepiError("expected a key 'cameras' with a list of cameras, and optional keys 'shared' and 'units'")
     table = validated(_Table, told, str(path))
     if table.grid is not None and prod(table.grid) != len(table.cameras):
         raise SepiError(f"{path}: a grid of {prod(table.grid)} cameras, but {len(table.cameras)} are listed")
@@ -96,7 +96,7 @@ def _rows(text: str) -> list[dict[str, Any]]:
     require_known("columns", rows.fieldnames, _COLUMNS)
     for name in ("file", *_PLACE, "fx"):
         if name not in rows.fieldnames:
-            raise SepiError(f"no column '{name}'; expected {', '.join(_COLUMNS)}, those from qw on if needed")
+            raise SepiError(f"no column '{name}'; expected {', '.join(_COLUMNS)}; columns from qw on are optional")
     return [_entry(row) for row in rows]
 
 
@@ -137,6 +137,6 @@ def rotation_of(told: Any) -> Floats:
         left, _, right = np.linalg.svd(values)
         return np.asarray(left @ right, np.float64)
     raise SepiError(
-        "rotation: expected a quaternion w x y z of length 1, or the 3x3 matrix of a rotation, "
-        "no mirror, from the world's axes to the camera's"
+        "rotation: expected a quaternion w x y z of length 1, or a 3x3 rotation matrix (no reflection), "
+        "from the world's axes to the camera's"
     )

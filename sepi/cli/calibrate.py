@@ -15,7 +15,7 @@ _PATH = click.Path(path_type=Path)
 
 @click.command(cls=SepiCommand)
 @click.argument("folder", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="Folder to make; ./NAME-cameras after FOLDER's name unless given.")
+@click.option("-o", "--output", type=_PATH, help="Folder to make; default: NAME-cameras for a FOLDER called NAME.")
 @click.option(
     "--lens",
     default="SIMPLE_RADIAL",
@@ -28,10 +28,10 @@ _PATH = click.Path(path_type=Path)
     type=click.Choice(["one", "each"]),
     default="one",
     show_default=True,
-    help="One camera took all pictures, or each has its own.",
+    help="Whether one camera took all pictures, or each has its own.",
 )
-@click.option("--force", is_flag=True, help="Go on whatever a quick look at a few pictures says.")
-@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+@click.option("--force", is_flag=True, help="Go on even if a check of a few pictures fails.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force: bool, threads: int | None) -> None:
     """Find the cameras that took the pictures in FOLDER, and write them as a COLMAP model for 'sepi depth'.
 
@@ -57,10 +57,10 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
     count = len(made.placed)
     missing = f"; not placed: {', '.join(made.left_out)}" if made.left_out else ""
     click.echo(f"placed: {count} of {count + len(made.left_out)} pictures{missing}")
-    click.echo(f"points lie within {made.error:.2g} pixels of where the pictures show them, at the mean")
+    click.echo(f"mean reprojection error of the points: {made.error:.2g} pixels")
     for note in made.notes:
         click.echo(note)
     click.echo(f"written: {target}/")
     if made.unusable is not None:
-        raise SepiError(f"'sepi depth' cannot use it: {made.unusable}")
+        raise SepiError(f"'sepi depth' cannot use these cameras: {made.unusable}")
     click.echo(f"next: sepi depth {target}")

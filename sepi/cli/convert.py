@@ -35,8 +35,10 @@ _PFM = ".pfm"
 @click.command(cls=SepiCommand)
 @click.argument("result_path", metavar="RESULT", type=_PATH)
 @click.argument("output", metavar="FILE", type=_PATH)
-@click.option("--map", "name", type=click.Choice(list(_MAPS)), help="Map to write; in .exr all of them unless given.")
-@click.option("--to", "kind", type=click.Choice(["rgbd"]), help="Colour and depth side by side, as displays take it.")
+@click.option("--map", "name", type=click.Choice(list(_MAPS)), help="Map to write; default in .exr: all maps.")
+@click.option(
+    "--to", "kind", type=click.Choice(["rgbd"]), help="Colour and depth side by side, for light field displays."
+)
 @view_of_result
 @camera_flags
 def convert(result_path: Path, output: Path, name: str | None, kind: str | None, **seen: Any) -> None:
@@ -68,10 +70,10 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
     suffix = output.suffix.lower()
     if kind is not None:
         if suffix != ".png" or name is not None:
-            raise SepiError(f"{output}: --to rgbd is a PNG of view and disparity: expected NAME.png, and no --map")
+            raise SepiError(f"{output}: --to rgbd writes a PNG of view and disparity; expected NAME.png, and no --map")
         result = read_result_at(result_path, seen["view"])
         write_png(output, colour_and_depth(result.picture, result.disparity, result.unknown))
-        click.echo(f"written: {output} (the view, and its disparity from far, black, to near, white)")
+        click.echo(f"written: {output} (the view, and its disparity: black is far, white near)")
         return
     if suffix not in (*EXR, *TIFF, _PFM):
         raise SepiError(f"{output}: expected a name that ends with .exr, .tif, .tiff or .pfm, the format of the file")
@@ -80,8 +82,8 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
         name = "disparity"
     if name is not None and name not in maps:
         if name != "depth" and "sigma" not in maps:
-            raise SepiError(f"{result_path}: no {name}, as the result has no error bars")
-        raise SepiError(f"{result_path}: no {name}, as the camera is not known; give --focal-length and the others")
+            raise SepiError(f"{result_path}: no {name}, since the result has no error bars")
+        raise SepiError(f"{result_path}: no {name}, since the camera is unknown; give --focal-length and the others")
     written = maps if name is None else {name: maps[name]}
     comment = ", ".join(f"{key}: {_MAPS[key]}" for key in written)
     if name is None:

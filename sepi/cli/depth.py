@@ -30,26 +30,26 @@ _PATH = click.Path(path_type=Path)
 
 @click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="Folder to write; ./NAME-depth after INPUT's name unless given.")
+@click.option("-o", "--output", type=_PATH, help="Folder to write; default: NAME-depth for an INPUT called NAME.")
 @click.option("--variant", default="best", show_default=True, help="Named choice of stages; see above.")
 @range_to_search
-@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 @click.option(
     "--memory",
     type=click.IntRange(min=1),
     metavar="MB",
-    help="Stay within so much memory; the same maps, more slowly. As much as is of use unless given.",
+    help="Largest memory of the process; less memory takes more time, for the same maps. Default: no limit.",
 )
 @click.option(
     "--set",
     "settings",
     multiple=True,
     metavar="KEY=VALUE",
-    help="Set a parameter, STAGE.CHOICE.NAME=VALUE; repeatable. config.yaml lists them.",
+    help="Set a parameter, STAGE.CHOICE.NAME=VALUE; repeatable. config.yaml lists all.",
 )
-@click.option("--force", is_flag=True, help="Write to a folder with other files or another light field's result, too.")
-@click.option("--timing", is_flag=True, help="Also write runtime.txt: seconds, as a benchmark submission needs.")
-@click.option("--all-views", is_flag=True, help="Also write all_views.h5: a map for each view, which takes longer.")
+@click.option("--force", is_flag=True, help="Also write to a folder with other files or another light field's result.")
+@click.option("--timing", is_flag=True, help="Also write runtime.txt: seconds, for a benchmark submission.")
+@click.option("--all-views", is_flag=True, help="Also write all_views.h5: a map for each view; takes longer.")
 @camera_flags
 @reading_flags
 def depth(
@@ -135,7 +135,7 @@ def depth(
     click.echo(f"disparity range: {range_text(light_field.require_disparity_range())}{_candidates(maps.made_by)}")
     unknown = float(maps.mask(UNKNOWN).mean())
     if unknown:
-        click.echo(f"unknown: {100 * unknown:.2g} % of the pixels; no view knows anything about them")
+        click.echo(f"unknown: {100 * unknown:.2g} % of the pixels; no view has evidence for their depth")
     click.echo(_interval(maps, variant))
     click.echo(f"written to {folder}/: {' '.join(files)}")
 
@@ -159,7 +159,7 @@ def _interval(maps: StageMaps, variant: str) -> str:
     from sepi.matching.unknown import UNKNOWN
 
     if maps.low is None or maps.high is None:
-        return f"no interval: {variant} has no model of its own error"
+        return f"no interval: {variant} has no error bars"
     width, known = maps.high - maps.low, ~maps.mask(UNKNOWN)
     half = float(np.median(width[known] if known.any() else width)) / 2
     return f"90 % interval: median half width {half:.2g} pixels per view step"

@@ -31,19 +31,21 @@ NO_INTERVAL = "no interval: the map has no error bars"
 @click.argument("ground_truth", metavar="[GROUND_TRUTH|SCENE]", type=_PATH, required=False)
 @truth_flags
 @bad_thresholds
-@click.option("--border", type=click.IntRange(min=0), help="Score with this many pixels left out on each side only.")
+@click.option(
+    "--border", type=click.IntRange(min=0), help="Leave out this many pixels on each side, and score no other border."
+)
 @click.option(
     "--offset",
     type=Pair("ROW,COLUMN"),
     metavar="ROW,COLUMN",
-    help="ESTIMATE is a crop: where its top left pixel lies in the ground truth, counted from 0.",
+    help="For a crop as ESTIMATE: row and column of its top left pixel in the ground truth, from 0.",
 )
 @click.option(
     "--truth-step",
     type=click.FloatRange(min=0),
     metavar="D",
-    help="What rounded ground truth is a multiple of, pixels per view step: an interval may miss it by half of that. "
-    "[default: K of --truth-scale where FILE holds whole numbers, else 0]",
+    help="Step of rounded ground truth, pixels per view step; an interval may miss it by half a step. "
+    "[default: K of --truth-scale if FILE has whole numbers, else 0]",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @reading_flags
@@ -106,12 +108,12 @@ def evaluate(
     elif values.shape != disparity.shape:
         smaller = all(length <= whole for length, whole in zip(disparity.shape, values.shape, strict=True))
         raise SepiError(
-            f"{source}: ground truth is {values.shape}, the estimate {disparity.shape} (height, width)"
-            f"{'; --offset tells where a crop lies' if smaller else ''}"
+            f"{source}: ground truth has shape {values.shape}, the estimate {disparity.shape} (height, width)"
+            f"{'; for a crop, give --offset' if smaller else ''}"
         )
     doubt = misfit(disparity, values, None if light_field is None else light_field.grid)
     if doubt is not None:
-        warnings.warn(f"{source}: ground truth would fit {estimate} far better {doubt}", SepiWarning, stacklevel=1)
+        warnings.warn(f"{source}: the ground truth fits {estimate} far better {doubt}", SepiWarning, stacklevel=1)
     masks = None if light_field is None else region_masks(light_field)
     protocols = PROTOCOLS if border is None else {f"border {border}": border}
     if truth_step is None:
@@ -159,7 +161,7 @@ def score_table(scores: AllScores, thresholds: Sequence[float] = (), truth_step:
     table = str(tabulate(rows, titles, tablefmt="plain", colalign=alignment, disable_numparse=True))
     if not bars:
         return f"{table}\n{NO_INTERVAL}"
-    rounded = f"ground truth in steps of {truth_step:g}: an interval that misses it by half a step holds it"
+    rounded = f"ground truth in steps of {truth_step:g}: an interval may miss it by half a step"
     return f"{table}\n{rounded}" if truth_step else table
 
 

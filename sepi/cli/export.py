@@ -26,7 +26,7 @@ _PATH = click.Path(path_type=Path)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @click.argument("output", metavar="OUT", type=_PATH)
 @range_to_search
-@click.option("--force", is_flag=True, help="Write where something is already, too.")
+@click.option("--force", is_flag=True, help="Also replace existing files.")
 @truth_flags
 @camera_flags
 @reading_flags

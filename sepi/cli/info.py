@@ -27,7 +27,7 @@ _RANGE_SOURCES = {
     "estimated": "estimated from the views",
 }
 
-_as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object; see docs/reference/formats.md.")
+_as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object (docs/reference/formats.md).")
 
 
 @click.command(cls=SepiCommand)
@@ -175,7 +175,7 @@ def _depth(light_field: LightField, estimated: DisparityRange | None) -> str:
     told = f"{camera.scale:g} {units} / (disparity + {camera.offset:g})"
     if estimated is None or estimated.minimum + _BEYOND * (estimated.maximum - estimated.minimum) > -camera.offset:
         return told
-    return f"{told}; much of the range lies beyond infinity: look at --baseline (mm) and --focus-distance (m)"
+    return f"{told}; much of the range lies beyond infinity: check --baseline (mm) and --focus-distance (m)"
 
 
 def _pixels(light_field: LightField) -> str:

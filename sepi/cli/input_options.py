@@ -63,12 +63,12 @@ _FLAGS = (
         "file_format",
         metavar="FORMAT",
         help="exported, cameras, hci, hci-2013, images, eslf, mosaic, tiff-stack, matlab, numpy, openlf, hdf5 or sepi; "
-        "found by looking unless given.",
+        "default: recognised from the files.",
     ),
     click.option("--grid", type=Pair("ROWSxCOLUMNS"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."),
     click.option(
         "--pattern",
-        help="Names of views in a folder: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is anything.",
+        help="Names of views in a folder: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is any text.",
     ),
     click.option(
         "--axes",
@@ -76,15 +76,15 @@ _FLAGS = (
     ),
     click.option("--variable", help="Name of the array in a .mat, .npz or HDF5 file with several."),
     click.option("--central", type=click.IntRange(min=1), metavar="N", help="Use only the N x N views in the middle."),
-    click.option("--order", default="as-given", help="Order of the views: a name that 'sepi check' tells."),
+    click.option("--order", default="as-given", help="Order of the views: a name that 'sepi check' prints."),
     click.option(
-        "--exclude", multiple=True, metavar="VIEW", help="Leave a view out: ROW,COLUMN from 0, or a file; repeatable."
+        "--exclude", multiple=True, metavar="VIEW", help="Leave out a view: ROW,COLUMN from 0, or a file; repeatable."
     ),
     click.option(
         "--view",
         type=Pair("ROW,COLUMN"),
         metavar="ROW,COLUMN",
-        help="View whose depth is made; the centre unless given.",
+        help="View whose depth is estimated; default: the centre view.",
     ),
     click.option(
         "--row-spacing",
@@ -92,20 +92,20 @@ _FLAGS = (
         metavar="F",
         help="Distance of rows of views in steps of columns, if they differ.",
     ),
-    click.option("--white", type=_POSITIVE, metavar="W", help="Value of white: 1023 in files of 10 bits, 4095 of 12."),
+    click.option("--white", type=_POSITIVE, metavar="W", help="Value of white: 1023 for 10 bits, 4095 for 12."),
     click.option("--images", metavar="FOLDER", help="Pictures of calibrated cameras, if not beside the model."),
     click.option(
         "--reference",
         metavar="PICTURE",
-        help="Calibrated camera whose depth is made; the most central one unless given.",
+        help="Picture of the calibrated camera whose depth is estimated; default: the most central one.",
     ),
     click.option(
         "--crop-of",
         metavar="WxH+X+Y",
-        help="Size of the pictures that the views were cut out of, and column and row in them of a view's first pixel: "
-        "sensor and calibration belong to those.",
+        help="For crops: width and height of the whole picture, and column and row in it of a view's first pixel. "
+        "Sensor size and calibration are those of the whole picture.",
     ),
-    click.option("--follow-links", is_flag=True, help="Read views that are links out of their folder."),
+    click.option("--follow-links", is_flag=True, help="Read views that are links to files outside their folder."),
 )
 
 
@@ -114,13 +114,13 @@ _TRUTH = (
         "--truth",
         type=click.Path(path_type=Path),
         metavar="FILE",
-        help="Ground truth of one's own: PFM, NumPy, HDF5, or a grey picture, in which 0 is unknown.",
+        help="Ground truth: PFM, NumPy, HDF5, or a grey picture, in which 0 is unknown.",
     ),
     click.option(
         "--truth-scale",
         type=_POSITIVE,
         metavar="K",
-        help="Pixels per view step that 1 in the file of --truth stands for; pictures of 8 and 16 bit need it.",
+        help="Pixels per view step of the value 1 in --truth; pictures of 8 and 16 bit need it.",
     ),
 )
 
@@ -135,7 +135,7 @@ view_of_result = click.option(
     "--view",
     type=Pair("ROW,COLUMN"),
     metavar="ROW,COLUMN",
-    help="View to take, where 'sepi depth --all-views' made maps of all; that of the result unless given.",
+    help="View to use, after 'sepi depth --all-views'; default: that of the result.",
 )
 
 range_to_search = click.option(
@@ -143,7 +143,7 @@ range_to_search = click.option(
     nargs=2,
     type=float,
     metavar="MIN MAX",
-    help="Disparities to search, pixels per view step; the scene's own or an estimate unless given.",
+    help="Disparities to search, pixels per view step; default: the scene's own, or an estimate.",
 )
 
 Geometry = Callable[..., "Camera"]
@@ -180,7 +180,7 @@ def truth_flags(command: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(command)
     def with_truth(*args: Any, truth: Path | None, truth_scale: float | None, **values: Any) -> Any:
         if truth is None and truth_scale is not None:
-            raise click.UsageError("--truth-scale says what the numbers of --truth FILE mean: give that, too")
+            raise click.UsageError("--truth-scale scales the numbers of --truth FILE; give --truth, too")
         from sepi.io.disparity_maps import TruthFile
 
         own = None if truth is None else TruthFile(truth, truth_scale)
@@ -216,8 +216,8 @@ def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:
 
 _GEOMETRY = {
     "focal_length_mm": ("MM", "Focal length, millimetres; with the next three: metric depth."),
-    "baseline_mm": ("MM", "Distance from column to column of cameras (row to row, if one column), millimetres."),
-    "focus_distance_m": ("M", "Depth at which nothing moves from view to view, metres; inf for parallel cameras."),
+    "baseline_mm": ("MM", "Distance between columns of cameras (rows, if one column), millimetres."),
+    "focus_distance_m": ("M", "Depth at which disparity is 0, metres; inf for parallel cameras."),
     "sensor_size_mm": ("MM", "Longer side of the sensor that took the whole picture (see --crop-of), millimetres."),
 }
 

@@ -17,18 +17,18 @@ for _name, _value in {"OPENBLAS_NUM_THREADS": "1", "NUMPY_MADVISE_HUGEPAGE": "0"
     os.environ.setdefault(_name, _value)
 
 _COMMANDS = {
-    "calibrate": ("calibrate", "Find the cameras of pictures without poses, by COLMAP."),
+    "calibrate": ("calibrate", "Find the cameras of pictures without poses, with COLMAP."),
     "check": ("info", "Check the order of the views of the light field INPUT."),
     "check-submission": ("results", "Check a submission to the HCI 4D benchmark."),
     "compare": ("compare", "Show two disparity maps side by side on a page."),
-    "convert": ("convert", "Write a finished map as OpenEXR, TIFF or PFM."),
+    "convert": ("convert", "Write a map of a result as OpenEXR, TIFF or PFM."),
     "depth": ("depth", "Compute the disparity map of the light field INPUT."),
     "evaluate": ("evaluate", "Score a disparity map against ground truth."),
-    "export": ("export", "Save the light field INPUT as it was read, for reading without flags."),
+    "export": ("export", "Save the light field INPUT as read, so that it needs no flags."),
     "info": ("info", "Show what is known about the light field INPUT."),
-    "points": ("results", "Write the point cloud of a finished disparity map."),
+    "points": ("results", "Write the point cloud of a result."),
     "poses": ("poses", "Write camera poses and depth for COLMAP or nerfstudio."),
-    "refocus": ("refocus", "Focus a light field after the fact."),
+    "refocus": ("refocus", "Refocus the light field INPUT."),
     "scenes": ("scenes", "Write scenes with exact ground truth."),
     "submission": ("results", "Pack results as a submission to the HCI 4D benchmark."),
 }

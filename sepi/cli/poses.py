@@ -24,9 +24,9 @@ _PATH = click.Path(path_type=Path)
     show_default=True,
     help="Program to write for.",
 )
-@click.option("-o", "--output", type=_PATH, help="Folder to make; ./NAME-colmap after INPUT's name unless given.")
+@click.option("-o", "--output", type=_PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
 @click.option(
-    "--min-confidence", type=float, metavar="X", help="No points of less sure pixels; else of the surer half."
+    "--min-confidence", type=float, metavar="X", help="Least confidence of points; default: the median of all pixels."
 )
 @click.option(
     "--points", type=click.IntRange(min=0), default=10000, show_default=True, metavar="N", help="At most N points."
@@ -81,8 +81,8 @@ def poses(
         {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](folder, posed, progress)
     if not posed.metric:
         click.echo(
-            "the camera is not known: a nominal one is taken, that sees the scene at a distance of 1 to 2; pixels fit "
-            "exactly, positions and depth are neither in metres nor to scale"
+            "the camera is unknown: a nominal one sees the scene at a distance of 1 to 2; pixels fit exactly, but "
+            "positions and depth are neither in metres nor to scale"
         )
     units = posed.units.partition(",")[0]
     click.echo(f"written: {folder}/ ({len(posed.poses)} views, {posed.chosen.sum()} points, {units})")

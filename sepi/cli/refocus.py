@@ -47,12 +47,12 @@ class _Wanted:
 @click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @click.argument("result_path", metavar="[RESULT]", type=_PATH, required=False)
-@click.option("-o", "--output", type=_PATH, help="Folder to write; ./NAME-refocused after INPUT's name unless given.")
+@click.option("-o", "--output", type=_PATH, help="Folder to write; default: NAME-refocused for an INPUT called NAME.")
 @click.option(
     "--steps",
     type=click.IntRange(1, 999),
     metavar="N",
-    help=f"Pictures from the nearest to the farthest surface; {_STEPS} unless --disparity or --at is given.",
+    help=f"Pictures from the nearest to the farthest surface; default: {_STEPS} without --disparity and --at.",
 )
 @click.option(
     "--disparity",
@@ -69,16 +69,16 @@ class _Wanted:
     nargs=2,
     multiple=True,
     metavar="X Y",
-    help="Focus on what the pixel X, Y shows, counted from 0 at the top left; repeatable; needs RESULT.",
+    help="Focus on the surface at pixel X, Y, from 0 at the top left; repeatable; needs RESULT.",
 )
 @click.option(
     "--aperture",
     type=float,
     metavar="R",
-    help="Radius of the aperture in view steps: smaller, and more is in focus. All views unless given.",
+    help="Radius of the aperture in view steps; a smaller one has more in focus. Default: all views.",
 )
 @click.option("--animation", is_flag=True, help="Also write the stack as an animation, focus.webp.")
-@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 @camera_flags
 @reading_flags
 def refocus(
@@ -124,7 +124,7 @@ def refocus(
     if light_field_path.resolve() == folder.resolve():
         raise SepiError(f"{folder}: is the light field itself; choose another folder for the pictures")
     if pixels and result_path is None:
-        raise SepiError("--at: needs RESULT, the map that tells how near a pixel is; 'sepi depth INPUT' makes it")
+        raise SepiError("--at: needs RESULT for the disparity of the pixel; 'sepi depth INPUT' makes it")
     light_field = read_light_field_of(light_field_path, result_path, reading)
     result = None if result_path is None else _read_result(result_path, light_field_path, light_field, reading)
     camera = light_field.camera or (result.camera if result else None)
@@ -145,7 +145,7 @@ def refocus(
         files = write_refocused(folder, foci, pictures, sharp, light_field.views.dtype, animated=animation)
     click.echo(f"focused at: {_listed(foci)}")
     if result is None:
-        click.echo("no all_in_focus.png: that needs RESULT, the map that 'sepi depth' makes")
+        click.echo("no all_in_focus.png: it needs RESULT, which 'sepi depth' makes")
     click.echo(f"written to {folder}/: {' '.join(files)}")
 
 
@@ -202,7 +202,7 @@ def _disparity_at(result: _Result, x: int, y: int) -> float:
         raise SepiError(f"--at {x} {y}: outside the picture; X goes from 0 to {width - 1}, Y from 0 to {height - 1}")
     value = float(result.disparity[y, x])
     if not math.isfinite(value) or (result.unknown is not None and result.unknown[y, x]):
-        raise SepiError(f"--at {x} {y}: {result.path} does not know how near this pixel is; choose one beside it")
+        raise SepiError(f"--at {x} {y}: {result.path} has no disparity for this pixel; choose one beside it")
     return value
 
 

@@ -14,25 +14,30 @@ from sepi.command import SepiCommand
 from sepi.errors import SepiError
 
 _PATH = click.Path(path_type=Path)
-_PARTIAL = click.option("--partial", is_flag=True, help="Take fewer than the benchmark's 12 scenes.")
+_PARTIAL = click.option("--partial", is_flag=True, help="Accept fewer than the benchmark's 12 scenes.")
 
 
 @click.command(cls=SepiCommand)
 @click.argument("result_path", metavar="RESULT", type=_PATH)
 @click.option(
-    "-o", "--output", type=_PATH, help="PLY file to write; points.ply beside the result, or points_ROW_COLUMN.ply."
+    "-o",
+    "--output",
+    type=_PATH,
+    help="PLY file to write; default: points.ply in the result, with --view points_ROW_COLUMN.ply.",
 )
-@click.option("--min-confidence", type=float, default=0.0, metavar="X", help="Leave out less sure pixels; 0 to 1.")
-@click.option("--max-depth", type=float, metavar="M", help="Leave out points more distant than this many metres.")
+@click.option(
+    "--min-confidence", type=float, default=0.0, metavar="X", help="Leave out pixels of a lower confidence, 0 to 1."
+)
+@click.option("--max-depth", type=float, metavar="M", help="Leave out points farther than this, metres.")
 @click.option(
     "--max-sigma",
     type=float,
     metavar="X",
-    help="Leave out points of a larger standard deviation: of the depth in metres where the camera is known, else of "
+    help="Leave out points of a larger standard deviation: of the depth in metres if the camera is known, else of "
     "the disparity in pixels per view step.",
 )
 @click.option("--step", type=click.IntRange(min=1), default=1, metavar="N", help="Use every Nth row and column only.")
-@click.option("--keep-unknown", is_flag=True, help="Keep pixels that no view knows anything about.")
+@click.option("--keep-unknown", is_flag=True, help="Keep unknown pixels, for whose depth no view has evidence.")
 @view_of_result
 @camera_flags
 def points(
@@ -64,7 +69,7 @@ def points(
 
     result = read_result_at(result_path, view)
     if max_sigma is not None and result.sigma is None:
-        raise SepiError(f"{result_path}: --max-sigma: the result has no error bars, as the methods compared with")
+        raise SepiError(f"{result_path}: --max-sigma: the result has no error bars, like those of compared methods")
     cloud = point_cloud(
         result.picture,
         result.disparity,
@@ -87,7 +92,7 @@ def points(
     if path.suffix.lower() != ".ply":
         raise SepiError(f"{path}: expected a name that ends with .ply, the format of the file")
     write_ply(path, cloud)
-    units = cloud.units or "metres" if cloud.metric else "relief: the camera is not known, so not to scale"
+    units = cloud.units or "metres" if cloud.metric else "relief, not to scale, since the camera is unknown"
     click.echo(f"written: {path} ({len(cloud.positions)} points, {units})")
 
 
@@ -95,7 +100,11 @@ def points(
 @click.argument("results", metavar="RESULT...", nargs=-1, required=True, type=_PATH)
 @click.option("-o", "--output", type=_PATH, default=Path("submission.zip"), show_default=True, help="Zip to write.")
 @click.option(
-    "--runtime", "runtimes", multiple=True, metavar="SCENE=SECONDS", help="In place of runtime.txt; repeatable."
+    "--runtime",
+    "runtimes",
+    multiple=True,
+    metavar="SCENE=SECONDS",
+    help="Run time, in place of runtime.txt; repeatable.",
 )
 @_PARTIAL
 def submission(results: tuple[Path, ...], output: Path, runtimes: tuple[str, ...], partial: bool) -> None:

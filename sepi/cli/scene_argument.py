@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sepi.io.result_folder import Result
     from sepi.lightfield import FloatMap, LightField
 
-_BARE = "a map alone, such as its disparity.pfm, is taken for one of any light field"
+_BARE = "a single map, such as its disparity.pfm, may be of any light field"
 
 
 def require_one_view(estimate: Path, other: Path, reading: Reading) -> None:
@@ -53,7 +53,7 @@ def read_ground_truth(
         return own.read(), None
     if is_disparity(path):
         if own is not None:
-            raise click.UsageError(f"{path} is ground truth, and so is --truth FILE: give one of them")
+            raise click.UsageError(f"{path} and --truth FILE are both ground truth; give one of them")
         values = read_disparity_at(path, reading.options.view)
         require_one_view(estimate, path, reading)
         return values, None
@@ -113,7 +113,7 @@ def read_light_field_of(
         difference = origin.difference(light_field)
         if difference is None:
             return light_field
-        advice = "give the one that it was made from, and no flags that 'sepi depth' did not have"
+        advice = "give the light field that it was made from, with the same flags as for 'sepi depth'"
         failures.append(
             SepiError(f"{result}: {difference}, as {path} is read here; {advice}{f' ({_BARE})' if bare else ''}")
         )

@@ -26,16 +26,16 @@ _PATH = click.Path(path_type=Path)
 @click.command(cls=SepiCommand)
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @click.option("-o", "--output", type=_PATH, default=Path("scenes"), show_default=True, help="Folder to write to.")
-@click.option("--rendered", is_flag=True, help="Path-traced scenes, by Mitsuba 3 (extra [render]): minutes for each.")
-@click.option("--size", type=click.IntRange(min=1), help="Pixels a side of a view; 192, with --rendered 512.")
+@click.option("--rendered", is_flag=True, help="Path-traced scenes (Mitsuba 3, extra [render]); minutes for each.")
+@click.option("--size", type=click.IntRange(min=1), help="Pixels a side of a view; default: 192, with --rendered 512.")
 @click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Views a side of the grid.")
-@click.option("--samples", type=click.IntRange(min=1), help="With --rendered: paths of light for each pixel; 64.")
+@click.option("--samples", type=click.IntRange(min=1), help="With --rendered: paths for each pixel; default: 64.")
 @click.option(
     "--noise",
     "levels",
     type=click.Choice(NOISE_LEVELS),
     multiple=True,
-    help="With --rendered: noise of the sensor; repeatable, a folder for each; off.",
+    help="With --rendered: noise of the sensor; repeatable, a folder for each; default: off.",
 )
 @click.option(
     "--set",
@@ -44,7 +44,7 @@ _PATH = click.Path(path_type=Path)
     metavar="KEY=VALUE",
     help="With --rendered: lens=0.5, vignetting=0.4, ...; repeatable. docs/reproduce/rendered.md lists them.",
 )
-@click.option("--all-views", is_flag=True, help="With --rendered: also a disparity map for each view.")
+@click.option("--all-views", is_flag=True, help="With --rendered: also write a disparity map for each view.")
 @click.option("--list", "only_list", is_flag=True, help="List the scenes and write nothing.")
 def scenes(
     names: tuple[str, ...],
@@ -85,7 +85,7 @@ def scenes(
     else:
         only = {"--samples": samples, "--noise": levels, "--set": settings, "--all-views": all_views}
         for flag in (flag for flag, value in only.items() if value):
-            raise click.UsageError(f"{flag} is of use with --rendered alone")
+            raise click.UsageError(f"{flag} needs --rendered")
         _write_builtin(names, output, 192 if size is None else size, views)
 
 
@@ -151,7 +151,7 @@ def _renders(names: Sequence[str], options: RenderOptions, output: Path) -> Gene
         if name not in missing:
             known = read_render(path)
             if known.made_by != made_by(name, options):
-                raise SepiError(f"{path}: was rendered with other options; remove it or choose another folder with -o")
+                raise SepiError(f"{path}: was rendered with other options; remove it, or choose another folder with -o")
             yield known
     with closing(render_scenes(missing, options, output)) as rendered:
         yield from (read_render(files[name]) for name in rendered)
@@ -174,4 +174,4 @@ def _write_folder(render: Render, exposure: Exposure, folder: Path, all_views: b
 def _require_new(output: Path, folders: Iterable[str]) -> None:
     for name in folders:
         if (output / name).exists():
-            raise SepiError(f"{output / name}: exists already; remove it or choose another folder with -o")
+            raise SepiError(f"{output / name}: exists already; remove it, or choose another folder with -o")

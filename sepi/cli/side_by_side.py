@@ -87,9 +87,7 @@ def _require_done(name: str, process: subprocess.Popen[str]) -> None:
     """Raise the error of a process that has ended, or say what it warned of."""
     told = process.communicate()[1].strip()
     if process.returncode < 0:
-        raise SepiError(
-            f"{name}: its process was ended by signal {-process.returncode}; the next run goes on from there"
-        )
+        raise SepiError(f"{name}: signal {-process.returncode} ended its process; the next run continues from here")
     if process.returncode:
         raise SepiError(told.removeprefix("sepi: ") or f"{name}: exit code {process.returncode}")
     if told:

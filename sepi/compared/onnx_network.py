@@ -125,7 +125,7 @@ def onnx(
 
 def _session(parameters: OnnxParameters) -> onnxruntime.InferenceSession:
     if parameters.model is None:
-        raise SepiError("initial.onnx.model: no network; name an ONNX file (docs/reproduce/compared.md)")
+        raise SepiError("initial.onnx.model: not given; expected the path of an ONNX file (docs/reproduce/compared.md)")
     if not Path(parameters.model).is_file():
         raise SepiError(f"{parameters.model}: no such file")
     try:
@@ -157,12 +157,12 @@ def _chosen_views(light_field: LightField, parameters: OnnxParameters) -> tuple[
     top, left = (t - rows // 2, s - columns // 2) if parameters.grid else (0, 0)
     if min(top, left) < 0 or top + rows > light_field.grid[0] or left + columns > light_field.grid[1]:
         raise SepiError(
-            f"{light_field.name}: the network takes {rows}x{columns} views round view {t},{s}, and the light field has "
+            f"{light_field.name}: the network takes {rows}x{columns} views round view {t},{s}, but the light field has "
             f"{light_field.grid[0]}x{light_field.grid[1]}"
         )
     part = np.s_[top : top + rows, left : left + columns]
     if not light_field.present[part].all():
-        raise SepiError(f"{light_field.name}: a network takes all views of its grid, and some are missing")
+        raise SepiError(f"{light_field.name}: the network needs all views of its grid, but some are missing")
     views = as_unit_float(light_field.rgb_views[part])
     if parameters.grey:
         views = (views @ _GREY)[..., None]
@@ -215,7 +215,7 @@ def _run(
     wanted = session.get_inputs()
     if len(given) != len(wanted):
         raise SepiError(
-            f"{parameters.model}: has {len(wanted)} inputs ({', '.join(one.name for one in wanted)}), and "
+            f"{parameters.model}: has {len(wanted)} inputs ({', '.join(one.name for one in wanted)}), but "
             f"initial.onnx.inputs describes {len(given)}"
         )
     kinds = {"tensor(float16)": np.float16, "tensor(double)": np.float64}

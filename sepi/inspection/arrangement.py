@@ -99,28 +99,28 @@ def arrange(light_field: LightField, options: ReadOptions) -> LightField:
     ranked = sorted(range(len(tried)), key=lambda n: costs[n])
     names = ", ".join(way.name for way in tried)
     if math.isfinite(costs[ranked[0]]) and costs[ranked[0]] > _MOST_COST:
-        odd = "; ".join(odd_views(light_field)) or "leave pictures out that are no views with --exclude"
+        odd = "; ".join(odd_views(light_field)) or "leave out pictures that are not views by --exclude"
         raise SepiError(
-            f"{source}: {count} views without row and column, and in no arrangement tried ({names}) they fit together; "
+            f"{source}: {count} views without row and column fit together in no arrangement tried ({names}); "
             f"give --grid ROWSxCOLUMNS, or {odd}"
         )
-    best, reason = tried[ranked[0]], "by how they fit together"
+    best, reason = tried[ranked[0]], "in which they fit together"
     if len(tried) > 1 and not _CLEAR_RATIO * costs[ranked[0]] + _LEAST_DIFFERENCE <= costs[ranked[1]] < math.inf:
         square = next(
             (way for way in tried if way.grid[0] == way.grid[1] and len(way.positions) == way.grid[0] ** 2), None
         )
         if square is None:
             raise SepiError(
-                f"{source}: {count} views without row and column, and the views do not tell which arrangement is "
-                f"theirs ({names}); give --grid ROWSxCOLUMNS"
+                f"{source}: {count} views without row and column, and their arrangement is unclear "
+                f"({names}); give --grid ROWSxCOLUMNS"
             )
         warnings.warn(
-            f"{source}: the views do not tell which grid they fill; taken for {square.name}, --grid sets it otherwise",
+            f"{source}: the grid of the views is unclear; taken for {square.name}, set another by --grid",
             SepiWarning,
             stacklevel=2,
         )
-        best, reason = square, "since the views do not tell"
-    note = f"{count} numbered views taken for {best.name}, {reason}; --grid sets it otherwise"
+        best, reason = square, "since the views are unclear"
+    note = f"{count} numbered views taken for {best.name}, {reason}; set another by --grid"
     return _placed(light_field, best, options, note)
 
 

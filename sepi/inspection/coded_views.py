@@ -36,6 +36,6 @@ def coded_views(light_field: LightField) -> str | None:
         if of_place.max() - others.mean() < max(_MORE * others.mean(), _ERRORS * others.std()):
             return None
     return (
-        "the views were compressed with loss (blocks of 8x8 pixels show, as those of JPEG): what was lost stands still "
-        "in all views, and draws what has little texture to disparity 0; take less compressed ones, if there are any"
+        "the views were compressed with loss (they show blocks of 8x8 pixels, like JPEG's): the blocks have the same "
+        "place in all views, and draw regions of little texture to disparity 0; use less compressed views if possible"
     )

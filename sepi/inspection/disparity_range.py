@@ -172,7 +172,7 @@ def settle_range(light_field: LightField, given: tuple[float, float] | None = No
         warnings.warn(
             f"{light_field.source or light_field.name}: {100 * share:.0f} % of the textured pixels match nowhere in "
             f"the disparity range ({known.source}) of {known.minimum:g} to {known.maximum:g} pixels per view step; "
-            "where the views are in the right order, give another one by --disparity-range",
+            "if the views are in the right order, give another range by --disparity-range",
             SepiWarning,
             stacklevel=2,
         )
@@ -285,8 +285,8 @@ class _Views:
         pixels, patches = _patches(trusted, np.minimum(1, len(positions) * (1 - unclear)) ** 2, smooth, tolerance)
         if pixels.size < _FEWEST_PIXELS:
             raise SepiError(
-                f"{self.light_field.name}: the disparity range cannot be estimated, too few pixels match between the "
-                "views; give one (MIN MAX, pixels per view step)"
+                f"{self.light_field.name}: the disparity range cannot be estimated: too few pixels match between the "
+                "views; give a range (MIN MAX, pixels per view step)"
             )
         low, high = np.quantile(pixels, [_OUTLIERS, 1 - _OUTLIERS])
         # small surfaces far before or behind the others are not outliers

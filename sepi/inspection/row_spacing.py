@@ -60,7 +60,7 @@ def settle_row_spacing(light_field: LightField, views: Views | None = None) -> L
     if spacing is None:
         return light_field
     spacing = round(spacing, 3)
-    note = f"rows of views are {spacing:g} times as far apart as columns, by the views; --row-spacing sets it"
+    note = f"rows of views are {spacing:g} times as far apart as columns (estimated); set it by --row-spacing"
     return replace(light_field, row_spacing=spacing, notes=(*light_field.notes, note))
 
 

@@ -91,33 +91,33 @@ class OrderCheck:
         Returns
         -------
         str
-            Whether the order is right, which one is, or that the views do not tell.
+            Whether the order is right, which one is, or that it is unclear.
         """
         warning = self.warning()
         if warning is not None:
             return warning
         if not self.clear:
             return (
-                "cannot tell: no order fits clearly better than the others (too little texture, or too little movement "
+                "unclear: no order fits clearly better than the others (too little texture, or too little movement "
                 "between the views)"
             )
         note = self.note()
         return f"the views are in the right order{'' if note is None else f', but {note}'}"
 
     def note(self) -> str | None:
-        """What to do if near and far are exchanged.
+        """Advice if near and far may be exchanged.
 
         Returns
         -------
         str or None
-            None where the views tell near from far, or their order is wrong or not clear.
+            None if near and far are clear, or the order is wrong or unclear.
         """
         if not self.clear or self.sign_clear or self.best != self.read_in:
             return None
         return f"{SIGN_OPEN}; if depth comes out inside out, read it with --order {turned_by_half(self.best)}"
 
     def warning(self) -> str | None:
-        """What to read the light field with instead.
+        """Advice if the order is wrong.
 
         Returns
         -------
@@ -126,8 +126,8 @@ class OrderCheck:
         """
         if self.fits_none:
             return (
-                "the views fit together in no order: they are of several moments or places, not rectified, or named "
-                "otherwise than 'sepi info' shows them read"
+                "the views fit together in no order: they show several moments or places, are not rectified, or have "
+                "other names than 'sepi info' assumes"
             )
         if not self.clear or self.best == self.read_in:
             return None
@@ -135,8 +135,8 @@ class OrderCheck:
         advice = f"read it with --order {self.best}"
         if not self.sign_clear:
             return f"{fault}: {advice}, or {turned_by_half(self.best)} if depth comes out inside out"
-        told = f"what hides what agrees in {self.agreeing} of {self.regions} regions of the picture"
-        return f"{fault} ({told if self.regions else 'so say the camera positions in the names'}): {advice}"
+        told = f"occlusion agrees in {self.agreeing} of {self.regions} regions of the picture"
+        return f"{fault} ({told if self.regions else 'according to camera positions in the names'}): {advice}"
 
 
 def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views | None = None) -> OrderCheck:

@@ -53,9 +53,9 @@ def build(*, only_if_changed: bool = False) -> None:
                 )
                 if done.returncode:
                     print(done.stdout, done.stderr, sep="\n", file=sys.stderr)
-                    raise ImportError("sepi: the sources of its kernels do not build; cmake says why above")
+                    raise ImportError("sepi: building its kernels failed; the output of cmake above has the reason")
     except OSError:
-        raise ImportError("sepi: its kernels are not those of the sources here; `make` builds them") from None
+        raise ImportError("sepi: its kernels were built from other sources; run `make` to build them") from None
 
 
 if __name__ == "__main__":

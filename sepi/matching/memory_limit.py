@@ -71,8 +71,8 @@ def bytes_of_bands(light_field: LightField, stages: Iterable[Parameters], memory
     whole, least = _bytes_taken(light_field, stages)
     if memory < least:
         raise SepiError(
-            f"{light_field.name}: takes at least {-(-least // 2**20)} MB with these views and candidates, more than "
-            f"the {memory // 2**20} MB that it may take; fewer candidates, a narrower range or variant paper take less"
+            f"{light_field.name}: needs at least {-(-least // 2**20)} MB with these views and candidates, more than "
+            f"the limit of {memory // 2**20} MB; fewer candidates, a narrower range or variant paper need less"
         )
     return memory - whole
 

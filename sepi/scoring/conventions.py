@@ -56,11 +56,11 @@ def misfit(estimate: FloatMap, truth: FloatMap, grid: tuple[int, int] | None = N
     if as_it_is < _POOR:
         return None
     if off(truth, zero)[0] > 1 - _POOR and off(truth, known & ~zero)[0] < _BETTER * as_it_is:
-        return f"without its zeros, {100 * zero.sum() / known.sum():.0f} % of it; where 0 is unknown, NaN says so"
+        return f"without its zeros, {100 * zero.sum() / known.sum():.0f} % of it; if 0 means unknown, write NaN"
     tried = {
         "upside down (a PFM begins with its bottom row)": truth[::-1],
         "mirrored": truth[:, ::-1],
-        "turned by half a turn": truth[::-1, ::-1],
+        "rotated by 180 degrees": truth[::-1, ::-1],
     }
     with np.errstate(divide="ignore"):
         inverse: FloatMap = np.float32(1) / truth
@@ -90,9 +90,9 @@ def _line(values: FloatMap, wanted: FloatMap) -> tuple[float, float]:
 
 def _line_text(factor: float, more: float, close: float, inverse: bool, grid: tuple[int, int] | None) -> str:
     if inverse:
-        return f"as depth, {factor:.3g} / it {more:+.3g}; disparity in pixels per view step is expected"
+        return f"as depth, {factor:.3g} / it {more:+.3g}; expected disparity in pixels per view step"
     if abs(more) > close:
-        return f"as {factor:.3g} * it {more:+.3g}; disparity is 0 in focus, and in pixels per view step"
+        return f"as {factor:.3g} * it {more:+.3g}; expected disparity in pixels per view step, 0 in focus"
     counts = [count - less for count in grid or () for less in (0, 1)]
     steps = next((n for n in counts if abs(abs(factor) * n - 1) < _EQUAL), None)
     size = f"{1 / steps if steps else abs(factor):.3g}"

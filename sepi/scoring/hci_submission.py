@@ -96,7 +96,9 @@ def entry_of(folder: Path, runtimes: Mapping[str, float]) -> tuple[str, Entry]:
     result = read_result(folder)
     scene = result.scene
     if result.from_centre != (0, 0):
-        raise SepiError(f"{folder}: depth of another view; the benchmark wants that of the centre view, without --view")
+        raise SepiError(
+            f"{folder}: depth of another view; expected that of the centre view (sepi depth without --view)"
+        )
     require_known(f"{folder}: scenes of the benchmark", [scene], SCENES)
     disparity, runtime = folder / "disparity.pfm", folder / RUNTIME
     if not disparity.is_file():
@@ -241,7 +243,7 @@ def _strangers(names: Collection[str]) -> list[str]:
     strange = {name: name.split("/") for name in names if name not in _EXPECTED and not name.endswith("/")}
     # disp_maps/ and runtimes/ a level too low; __MACOSX/ holds what that system adds to an archive
     wrapping = {parts[0] for parts in strange.values() if parts[1:2] and parts[1] in _NAMES} - {"", "__MACOSX"}
-    lines = [f"{folder}/: {MAPS}/ and {RUNTIMES}/ must lie at the root, not in this folder" for folder in wrapping]
+    lines = [f"{folder}/: expected {MAPS}/ and {RUNTIMES}/ at the root, not in this folder" for folder in wrapping]
     others = [name for name, parts in strange.items() if parts[0] not in wrapping]
     lines = sorted(map(_shown, lines))
     lines += [f"{_shown(name)}: does not belong to a submission; leave it out" for name in others[:_MOST_LINES]]

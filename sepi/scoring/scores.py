@@ -261,7 +261,7 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
     """
     require_light_field(light_field)
     if light_field.ground_truth is None:
-        raise SepiError(f"{light_field.name}: regions for evaluation need ground truth, and this scene has none")
+        raise SepiError(f"{light_field.name}: regions for evaluation need ground truth, but this scene has none")
     names = ("occluded", "textureless")
     masks = dict(light_field.masks)
     if not masks.keys() >= set(names):

@@ -374,12 +374,12 @@ def test_a_stack_goes_from_near_to_far() -> None:
         (lambda field: refocus(field, 0.0, aperture=math.nan), "aperture must be a radius above 0"),
         (
             lambda field: refocus(field, 0.0, aperture=0.6),
-            "holds no view but the reference view; the nearest other is 1",
+            "an aperture of 0.6 view steps .*; the nearest other is 1",
         ),
         (lambda field: all_in_focus(field, np.zeros((9, 10), np.float32)), r"\(9, 11\), got float32 \(9, 10\)"),
         (lambda field: all_in_focus(field, np.zeros((9, 11), np.float32), aperture=-1), "radius above 0"),
         (lambda field: refocus(field, 0.0, np.zeros((4, 11), np.float32)), r"\(9, 11\), got float32 \(4, 11\)"),
-        (lambda _: focal_stack(np.full((3, 3), np.nan, np.float32), 3), "no pixel of known disparity"),
+        (lambda _: focal_stack(np.full((3, 3), np.nan, np.float32), 3), "no pixel"),
     ],
 )
 def test_what_cannot_be_done_is_one_line(call: Any, message: str) -> None:

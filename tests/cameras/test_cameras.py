@@ -380,10 +380,10 @@ def _gone(entries: list[dict[str, Any]]) -> None:
 @pytest.mark.parametrize(
     ("spoil", "expected"),
     [
-        (_same_place, "stand at one place"),
+        (_same_place, r"leave one .*--exclude \w+\.png"),
         (_facing, "degrees apart"),
-        (_along, "move along the way that they look"),
-        (_mirrored, "no mirror"),
+        (_along, r"\d degrees .*; expected .* to 90 degrees"),
+        (_mirrored, "rotation: expected"),
         (_gone, "no picture 'gone.png'"),
     ],
 )
@@ -474,14 +474,14 @@ def test_a_lens_is_that_of_the_picture_at_hand_whoever_tells_it(tmp_path: Path, 
     assert {(shot.lens.width, shot.lens.focal, shot.lens.principal) for shot in model.shots} == {
         (64, LENS.focal, (30.5, 20.5))
     }
-    with pytest.raises(SepiError, match="from column 70, row 20 on do not lie inside 128x96"):
+    with pytest.raises(SepiError, match="column 70, row 20 .*128x96"):
         read_model(cut, crop_of=(128, 96, 70, 20))
 
 
 @pytest.mark.parametrize("kind", KINDS[:3])
 def test_a_principal_point_of_other_pictures_is_told_where_no_size_is(tmp_path: Path, kind: str) -> None:
     folder = _told_at(tmp_path, kind, (64, 48), sized=False)
-    with pytest.raises(SepiError, match=r"those of pictures about 1\.7 times as large; expected the size"):
+    with pytest.raises(SepiError, match=r"pictures about 1\.7 times as large; expected .*--crop-of"):
         read_model(folder)
     assert read_model(folder, crop_of=(128, 96, 0, 0)).shots[0].lens.principal == LENS.principal
 
@@ -492,7 +492,7 @@ def test_a_side_that_was_rounded_is_no_other_scale() -> None:
     for told, here in ((whole, quarter), (quarter, whole)):
         lens = Lens(*told, (1000.0, 1000.0), (told[0] / 2 - 0.5, told[1] / 2 - 0.5)).scaled(*here)
         assert lens.principal == pytest.approx((here[0] / 2 - 0.5, here[1] / 2 - 0.5))
-    with pytest.raises(SepiError, match="scaled alike"):
+    with pytest.raises(SepiError, match="is 3286x4946, but its camera has 4946x3286"):
         lens.scaled(3286, 4946)
 
 
@@ -568,7 +568,7 @@ def test_without_pycolmap_the_extra_is_named(tmp_path: Path, monkeypatch: pytest
 
 
 def test_a_damaged_rig_is_told() -> None:
-    with pytest.raises(SepiError, match="where its cameras stood"):
+    with pytest.raises(SepiError, match="damaged"):
         Rig.from_text('{"views": 3}')
 
 

@@ -90,7 +90,7 @@ def test_export_keeps_it_for_every_command(seen: LightField) -> None:
         (("map", "--truth", "truth.png"), "truth.png: a PNG without the text chunks 'scale' and 'offset' does not say"),
         (("map", "--truth", "text.png", "--truth-scale", 1), "text.png: not a PNG"),
         (("map", "--truth", "nothing.png", "--truth-scale", 1), "nothing.png: no pixel is known; 0 in whole numbers"),
-        (("map", "--truth", "small.pfm"), "small.pfm: ground truth is (60, 64), the estimate (64, 64)"),
+        (("map", "--truth", "small.pfm"), "small.pfm: ground truth has shape (60, 64), the estimate (64, 64)"),
         (("map", "plain.h5", "--truth", "small.pfm"), "small.pfm: ground truth is (60, 64), the views are (64, 64)"),
         (
             ("map", "--truth", "truth.png", "--truth-scale", 1, "--view", "1,1"),
@@ -110,7 +110,7 @@ def test_truth_of_another_convention_is_told_beside_the_scores(seen: LightField)
     write_pfm(Path("upside.pfm"), known[::-1])
     np.save("right.npy", known)
     called = call("evaluate", "right.npy", "upside.pfm", "--json")
-    assert "upside.pfm: ground truth would fit right.npy far better upside down" in called.stderr
+    assert "upside.pfm: the ground truth fits right.npy far better upside down" in called.stderr
     assert json.loads(called.stdout)["paper"]["all"]["pixels"] == 64 * 64
     write_pfm(Path("upside.pfm"), known)
     assert call("evaluate", "right.npy", "upside.pfm").stderr == ""
@@ -120,8 +120,8 @@ def test_truth_of_another_convention_is_told_beside_the_scores(seen: LightField)
     ("words", "message"),
     [
         (("map",), "expected GROUND_TRUTH, a SCENE, or --truth FILE"),
-        (("map", "truth.npy", "--truth", "truth.png"), "truth.npy is ground truth, and so is --truth FILE"),
-        (("map", "plain.h5", "--truth-scale", 2), "--truth-scale says what the numbers of --truth FILE mean"),
+        (("map", "truth.npy", "--truth", "truth.png"), "truth.npy and --truth FILE"),
+        (("map", "plain.h5", "--truth-scale", 2), "--truth FILE; give --truth"),
         (("map", "--truth", "truth.png", "--truth-scale", 0), "0.0 is not in the range 0<x<inf"),
         (("map", "--truth", "truth.png", "--bad", 0), "'--bad': 0.0 is not in the range x>0"),
     ],

@@ -106,7 +106,7 @@ def test_poses_without_a_camera_are_told_to_be_nominal(scene: LightField) -> Non
     called = call("poses", "scene.h5", "maps")
     assert called.exit_code == 0, called.output
     first, last = called.stdout.splitlines()
-    assert first.startswith("the camera is not known: a nominal one is taken")
+    assert "nominal" in first
     assert "neither in metres nor to scale" in first
     assert last.endswith("nominal units)")
     assert "# units: nominal units" in Path("scene-colmap/sparse/images.txt").read_text()
@@ -296,9 +296,7 @@ def test_error_bars_are_maps_to_convert_as_well(scene: LightField) -> None:
     disparity = np.zeros(scene.shape, np.float32)
     sigma = np.random.default_rng(2).uniform(0.01, 0.1, scene.shape).astype(np.float32)
     bars = {"sigma": sigma, "low": disparity - sigma, "high": disparity + 3 * sigma}
-    assert "maps: no sigma, as the result has no error bars" in error_of(
-        call("convert", "maps", "x.tif", "--map", "sigma")
-    )
+    assert "maps: no sigma" in error_of(call("convert", "maps", "x.tif", "--map", "sigma"))
     write_result("maps", scene, StageMaps(disparity, disparity, bars))
     # 30 / 6^2 metres for each pixel per view step
     for name, expected in {**bars, "depth_sigma": sigma * 30 / 36}.items():

@@ -34,7 +34,7 @@ def _estimate(noise: float = 0.03) -> FloatMap:
     [
         (_truth()[::-1], "upside down"),
         (_truth()[:, ::-1], "mirrored"),
-        (_truth()[::-1, ::-1], "half a turn"),
+        (_truth()[::-1, ::-1], "180 degrees"),
         (-_truth(), "sign turned"),
         (4 * _truth(), r"0\.25, as one in steps of the whole grid \(--truth FILE --truth-scale 0\.25\)"),
         (_truth() / 3, r"multiplied by 3\b(?!.*whole grid)"),

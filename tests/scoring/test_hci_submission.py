@@ -146,7 +146,8 @@ def test_a_name_in_capitals_is_another_name(made: Callable[[Files], Path]) -> No
 def test_all_in_a_folder_of_its_own_is_said_in_few_words(made: Callable[[Files], Path]) -> None:
     """What most programs make of 'compress this folder'."""
     lines = problems_of(made({f"mine/{name}": data for name, data in good().items()}))
-    assert lines[0] == "mine/: disp_maps/ and runtimes/ must lie at the root, not in this folder"
+    assert lines[0].startswith("mine/: ")
+    assert "disp_maps/ and runtimes/ at the root" in lines[0]
     assert [line.partition(":")[0] for line in lines[1:]] == ["disp_maps/", "runtimes/"]
 
 
