@@ -70,7 +70,7 @@ bad_thresholds = click.option(
     type=click.FloatRange(min=0, min_open=True),
     multiple=True,
     metavar="T",
-    help="Also score the share of pixels with an error above T pixels per view step; repeatable.",
+    help="Also score the share of errors above T pixels per view step; repeatable.",
 )
 
 
@@ -239,9 +239,7 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     @click.option("--light-field", "light_field_path", type=existing, required=True, help="HDF5 file from ingest.")
     @click.option("--previous", type=existing, help="File of the stage before; not for the first stage.")
     @click.option("--choice", type=click.Choice(list(choices)), required=True, help="Choice of this stage.")
-    @click.option(
-        "--parameters", default="{}", show_default=True, help="JSON object of parameters; others have defaults."
-    )
+    @click.option("--parameters", default="{}", show_default=True, help="JSON object of parameters.")
     @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
     @click.option("--output", type=existing, required=True, help="Stage file to write.")
     @click.option("--timing", type=existing, help="JSON file to write: seconds, peak memory, machine.")

@@ -162,12 +162,7 @@ _PATH = click.Path(path_type=Path)
 @click.command(name="python -m sepi.evaluate", cls=SepiCommand)
 @click.option("--light-field", "light_field_path", type=_PATH, required=True, help="From ingest.")
 @click.option("--truth", type=_PATH, help="Ground truth from sepi.truth; default: the light field's own.")
-@click.option(
-    "--stages",
-    type=_PATH,
-    required=True,
-    help="Folder of the stage files; their paths in it are the names of the maps.",
-)
+@click.option("--stages", type=_PATH, required=True, help="Folder of the stage files, whose paths name the maps.")
 @bad_thresholds
 @click.option("--output", type=_PATH, required=True, help="Score file (HDF5) to write.")
 @click.argument("paths", nargs=-1, type=_PATH, metavar="STAGE_FILE...", required=True)

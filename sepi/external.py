@@ -116,9 +116,7 @@ def _sources(text: str) -> dict[str, ExternalSource]:
 @click.command(name="python -m sepi.external", cls=SepiCommand)
 @click.option("--light-field", "light_field_path", type=click.Path(path_type=Path), required=True, help="From ingest.")
 @click.option(
-    "--truth",
-    type=click.Path(path_type=Path),
-    help="Ground truth from sepi.truth; default: the light field's own.",
+    "--truth", type=click.Path(path_type=Path), help="Ground truth from sepi.truth; default: the light field's own."
 )
 @click.option("--maps", required=True, help='JSON: {"METHOD": {"path": FILE, "scale": NUMBER, "offset": NUMBER}, ...}.')
 @click.option("--scene", default="", help="Name of the scene in messages; default: the light field's own.")

@@ -81,23 +81,19 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     )
     views: int | None = Field(None, ge=2, description="least number of views for the last step; null: all")
     first_views: int | None = Field(
-        25,
-        ge=2,
-        description="least number of views for all steps but the last; null, or if they are noisy: all",
+        25, ge=2, description="least number of views for all steps but the last; null, or if they are noisy: all"
     )
     refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
     noisy_refinements: int = Field(
         6, ge=0, le=20, description="the same for noisy views, where matching ends farther from the true depth"
     )
     refinement_radius: int = Field(4, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
-    one_surface: bool = Field(
-        True, description="whether a window leaves out other surfaces, by disparities and colours"
-    )
+    one_surface: bool = Field(True, description="whether a window leaves out other surfaces, by depth and colour")
     solves: int = Field(4, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
     solve_radius: int = Field(1, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
     max_update: float = Field(0.05, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
     strength: float = Field(
-        7.0, ge=0, description="weight of the smoothness; the best-known tenth of the pixels has data of weight 1"
+        7.0, ge=0, description="weight of the smoothness; the best-known tenth of data has weight 1"
     )
     second_difference_threshold: float = Field(
         0.03, gt=0, description="second difference that marks a discontinuity in the first round, pixels per view step"

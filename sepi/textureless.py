@@ -61,9 +61,7 @@ class LtiParameters(CannyParameters):
         0.03, gt=0, description="mean-shift bandwidth in the HSV cone of radius 1, height 1"
     )
     continuity: float = Field(0.3, ge=0, description="tau_out, weight of continuity between neighbours")
-    slope_continuity: float = Field(
-        10.0, ge=0, description="weight of equal slopes relative to equal depth at the border"
-    )
+    slope_continuity: float = Field(10.0, ge=0, description="weight of equal slopes, relative to equal depth")
     tolerance: float = Field(0.05, gt=0, description="residual of an inlier, pixels per view step")
     keep_confidence: float = Field(
         0.7, ge=0, le=1, description="relative confidence from which a pixel resists a plane"

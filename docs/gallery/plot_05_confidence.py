@@ -108,8 +108,8 @@ figure.colorbar(image, ax=axis, label="px / step")
 plt.show()
 
 # %%
-# One more mask is always there: ``unknown`` marks pixels for whose depth no view
-# has evidence, such as a black background or an overexposed window. Confidence
-# is 0 there. This scene has none.
+# One more mask is always there: ``unknown`` marks pixels for whose depth no
+# view has evidence, such as a black background or an overexposed window.
+# Confidence is 0 there. This scene has none.
 
 print("unknown pixels:", int(maps.extra["unknown"].sum()))

@@ -11,9 +11,7 @@ class BoundaryParameters(OcclusionMarginParameters):
     """What is a depth step, and what decides which side of it a pixel is on."""
 
     use_shares: bool = Field(True, description="whether the decision uses the shares of both surfaces in all views")
-    use_mixture: bool = Field(
-        True, description="whether the decision uses the mixture of colours in the reference view"
-    )
+    use_mixture: bool = Field(True, description="whether the decision uses mixed colours of the reference view")
     use_lines: bool = Field(
         True, description="whether straight edges through its neighbours decide about a pixel; false: the pixel alone"
     )
@@ -30,7 +28,7 @@ class BoundaryParameters(OcclusionMarginParameters):
         description="cost of a change to the other surface, for a whole pixel, relative to the views' mean costs, 0..1",
     )
     share_radius: int = Field(
-        2, ge=1, le=10, description="distance from the step within which the views' shares decide, in pixels"
+        2, ge=1, le=10, description="distance from the step within which shares decide, in pixels"
     )
     share_scale: float = Field(
         0.2,
@@ -40,10 +38,7 @@ class BoundaryParameters(OcclusionMarginParameters):
     )
     share_views: int = Field(81, ge=2, description="least number of views for the shares")
     alpha_threshold: float = Field(
-        0.39,
-        gt=0,
-        le=1,
-        description="share of the nearer surface below which the colours show the farther one",
+        0.39, gt=0, le=1, description="share of the nearer surface below which the colours show the farther one"
     )
     alpha_contrast: float = Field(
         9.0,

@@ -64,9 +64,7 @@ class Pictures:
         if tried[0] not in within:
             raise SepiError(f"{self._model}: picture '{tried[0]}': expected a path within the folder of pictures")
         where = " nor ".join(map(str, self._places[:3]))
-        raise SepiError(
-            f"{self._model}: no picture '{names[0]}' in {where}; name the folder of the pictures by --images"
-        )
+        raise SepiError(f"{self._model}: no picture '{names[0]}' in {where}; name the folder by --images")
 
     def size(self, file: Path) -> tuple[int, int]:
         """Width and height of a picture, or of that which it is a part of."""

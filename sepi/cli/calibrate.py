@@ -35,10 +35,11 @@ _PATH = click.Path(path_type=Path)
 def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force: bool, threads: int | None) -> None:
     """Find the cameras that took the pictures in FOLDER, and write them as a COLMAP model for 'sepi depth'.
 
-    One camera, moved sideways past a scene in which nothing moves, and looking much the same way; a grid, a row or any
-    sweep. First a few of the pictures are looked at, small: a camera that hardly moved, moved forward or turned too far
-    is told at once. At the end it says how many pictures are placed, and how flat the motion was. Focal length is that
-    of the files' EXIF, else a usual one, unless the pictures tell it. Needs pycolmap: pip install 'sepi[colmap]'.
+    Move one camera sideways past a static scene, with a constant viewing direction, along a grid, a row or any path.
+    A first check of a few reduced pictures refuses a camera that hardly moved, moved forward or turned too far. The
+    last lines tell how many pictures are placed, and how far the cameras stand off a plane. The focal length comes
+    from the pictures if they determine it, else from EXIF, else it is a usual one. Needs pycolmap: pip install
+    'sepi[colmap]'.
 
     \b
     Examples:

@@ -29,10 +29,10 @@ def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, own: Trut
     """Show the disparity maps A and B side by side on a page.
 
     A and B are maps of any program: PFM, HDF5 with a dataset 'disparity', NumPy (.npy), TIFF of floats,
-    'disparity_16bit.png', or a folder that 'sepi depth' wrote. GROUND_TRUTH is such a map, too; give the SCENE itself,
-    a light field, to see its view beside the maps, and to have regions scored, with --truth FILE if it has no ground
-    truth. The page is one file and needs no network: a slider wipes between any two of the maps, their differences and
-    their errors; numbers and close-ups follow the cursor; a point cloud turns.
+    'disparity_16bit.png', or a folder that 'sepi depth' wrote. GROUND_TRUTH is such a map, too. With a SCENE, a light
+    field, the page also shows its view and scores regions; --truth FILE gives ground truth to a scene without any. The
+    page is one file and needs no network. A slider wipes between two maps, differences or errors; values and close-ups
+    follow the cursor; a point cloud can be turned.
 
     \b
     Examples:
@@ -62,7 +62,7 @@ def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, own: Trut
 
 
 def _names(a: Path, b: Path) -> tuple[str, str]:
-    """The last parts of two paths, as many as it takes to tell them apart."""
+    """The shortest different ends of two paths."""
     parts = [path.resolve().parts for path in (a, b)]
     for count in range(1, max(map(len, parts)) + 1):
         one, other = ("/".join(names[-count:]) for names in parts)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sepi.lightfield import FloatMap
 
 _PATH = click.Path(path_type=Path)
-# names of sepi.stage, whose import would take longer than the help
+# names of sepi.stage, written out because its import takes longer than the help
 _BARS = "sigma", "low", "high"
 _STEPS, _METRES = "pixels per view step", "metres"
 _MAPS = {
@@ -26,7 +26,7 @@ _MAPS = {
     **dict.fromkeys(_BARS, _STEPS),
     "depth_sigma": _METRES,
 }
-# by these names programs know depth, and a grey picture
+# names by which other programs know depth, and a grey picture
 _CHANNELS = {"depth": "Z"}
 _GREY = "Y"
 _PFM = ".pfm"
@@ -36,22 +36,20 @@ _PFM = ".pfm"
 @click.argument("result_path", metavar="RESULT", type=_PATH)
 @click.argument("output", metavar="FILE", type=_PATH)
 @click.option("--map", "name", type=click.Choice(list(_MAPS)), help="Map to write; default in .exr: all maps.")
-@click.option(
-    "--to", "kind", type=click.Choice(["rgbd"]), help="Colour and depth side by side, for light field displays."
-)
+@click.option("--to", "kind", type=click.Choice(["rgbd"]), help="Colour and depth side by side, for displays.")
 @view_of_result
 @camera_flags
 def convert(result_path: Path, output: Path, name: str | None, kind: str | None, **seen: Any) -> None:
     """Write maps of RESULT as FILE, a picture of 32-bit floats: OpenEXR (.exr), TIFF (.tif, .tiff) or PFM (.pfm).
 
-    RESULT is a folder that 'sepi depth' wrote, its result.h5 or its all_views.h5. OpenEXR holds the channels disparity
-    (pixels per view step), confidence, and, where the camera is known, Z (depth, metres); where RESULT has error bars,
-    sigma, low and high (pixels per view step) and depth_sigma (metres); one map alone, chosen with --map, is the grey
-    channel Y, which OpenCV reads. TIFF and PFM hold one map, the disparity unless --map names another. OpenEXR needs
-    the package of that name: pip install 'sepi[exr]'.
+    RESULT is a folder that 'sepi depth' wrote, its result.h5 or its all_views.h5. OpenEXR has the channels disparity
+    (pixels per view step) and confidence; Z (depth, metres) if the camera is known; sigma, low and high (pixels per
+    view step) and depth_sigma (metres) if RESULT has error bars. A single map chosen by --map is the grey channel Y,
+    which OpenCV reads. TIFF and PFM have one map, the disparity unless --map names another. OpenEXR needs the package
+    of that name: pip install 'sepi[exr]'.
 
-    With --to rgbd FILE is a PNG with the view on the left and its disparity on the right, from far, black, to near,
-    white, as displays of light fields take it.
+    With --to rgbd, FILE is a PNG for light field displays: the view on the left, its disparity on the right (black is
+    far, white near).
 
     \b
     Examples:
@@ -98,7 +96,7 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
 
 
 def _maps(path: Path, view: tuple[int, int] | None, geometry: Geometry | None) -> dict[str, FloatMap]:
-    """Maps of a result by their names; depth where the camera is known, error bars where it has any."""
+    """Maps of a result by name, with depth if the camera is known, and error bars if there are any."""
     from sepi.io.all_views import read_result_at
 
     result = read_result_at(path, view)

@@ -1,4 +1,4 @@
-"""Command ``sepi depth``: from a light field to the folder of its maps."""
+"""The command ``sepi depth``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sepi.cli.input_options import Geometry, Reading, camera_flags, default_fold
 from sepi.command import SepiCommand, progress_bar
 from sepi.errors import SepiError
 
-# imported in the functions: `sepi depth --help` does without what they import
+# other imports stand in the functions, since `sepi depth --help` does not need them
 if TYPE_CHECKING:
     import numpy.typing as npt
 
@@ -68,16 +68,15 @@ def depth(
 ) -> None:
     """Compute the disparity map of the light field INPUT.
 
-    INPUT is a folder of views, a Lytro picture (*_eslf.png), an array (.mat, .npy, .npz) or an HDF5 file; 'sepi info'
-    shows how it is read, 'sepi check' whether its views are in the right order. Writes the disparity as numbers and in
-    colour, how far it may be wrong, confidence, masks and a point cloud; depth in metres where the camera is known.
-    With --all-views a map for every view, too, made from those of a few: docs/depth/all_views.md.
+    INPUT is a folder of views, a Lytro picture (*_eslf.png), an array (.mat, .npy, .npz) or an HDF5 file. 'sepi info'
+    shows how it is read, 'sepi check' whether its views are in the right order. The command writes disparity (numbers
+    and picture), error bars, confidence, masks and a point cloud, and depth in metres if the camera is known. With
+    --all-views it also writes a map for every view (docs/depth/all_views.md).
 
-    Variants: best (the most accurate), fast (less accurate), paper (the method as published), no_sepi, no_occlusion,
-    no_textureless, no_occlusion_no_textureless, no_noise_correction (parts of it switched off), wang (another treatment
-    of occlusion); best_no_detail and others that docs/method/best.md lists (parts of best switched off); acc, cae,
-    mishiba, oavc, occ, pobr, spo (other authors' methods), onnx (a network of yours), which docs/reproduce/compared.md
-    explains.
+    Variants: best (the most accurate), fast (less accurate), paper (the method as published); no_sepi, no_occlusion,
+    no_textureless, no_occlusion_no_textureless, no_noise_correction (paper with parts switched off), wang (paper with
+    another occlusion model); best_no_detail and others (best with parts switched off, docs/method/best.md); acc, cae,
+    mishiba, oavc, occ, pobr, spo (other authors' methods), onnx (a network of yours, docs/reproduce/compared.md).
 
     \b
     Examples:
@@ -111,7 +110,7 @@ def depth(
 
     require_own(folder, light_field, force=force)
     if geometry is not None:
-        # another camera than the calibrated one: its rig's lengths mean nothing
+        # with another camera, lengths of the calibrated rig mean nothing
         light_field = replace(light_field, camera=geometry(shape=light_field.shape), rig=None)
     light_field = settle_range(light_field)
     with progress_bar(light_field.name) as progress:
@@ -143,7 +142,7 @@ def depth(
 def _also_as_taken(
     folder: Path, light_field: LightField, views: Iterable[ViewMaps]
 ) -> Iterator[tuple[tuple[int, int], Mapping[str, npt.NDArray[Any]]]]:
-    """The maps of views one after the other; each is also written as its calibrated camera took it."""
+    """The maps of each view, also written for the picture that its calibrated camera took."""
     from sepi.io.result_folder import write_as_taken
 
     for view in views:
@@ -153,7 +152,7 @@ def _also_as_taken(
 
 
 def _interval(maps: StageMaps, variant: str) -> str:
-    """How wide the intervals of what is known are, or that there are none."""
+    """Line on the width of the intervals of known pixels, or that there are none."""
     import numpy as np
 
     from sepi.matching.unknown import UNKNOWN
@@ -166,7 +165,7 @@ def _interval(maps: StageMaps, variant: str) -> str:
 
 
 def _candidates(made_by: MadeBy | None) -> str:
-    """How many candidates there are in the range; nothing where no stage has any."""
+    """Text on the number of candidates in the range; empty if no stage has any."""
     history = () if made_by is None else made_by.history
     known = [step["parameters"]["num_disparities"] for step in history if "num_disparities" in step["parameters"]]
     return f", {' and '.join(map(str, dict.fromkeys(known)))} candidates" if known else ""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _PATH = click.Path(path_type=Path)
 
 NO_INTERVAL = "no interval: the map has no error bars"
-"""What is said of one that has none."""
+"""Line for a map without error bars."""
 
 
 @click.command(cls=SepiCommand)
@@ -32,7 +32,7 @@ NO_INTERVAL = "no interval: the map has no error bars"
 @truth_flags
 @bad_thresholds
 @click.option(
-    "--border", type=click.IntRange(min=0), help="Leave out this many pixels on each side, and score no other border."
+    "--border", type=click.IntRange(min=0), help="Pixels to leave out on each side, in place of both protocols."
 )
 @click.option(
     "--offset",
@@ -63,19 +63,18 @@ def evaluate(
     """Score the disparity map ESTIMATE against ground truth.
 
     ESTIMATE is a PFM, an HDF5 file with a dataset 'disparity', a NumPy file (.npy), a TIFF of floats, a
-    'disparity_16bit.png', or a folder that 'sepi depth' wrote. GROUND_TRUTH is such a file; give the SCENE itself, a
-    light field with ground truth, to have its occluded and textureless regions scored too. A folder that 'sepi depth'
-    wrote knows which view of which light field it belongs to, and how that was read.
+    'disparity_16bit.png', or a folder that 'sepi depth' wrote. GROUND_TRUTH is such a file. With a SCENE, a light
+    field with ground truth, occluded and textureless regions are scored, too. A folder that 'sepi depth' wrote records
+    its light field, view and flags.
 
-    With --truth FILE, a scene without ground truth is scored, too, or the file alone without any: a grey picture of 8
-    or 16 bit with --truth-scale K (disparity = level * K, 0 is unknown), or such a file as above.
+    --truth FILE is ground truth for a scene without any, or alone: a file as above, or a grey picture of 8 or 16 bit
+    with --truth-scale K (disparity = level * K, 0 is unknown).
 
-    Both protocols are used: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side. With --offset,
-    the crop's pixels are scored, and borders are counted from the edges of the ground truth, not from the crop's.
+    There are two protocols: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side. With --offset,
+    the crop's pixels are scored, and the border is that of the ground truth, not of the crop.
 
-    Where ESTIMATE has error bars, as what 'sepi depth' wrote has, they are scored, too: how often the interval of 90 %
-    holds the truth, its median width, the likelihood of the errors (NLL), and whether doubt is where errors are (AUSE,
-    0 is best).
+    Error bars of ESTIMATE are scored, too: how often the interval of 90 % holds the truth, its median width, the
+    negative log likelihood of the errors (NLL), and how well sigma ranks the errors (AUSE, 0 is best).
 
     \b
     Examples:
@@ -133,7 +132,7 @@ def evaluate(
 
 
 def _described(offset: tuple[int, int], shape: tuple[int, int], whole: tuple[int, int]) -> str:
-    """The part of the ground truth that is scored, in one line."""
+    """Line on the part of the ground truth that is scored."""
     (row, column), (height, width) = offset, shape
     return (
         f"crop: rows {row} to {row + height - 1}, columns {column} to {column + width - 1} of "
@@ -142,7 +141,7 @@ def _described(offset: tuple[int, int], shape: tuple[int, int], whole: tuple[int
 
 
 def score_table(scores: AllScores, thresholds: Sequence[float] = (), truth_step: float = 0.0) -> str:
-    """Scores as aligned columns; below them whether there was an interval to score."""
+    """Scores as aligned columns, with notes on the intervals below."""
     from tabulate import tabulate
 
     from sepi.scoring.error_bars import ERROR_BAR_SCORES
@@ -166,7 +165,7 @@ def score_table(scores: AllScores, thresholds: Sequence[float] = (), truth_step:
 
 
 def _cell(value: float) -> str:
-    """A count as it is, a score with three decimals, a score over no pixels as a dash."""
+    """Text of a count, of a score with three decimals, or a dash for a score over no pixels."""
     if isinstance(value, int):
         return f"{value}"
     return "-" if math.isnan(value) else f"{value:.3f}"

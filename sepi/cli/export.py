@@ -1,7 +1,4 @@
-"""``sepi export``: a light field, read as the flags say, in files that need none of them.
-
-Not to be taken for the stage :mod:`sepi.export`, which writes finished maps.
-"""
+"""The command ``sepi export``; not the stage :mod:`sepi.export`, which writes final maps."""
 
 from __future__ import annotations
 
@@ -39,11 +36,11 @@ def export(
     geometry: Geometry | None,
     reading: Reading,
 ) -> None:
-    """Save the light field INPUT, read as the flags say, as OUT: every command reads that without flags.
+    """Save the light field INPUT, read with these flags, as OUT, which needs no flags.
 
-    OUT is one HDF5 file, if its name ends with .h5, or a folder with a picture for each view, named by row and column:
-    PNG of 8 or 16 bit, TIFF where views are floats. Both keep where the views stand, the disparity range, the camera,
-    the view whose depth is made, ground truth and masks; the folder in light_field.json, which may be edited
+    OUT is one HDF5 file if its name ends with .h5; else a folder with a picture for each view, named by row and column:
+    PNG of 8 or 16 bit, or TIFF of floats. Both hold the positions of the views, the disparity range, the camera, the
+    view whose depth is estimated, ground truth and masks. The folder has them in light_field.json, which you may edit
     (docs/reference/folders.md).
 
     \b
@@ -63,7 +60,7 @@ def export(
         light_field = replace(light_field, camera=geometry(shape=light_field.shape), rig=None)
     if own is not None:
         light_field = replace(light_field, ground_truth=own.read(light_field.shape))
-    # what was assumed is settled by now, and flags are of no more use
+    # notes on assumptions and flags do not apply to what is read from OUT
     note = f"exported from {light_field_path}"
     light_field = replace(settle_range(light_field), source="", reading="", notes=(note,))
     write_exported(output, light_field, force=force)

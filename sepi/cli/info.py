@@ -1,4 +1,4 @@
-"""``sepi info`` and ``sepi check``: what is known about a light field, and whether its views are in the right order."""
+"""The commands ``sepi info`` and ``sepi check``."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flag
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 
-# imported in the functions: `sepi --help` does without what they import
+# other imports stand in the functions, since `sepi --help` does not need them
 if TYPE_CHECKING:
     from sepi.lightfield import DisparityRange, LightField
 
 _PATH = click.Path(path_type=Path)
-# part of a range below which its margin may lie beyond infinity
+# share of a range that may lie beyond infinity, as its margin does
 _BEYOND = 0.25
 _RANGE_SOURCES = {
     "parameters": "from the scene's parameters",
@@ -100,13 +100,13 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as
 @_as_json
 @click.pass_context
 def check(context: click.Context, light_field_path: Path, reading: Reading, as_json: bool) -> None:
-    """Check whether the views of the light field INPUT are in the order that depth needs.
+    """Check whether the views of the light field INPUT are in the right order.
 
-    Software does not agree on whether rows of views go up or down, columns left or right, or which of the two comes
-    first; in a wrong order depth is inside out or nonsense. The views tell: all eight orders are tried, and the flag
-    is named that sets INPUT right. Views that fit none of the others are named, too. Where all is well with them, warns
-    of a part of the scene that is not in the disparity range. Exits with 1 where another order clearly fits better, the
-    views fit in none, or some of them fit none of the others; with 2 where INPUT cannot be read.
+    Programs differ in the direction of rows and columns of views, and in which of them comes first. In a wrong order,
+    depth is inside out or meaningless. The command compares the views in all eight orders, and names the flag for the
+    right one. It also names views that match none of the others, and warns if a part of the scene lies outside the
+    disparity range. The exit code is 1 if another order fits clearly better, the views fit in no order, or some match
+    none of the others; 2 if INPUT cannot be read.
     """
     from sepi.inspection.disparity_range import settle_range
     from sepi.inspection.odd_views import odd_views
@@ -146,13 +146,13 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
             click.echo(line)
     if odd or found.warning() is not None:
         context.exit(1)
-    # views without texture have no range, and are no failure here
+    # views without texture have no range; this is no failure here
     with suppress(SepiError):
         settle_range(light_field)
 
 
 def size_text(light_field: LightField) -> str:
-    """Grid of views and their size, in words."""
+    """Text on the grid of views and their size."""
     (rows, columns), (height, width) = light_field.grid, light_field.shape
     present = int(light_field.present.sum())
     number = "" if present == rows * columns else f", {present} of {rows * columns}"
@@ -160,12 +160,12 @@ def size_text(light_field: LightField) -> str:
 
 
 def range_text(known: DisparityRange) -> str:
-    """A disparity range and where it is from, in words."""
+    """Text on a disparity range and its source."""
     return f"{known.minimum:g} to {known.maximum:g} pixels per view step ({_RANGE_SOURCES[known.source]})"
 
 
 def _depth(light_field: LightField, estimated: DisparityRange | None) -> str:
-    """How disparities become depth."""
+    """Text on the conversion of disparity to depth."""
     from sepi.rig import METRES
 
     camera, rig = light_field.camera, light_field.rig
@@ -191,14 +191,14 @@ def _pixels(light_field: LightField) -> str:
 
 
 def _shown(light_field: LightField) -> list[float] | None:
-    """Which part of the picture each view shows; None where all show everything."""
+    """Share of the picture that each view shows; None if no pixels are missing."""
     if light_field.missing is None:
         return None
     return [1 - float(view.mean()) for view in light_field.missing[light_field.present]]
 
 
 def _described(light_field: LightField) -> dict[str, Any]:
-    """What is known of every light field, for JSON."""
+    """Facts about a light field for JSON."""
     return {
         "name": light_field.name,
         "source": light_field.source,
@@ -214,7 +214,7 @@ def _described(light_field: LightField) -> dict[str, Any]:
 
 
 def _positions(light_field: LightField) -> list[list[list[float] | None]] | None:
-    """Position of each view, null where it is missing; None for views on the grid."""
+    """Position of each view, None for a missing one; None for views on the grid."""
     if light_field.positions is None:
         return None
     rows = zip(light_field.positions.tolist(), light_field.present.tolist(), strict=True)

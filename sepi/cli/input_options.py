@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-# imported in the functions: `sepi --help` does without what they import
+# other imports stand in the functions, since `sepi --help` does not need them
 if TYPE_CHECKING:
     from sepi.camera import Camera
     from sepi.io.readers.options import ReadOptions
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Pair(click.ParamType[tuple[int, int]]):
-    """Two whole numbers with a sign between them, such as 9x9 or 4,4."""
+    """Two whole numbers with a separator, such as 9x9 or 4,4."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -36,7 +36,7 @@ _POSITIVE = click.FloatRange(0, math.inf, min_open=True, max_open=True)
 
 
 def default_folder(path: Path, kind: str) -> Path:
-    """Where a command writes what it makes of an input unless told: ``./NAME-kind``."""
+    """Default output folder of a command for an input, ``./NAME-kind``."""
     from sepi.io.files import name_of
 
     name = name_of(path)
@@ -45,7 +45,7 @@ def default_folder(path: Path, kind: str) -> Path:
 
 @dataclass(frozen=True)
 class Reading:
-    """How the flags say to read a light field."""
+    """Flags for reading a light field."""
 
     file_format: str | None
     options: ReadOptions
@@ -67,8 +67,7 @@ _FLAGS = (
     ),
     click.option("--grid", type=Pair("ROWSxCOLUMNS"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."),
     click.option(
-        "--pattern",
-        help="Names of views in a folder: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is any text.",
+        "--pattern", help="Names of views in a folder: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is any text."
     ),
     click.option(
         "--axes",
@@ -147,7 +146,7 @@ range_to_search = click.option(
 )
 
 Geometry = Callable[..., "Camera"]
-"""Makes the camera of views of a ``shape``."""
+"""Function from the ``shape`` of views to their camera."""
 
 
 def _flagged(command: Callable[..., Any], flags: Iterable[Callable[..., Any]]) -> Callable[..., Any]:
@@ -157,12 +156,12 @@ def _flagged(command: Callable[..., Any], flags: Iterable[Callable[..., Any]]) -
 
 
 def scene_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the flags of a scene of this package, in place of one that is read."""
+    """Add the flags of built-in and rendered scenes to a command."""
     return _flagged(command, _SCENES)
 
 
 def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the flags that say how to read a light field; it gets them as one argument ``reading``."""
+    """Add the flags for reading a light field to a command, as one argument ``reading``."""
 
     @functools.wraps(command)
     def with_reading(*args: Any, file_format: str | None, **values: Any) -> Any:
@@ -175,7 +174,7 @@ def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def truth_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the flags of ground truth of a user's own; it gets them as one argument ``own``, None without."""
+    """Add the flags of the user's ground truth to a command, as one argument ``own``, None without them."""
 
     @functools.wraps(command)
     def with_truth(*args: Any, truth: Path | None, truth_scale: float | None, **values: Any) -> Any:
@@ -190,9 +189,9 @@ def truth_flags(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the flags of the camera's geometry; it gets them as one argument ``geometry``, None without.
+    """Add the flags of the camera's geometry to a command, as one argument ``geometry``, None without them.
 
-    ``geometry`` is :func:`sepi.camera.camera_from` but for the shape of the views.
+    ``geometry`` is :func:`sepi.camera.camera_from` without the shape of the views.
     """
 
     @functools.wraps(command)

@@ -11,8 +11,8 @@ import click
 
 from sepi.command import SepiGroup
 
-# read when NumPy is imported. Threads of OpenBLAS would do little but spin, since products are small here. Pages of 2
-# MB take time to find and clear, and memory, since arrays are used up as fast as they are made
+# NumPy reads these when imported. Products are small here, so threads of OpenBLAS would only wait. Pages of 2 MB take
+# time and memory, since arrays live shortly
 for _name, _value in {"OPENBLAS_NUM_THREADS": "1", "NUMPY_MADVISE_HUGEPAGE": "0"}.items():
     os.environ.setdefault(_name, _value)
 
@@ -32,11 +32,11 @@ _COMMANDS = {
     "scenes": ("scenes", "Write scenes with exact ground truth."),
     "submission": ("results", "Pack results as a submission to the HCI 4D benchmark."),
 }
-"""Command to its module in this folder and what it does, for the list of them."""
+"""Command to its module in this folder, and its line in the list of commands."""
 
 
 class _Imported(UserDict[str, Any]):
-    """Commands that are imported when they are looked up: to list them, or to run one, takes no other."""
+    """Commands, each imported when looked up."""
 
     def __getitem__(self, name: str) -> click.Command:
         """The command of this name."""
@@ -77,9 +77,8 @@ def _tell_version(context: click.Context, _: click.Parameter, asked: bool) -> No
 def main() -> None:
     """Depth from light fields by stitched epipolar plane images.
 
-    A light field is a grid of views of one scene, each taken from a camera position a little to the side of the next.
-    Its disparity map says, for each pixel of the centre view, by how many pixels it moves from view to view: the
-    more, the nearer.
+    A light field is a grid of views of one scene, taken from neighbouring camera positions. For each pixel of the
+    centre view, its disparity map tells by how many pixels the pixel moves from view to view. Nearer points move more.
 
     \b
     Try it on a built-in scene:
@@ -90,5 +89,5 @@ def main() -> None:
 
 
 def run() -> None:
-    """The command as a process of its own."""
+    """Run the command."""
     main(prog_name="sepi")

@@ -45,12 +45,11 @@ def poses(
 ) -> None:
     """Write the views of the light field INPUT with camera poses, depth and points, for COLMAP or nerfstudio.
 
-    RESULT is the folder that 'sepi depth' wrote for INPUT, or its result.h5; it knows how INPUT was read.
-    Poses are exact, so nothing has to be matched. Each view has a principal point of its own: programs that ignore it
-    see another scene. Depth of the other views is that of 'sepi depth --all-views', else RESULT's, carried over; 0
-    where it is not known. Positions are in metres where the camera is known. Where RESULT has error bars, COLMAP's
-    points have an error, and nerfstudio's depth has a standard deviation. docs/depth/other_programs.md describes the
-    files.
+    RESULT is the folder that 'sepi depth' wrote for INPUT, or its result.h5; it records how INPUT was read. Poses are
+    exact and need no matching. Each view has its own principal point; a program that ignores it sees another scene.
+    Depth of other views comes from 'sepi depth --all-views', else from RESULT's map, warped to them; 0 is unknown.
+    Positions are in metres if the camera is known. If RESULT has error bars, COLMAP's points have an error, and
+    nerfstudio's depth has a standard deviation. docs/depth/other_programs.md describes the files.
 
     \b
     Examples:

@@ -27,7 +27,7 @@ _STEPS = 9
 
 @dataclass(frozen=True)
 class _Result:
-    """A finished map: its path, its disparity (H, W), what no view knows, and the camera where it says."""
+    """A map: path, disparity (H, W), unknown pixels, and camera if known."""
 
     path: Path
     disparity: FloatMap
@@ -37,7 +37,7 @@ class _Result:
 
 @dataclass(frozen=True)
 class _Wanted:
-    """Where to focus, as the flags say."""
+    """Flags of where to focus."""
 
     steps: int | None
     disparities: tuple[float, ...]
@@ -94,18 +94,18 @@ def refocus(
     geometry: Geometry | None,
     reading: Reading,
 ) -> None:
-    """Focus the light field INPUT after the fact.
+    """Refocus the light field INPUT.
 
     RESULT is the map of INPUT: a folder that 'sepi depth' wrote, or a disparity map of another program (PFM, HDF5,
-    .npy, 'disparity_16bit.png'). The folder knows how INPUT was read. Writes
+    .npy, 'disparity_16bit.png'). The folder records how INPUT was read. The command writes
 
     \b
-    all_in_focus.png   every pixel from all the views that see it: as sharp as the view, less noise
-    focus_01.png ...   a focal stack: pictures of a large lens, focused from near to far
-    focus.csv          disparity of each picture, and its depth in metres where the camera is known
+    all_in_focus.png   mean of all views that see a pixel: as sharp as the view, less noise
+    focus_01.png ...   focal stack: pictures of a large lens, focused from near to far
+    focus.csv          disparity of each picture, and its depth in metres if the camera is known
 
-    Without RESULT no map is computed: the stack goes through the range of disparities that INPUT states or its views
-    tell, the gaps between the views show where it is out of focus, and there is no all_in_focus.png.
+    Without RESULT, the stack covers INPUT's own or estimated disparity range; the gaps between the views show where it
+    is out of focus, and there is no all_in_focus.png.
 
     \b
     Examples:
@@ -131,7 +131,7 @@ def refocus(
     if geometry is not None:
         camera = geometry(shape=light_field.shape)
     foci = _foci(light_field, result, camera, _Wanted(steps, disparities, pixels))
-    # whatever is wrong with it, before anything takes long
+    # fails early if the folder cannot be used
     views_within(light_field, aperture)
     with progress_bar(light_field.name) as progress:
         share = 0.0 if result is None else 1 / (1 + len(foci))
@@ -150,7 +150,7 @@ def refocus(
 
 
 def _read_result(path: Path, light_field_path: Path, light_field: LightField, reading: Reading) -> _Result:
-    """The map to focus by, which must be of the views' size."""
+    """The map to focus by, checked to have the views' size."""
     from sepi.io.all_views import read_disparity_at, read_origin_at, read_result_at
 
     view = reading.options.view
@@ -166,7 +166,7 @@ def _read_result(path: Path, light_field_path: Path, light_field: LightField, re
 
 
 def _foci(light_field: LightField, result: _Result | None, camera: Camera | None, wanted: _Wanted) -> list[Focus]:
-    """Where to focus, from near to far."""
+    """Disparities to focus at, from near to far."""
     from sepi.io.refocused_folder import Focus
 
     for value in wanted.disparities:
@@ -183,7 +183,7 @@ def _foci(light_field: LightField, result: _Result | None, camera: Camera | None
 
 
 def _through(light_field: LightField, result: _Result | None, count: int) -> list[float]:
-    """Disparities from the nearest to the farthest surface: those of the map, else of the light field's range."""
+    """Disparities from the nearest to the farthest surface of the map, else over the light field's range."""
     from sepi.applications.refocusing import evenly_spaced, focal_stack
     from sepi.inspection.disparity_range import settle_range
 
@@ -219,7 +219,7 @@ def _stack(
     aperture: float | None,
     progress: Progress,
 ) -> Iterator[FloatMap]:
-    """The picture of each focus, made when it is asked for."""
+    """Picture of each focus, computed one at a time."""
     from sepi.applications import refocusing
 
     for number, focus in enumerate(foci):
@@ -231,7 +231,7 @@ def _stack(
 
 
 def _listed(foci: Sequence[Focus]) -> str:
-    """The disparities, with the depths where they are known."""
+    """Text of the disparities, and depths if known."""
     values = ", ".join(f"{focus.disparity:.3g}" for focus in foci)
     depths = ", ".join(f"{focus.depth:.3g}" for focus in foci if focus.depth is not None)
     return f"{values} pixels per view step" + (f" ({depths} m)" if depths else "")

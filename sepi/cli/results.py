@@ -1,4 +1,4 @@
-"""The commands ``sepi points``, ``sepi submission`` and ``sepi check-submission``: what becomes of finished maps."""
+"""The commands ``sepi points``, ``sepi submission`` and ``sepi check-submission``."""
 
 from __future__ import annotations
 
@@ -20,14 +20,9 @@ _PARTIAL = click.option("--partial", is_flag=True, help="Accept fewer than the b
 @click.command(cls=SepiCommand)
 @click.argument("result_path", metavar="RESULT", type=_PATH)
 @click.option(
-    "-o",
-    "--output",
-    type=_PATH,
-    help="PLY file to write; default: points.ply in the result, with --view points_ROW_COLUMN.ply.",
+    "-o", "--output", type=_PATH, help="PLY file to write; default: points.ply or points_ROW_COLUMN.ply in RESULT."
 )
-@click.option(
-    "--min-confidence", type=float, default=0.0, metavar="X", help="Leave out pixels of a lower confidence, 0 to 1."
-)
+@click.option("--min-confidence", type=float, default=0.0, metavar="X", help="Least confidence of points, 0 to 1.")
 @click.option("--max-depth", type=float, metavar="M", help="Leave out points farther than this, metres.")
 @click.option(
     "--max-sigma",
@@ -53,9 +48,9 @@ def points(
 ) -> None:
     """Write the coloured point cloud of RESULT as a PLY file.
 
-    RESULT is a folder that 'sepi depth' wrote, its result.h5 or its all_views.h5. Points are in metres where the
-    scene's files or the flags give the camera; otherwise they are a relief with x and y in pixels. Each has a sigma
-    where RESULT has error bars, in metres or in pixels per view step. docs/depth/metric_depth.md describes both.
+    RESULT is a folder that 'sepi depth' wrote, its result.h5 or its all_views.h5. Points are in metres if the scene's
+    files or the flags give the camera; else they are a relief with x and y in pixels. If RESULT has error bars, each
+    point has a sigma, in metres or in pixels per view step. docs/depth/metric_depth.md describes both.
 
     \b
     Examples:
@@ -100,18 +95,14 @@ def points(
 @click.argument("results", metavar="RESULT...", nargs=-1, required=True, type=_PATH)
 @click.option("-o", "--output", type=_PATH, default=Path("submission.zip"), show_default=True, help="Zip to write.")
 @click.option(
-    "--runtime",
-    "runtimes",
-    multiple=True,
-    metavar="SCENE=SECONDS",
-    help="Run time, in place of runtime.txt; repeatable.",
+    "--runtime", "runtimes", multiple=True, metavar="SCENE=SECONDS", help="Run time, unless in runtime.txt; repeatable."
 )
 @_PARTIAL
 def submission(results: tuple[Path, ...], output: Path, runtimes: tuple[str, ...], partial: bool) -> None:
     """Pack RESULTs as a submission to the HCI 4D light field benchmark.
 
-    Each RESULT is a folder that 'sepi depth --timing' wrote for one of the benchmark's 12 scenes. The submission is
-    checked first; one with problems is not written.
+    Each RESULT is a folder that 'sepi depth --timing' wrote for one of the benchmark's 12 scenes. A submission with
+    problems is not written.
 
     \b
     Example:
@@ -140,8 +131,8 @@ def submission(results: tuple[Path, ...], output: Path, runtimes: tuple[str, ...
 def check_submission(context: click.Context, path: Path, partial: bool) -> None:
     """Check a submission to the HCI 4D light field benchmark.
 
-    Prints a line for each problem and exits with 1 if there is any. More is checked than the benchmark does on upload:
-    values that are not finite, run times that are not positive, files that do not belong.
+    The command prints a line for each problem; the exit code is 1 if there is any. It checks more than the benchmark's
+    upload: values that are not finite, run times that are not positive, files that do not belong.
     """
     from sepi.scoring.hci_submission import problems_of
 
@@ -154,7 +145,7 @@ def check_submission(context: click.Context, path: Path, partial: bool) -> None:
 
 
 def _runtime(text: str) -> tuple[str, float]:
-    """Scene and seconds of ``SCENE=SECONDS``."""
+    """Scene and seconds from ``SCENE=SECONDS``."""
     scene, _, number = text.partition("=")
     with suppress(ValueError):
         if scene and 0 < float(number) < math.inf:

@@ -1,6 +1,4 @@
-"""Light fields that finished maps belong to: GROUND_TRUTH|SCENE of the commands that score maps, INPUT of refocus and
-poses.
-"""
+"""Light fields of maps: GROUND_TRUTH|SCENE of commands that score maps, INPUT of refocus and poses."""
 
 from __future__ import annotations
 
@@ -25,7 +23,7 @@ _BARE = "a single map, such as its disparity.pfm, may be of any light field"
 
 
 def require_one_view(estimate: Path, other: Path, reading: Reading) -> None:
-    """Raise if two maps say that they belong to different views."""
+    """Raise if two maps belong to different views."""
     from sepi.io.all_views import read_origin_at
 
     one, two = (read_origin_at(path, reading.options.view) for path in (estimate, other))
@@ -36,7 +34,7 @@ def require_one_view(estimate: Path, other: Path, reading: Reading) -> None:
 def read_ground_truth(
     path: Path | None, estimate: Path, reading: Reading, own: TruthFile | None = None
 ) -> tuple[FloatMap | None, LightField | None]:
-    """The ground truth for an estimate, ``own`` where it is given, and the light field if ``path`` is one.
+    """The ground truth for an estimate (``own`` if given), and the light field if ``path`` is one.
 
     Raises
     ------
@@ -64,7 +62,7 @@ def read_ground_truth(
 
 
 def _require_view_of(estimate: Path, reading: Reading) -> None:
-    """Raise for a map of another view than --view says, which nothing else would tell."""
+    """Raise for a map of another view than --view."""
     from sepi.io.all_views import read_origin_at
 
     origin, view = read_origin_at(estimate, reading.options.view), reading.options.view
@@ -76,10 +74,10 @@ def _require_view_of(estimate: Path, reading: Reading) -> None:
 def read_light_field_of(
     path: Path, result: Path | None, reading: Reading, *, check_order: bool = True, bare: bool = True
 ) -> LightField:
-    """The light field that a map belongs to, seen from the map's view and read as the map says, where it does.
+    """The light field of a map, with the map's view as reference view.
 
-    It is read as it was for the result, but for what the flags say; or by the flags alone, where that is no longer
-    needed, as the views lie in their places by now.
+    It is read with the result's flags, overridden by the given ones. If it was exported meanwhile and needs no flags,
+    the given ones alone count.
 
     Parameters
     ----------
@@ -87,16 +85,16 @@ def read_light_field_of(
     result : Path or None
         The map.
     reading : Reading
-        Flags.
+        Flags of the command.
     check_order : bool
-        As :func:`sepi.read_light_field` has it, where the map does not say which light field it is of.
+        As for :func:`sepi.read_light_field`, if the map does not record its light field.
     bare : bool
-        Whether the caller takes maps that do not say.
+        Whether the caller accepts such maps.
 
     Raises
     ------
     SepiError
-        If it cannot be read, or is not the very light field that the map says.
+        If it cannot be read, or is not the light field that the map records.
     """
     from sepi.io.all_views import read_origin_at
 
@@ -121,7 +119,7 @@ def read_light_field_of(
 
 
 def camera_of(path: Path, view: tuple[int, int] | None, result: Result, geometry: Geometry | None) -> Camera | None:
-    """The camera of a result: that of the flags, of views that are a part of pictures where the result says so."""
+    """The camera of a result: that of the flags, for the result's crop if it has one; else the result's own."""
     from sepi.camera import warn_of_infinity
     from sepi.io.all_views import read_origin_at
 
@@ -135,7 +133,7 @@ def camera_of(path: Path, view: tuple[int, int] | None, result: Result, geometry
 
 
 def _as_it_was(origin: Origin, reading: Reading) -> Reading:
-    """The flags, and what a result says where they say nothing."""
+    """The flags, completed by those of a result."""
     from sepi.io.readers.options import ReadOptions
 
     given, names = reading.options, [field.name for field in fields(ReadOptions)]
@@ -146,8 +144,8 @@ def _as_it_was(origin: Origin, reading: Reading) -> Reading:
 
 
 def _as_it_is(origin: Origin, reading: Reading) -> Reading:
-    """The flags, and the view and row spacing of a result where they name none."""
+    """The flags, completed by view and row spacing of a result."""
     given = reading.options
-    # the row spacing was found out from the views, perhaps
+    # the row spacing may be an estimate from the views
     spacing = given.row_spacing or origin.row_spacing
     return replace(reading, options=replace(given, view=given.view or origin.view, row_spacing=spacing))

@@ -1,4 +1,4 @@
-"""Command ``sepi scenes``: scenes with exact ground truth, drawn at once or path-traced."""
+"""The command ``sepi scenes``."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ def scenes(
 ) -> None:
     """Write scenes, with exact ground truth, as HCI 4D benchmark folders.
 
-    All of them unless NAMEs are given. Those built in are drawn at once, of flat shapes; those of --rendered are
-    path-traced, with plain walls, gloss, mirrors and glass; beside their folder there is a file NAME.h5 with their
+    Without NAMEs, all scenes are written. Built-in scenes consist of planar shapes and take seconds. Scenes of
+    --rendered are path-traced, with plain walls, gloss, mirrors and glass; a file NAME.h5 beside the folder has their
     light, and disparity, normals and masks of every view.
 
     \b
@@ -140,7 +140,7 @@ def _write_rendered(
 
 
 def _renders(names: Sequence[str], options: RenderOptions, output: Path) -> Generator[Render]:
-    """Of files that are there already if they are of the same options; the others are made."""
+    """Renders from existing files if made with the same options; others are computed."""
     from sepi.cli.side_by_side import render_scenes
     from sepi.rendered.render_file import read_render
     from sepi.rendered.rendering import made_by

@@ -1,4 +1,4 @@
-"""Path-traced scenes one beside the other: the start and the end of each have work for one core alone."""
+"""Path-traced scenes rendered in parallel, since the start and the end of each use one core only."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from sepi.rendered.options import RenderOptions
 from sepi.rendered.rendering import views_done
 from sepi.threads import available_cores
 
-# scenes at a time: of full size each holds 3 GB
+# number of scenes at a time; each of full size takes 3 GB
 _MOST = 2
-# seconds after which the bar is looked after
+# seconds between updates of the progress bar
 _PAUSE = 0.2
 
 
 def render_scenes(names: Sequence[str], options: RenderOptions, folder: Path) -> Generator[str]:
-    """Render scenes into files ``NAME.h5``, each in a process of its own; shows a bar meanwhile.
+    """Render scenes into files ``NAME.h5``, each in its own process, with a progress bar.
 
     Parameters
     ----------
@@ -34,17 +34,17 @@ def render_scenes(names: Sequence[str], options: RenderOptions, folder: Path) ->
         Keys of :data:`sepi.rendered.RENDERED`.
     options : RenderOptions
     folder : Path
-        Of the files. Views that are done lie in folders beside them until all of a scene are.
+        Folder of the files. Finished views lie in folders beside them until a scene is complete.
 
     Yields
     ------
     str
-        The name of a scene that is done, as soon as it is.
+        Name of each scene as soon as it is finished.
 
     Raises
     ------
     SepiError
-        If a scene cannot be rendered; those that were begun then end, and go on in a later run.
+        If a scene cannot be rendered; the others stop, and a later run continues them.
     """
     waiting, running = list(names), dict[str, subprocess.Popen[str]]()
     cores, done = available_cores(), 0
@@ -53,7 +53,7 @@ def render_scenes(names: Sequence[str], options: RenderOptions, folder: Path) ->
         while waiting or running:
             while waiting and len(running) < most:
                 name = waiting.pop(0)
-                # the last one has no other beside it for long
+                # the last scene soon has the cores to itself
                 running[name] = _started(name, options, folder, cores // most if waiting else cores)
             with progress_bar(", ".join(running)) as progress:
                 while all(process.poll() is None for process in running.values()):
@@ -84,7 +84,7 @@ def _started(name: str, options: RenderOptions, folder: Path, threads: int) -> s
 
 
 def _require_done(name: str, process: subprocess.Popen[str]) -> None:
-    """Raise the error of a process that has ended, or say what it warned of."""
+    """Raise the error of a process that has ended, or print its warnings."""
     told = process.communicate()[1].strip()
     if process.returncode < 0:
         raise SepiError(f"{name}: signal {-process.returncode} ended its process; the next run continues from here")

@@ -76,9 +76,7 @@ class AccParameters(CandidateParameters):
     )
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
-    colour_share: float = Field(
-        0.5, ge=0, le=1, description="share of the colours in the cost; gradients have the rest"
-    )
+    colour_share: float = Field(0.5, ge=0, le=1, description="share of colours in the cost; gradients have the rest")
     colour_truncation: float = Field(
         0.05, gt=0, description="difference beyond which the cost no longer grows, colours in 0..1"
     )
@@ -102,21 +100,15 @@ class ConfidentLabelsParameters(Parameters):
     needs: ClassVar[Needs] = Needs(bytes_per_sample=6, bytes_per_pixel=3000, seconds_per_megasample=1)
 
     reliable_deviation: float = Field(
-        0.003, ge=0, description="standard deviation of the costs over the candidates from which a pixel is reliable"
+        0.003, ge=0, description="standard deviation of the costs from which a pixel is reliable"
     )
     fidelity: float = Field(
-        0.01,
-        ge=0,
-        description="cost of a difference from a reliable pixel's first depth, per hundredth of the disparity range",
+        0.01, ge=0, description="cost of a hundredth of the disparity range off a reliable pixel's first depth"
     )
     correspondence: float = Field(
-        0.2,
-        ge=0,
-        description="cost of a difference from the depth of matched features, per hundredth of the disparity range",
+        0.2, ge=0, description="cost of a hundredth of the disparity range off the depth of matched features"
     )
-    smoothness: float = Field(
-        0.003, ge=0, description="cost of a change between neighbours, per hundredth of the disparity range"
-    )
+    smoothness: float = Field(0.003, ge=0, description="cost of a change by a hundredth of the disparity range")
     iterations: int = Field(5, ge=1, le=100, description="passes of the messages, there and back")
     refinements: int = Field(4, ge=0, le=100, description="number of fits of the continuous depth")
     filter_radius: int = Field(3, ge=1, le=50, description="window of 2 r + 1 pixels that filters the refinement")

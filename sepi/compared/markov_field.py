@@ -23,9 +23,7 @@ class MarkovFieldParameters(Parameters):
 
     needs: ClassVar[Needs] = Needs(bytes_per_sample=6, bytes_per_pixel=4000, seconds_per_megasample=0.6)
 
-    smoothness: float = Field(
-        0.02, ge=0, description="cost of a change between neighbours, per hundredth of the disparity range"
-    )
+    smoothness: float = Field(0.02, ge=0, description="cost of a change by a hundredth of the disparity range")
     truncation: float = Field(
         0.1, gt=0, le=1, description="change beyond which the cost no longer grows, as a share of the disparity range"
     )

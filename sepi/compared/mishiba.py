@@ -90,10 +90,7 @@ class MishibaParameters(CandidateParameters):
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     feature_sigma: float = Field(
-        1.0,
-        gt=0,
-        le=10,
-        description="standard deviation of the Gaussian mean with which a pixel is compared for its bit, in pixels",
+        1.0, gt=0, le=10, description="sigma of the Gaussian mean with which a pixel is compared for its bit, in pixels"
     )
     lattice_step: int = Field(
         2, ge=1, le=8, description="distance of the pixels whose costs are computed, in pixels; others are interpolated"

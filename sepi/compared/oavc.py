@@ -88,10 +88,7 @@ class OavcParameters(CandidateParameters):
         description="share of the views that must vote for some candidate; it sets each pixel's threshold",
     )
     least_threshold: float = Field(
-        0.004,
-        ge=1e-6,
-        le=1,
-        description="least threshold of a vote: mean difference of the channels, colours in 0..1",
+        0.004, ge=1e-6, le=1, description="least threshold of a vote: mean difference of the channels, colours in 0..1"
     )
 
 

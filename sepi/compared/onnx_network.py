@@ -61,18 +61,14 @@ class OnnxParameters(Parameters):
     grid: tuple[int, int] | None = Field(
         None, description="rows and columns of views round the reference view that the network takes; null: all"
     )
-    reversed: tuple[Literal["t", "s"], ...] = Field(
-        (), description="axes of views whose order the network takes reversed"
-    )
+    reversed: tuple[Literal["t", "s"], ...] = Field((), description="axes of views that the network takes reversed")
     grey: bool = Field(False, description="whether the network takes one channel, brightness")
     scale: float = Field(1.0, description="factor of the input colours, which are 0..1")
     offset: float = Field(0.0, description="added to the input colours after the factor")
     output: str | None = Field(None, description="name of the output with the disparity; null: the first")
     disparity_scale: float = Field(1.0, description="factor from the output to pixels per view step")
     disparity_offset: float = Field(0.0, description="added to the output after the factor, pixels per view step")
-    margin: int = Field(
-        0, ge=0, le=200, description="how much narrower the output is than the input on each side, pixels"
-    )
+    margin: int = Field(0, ge=0, le=200, description="width that the output lacks on each side, pixels")
     tile: int | None = Field(None, ge=8, description="width of the output's tiles, pixels; null: one for all")
     overlap: int = Field(16, ge=0, description="overlap of neighbouring tiles, pixels")
 

@@ -109,9 +109,7 @@ class PobrRegionParameters(Parameters):
     superpixels: int = Field(2000, ge=1, description="number of superpixels")
     tau_0: float = Field(1000.0, ge=0, description="how sharply the label confidence falls beyond tau_1")
     tau_1: float = Field(
-        0.2,
-        ge=0,
-        description="deviation of a superpixel's labels above which their confidence falls, pixels per view step",
+        0.2, ge=0, description="deviation of a superpixel's labels at which confidence falls, pixels per view step"
     )
     least_share: float = Field(0.03, gt=0, le=1, description="q, least factor of the label confidence")
 
@@ -123,9 +121,7 @@ class PobrSmoothingParameters(Parameters):
         3e-6, ge=0, description="weight of smoothness against data; for gradients of values 0..1 per px"
     )
     gradient_floor: float = Field(
-        0.002,
-        gt=0,
-        description="f, image gradient below which smoothness no longer grows, 0..1 per px; noise adds to it",
+        0.002, gt=0, description="f, gradient below which smoothness no longer grows, 0..1 per px; noise adds to it"
     )
     tau_2: float = Field(1.5, ge=0, description="how strongly label confidence weakens smoothness")
 

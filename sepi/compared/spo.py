@@ -75,10 +75,7 @@ class SpoParameters(CandidateParameters):
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     scale: float = Field(
-        0.8,
-        ge=0.35,
-        le=10,
-        description="standard deviation of the Gaussian whose derivative weights the sides of a line, pixels",
+        0.8, ge=0.35, le=10, description="sigma of the Gaussian whose derivative weights the sides of a line, pixels"
     )
     bins: int = Field(64, ge=2, le=256, description="bins of a histogram, for each channel")
     peak: float = Field(

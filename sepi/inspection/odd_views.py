@@ -55,9 +55,7 @@ def odd_views(light_field: LightField) -> list[str]:
         "show the same picture as others": [n for n, look in enumerate(looks) if times[look] > 1 and small[n].any()],
         "match none of the others (black, of another scene, or rotated; EXIF is not used)": _misfits(places, small),
     }
-    return [
-        f"views that {what}; leave them out by {_flags(light_field, places[at])}" for what, at in found.items() if at
-    ]
+    return [f"views that {what}; leave out by {_flags(light_field, places[at])}" for what, at in found.items() if at]
 
 
 def _flags(light_field: LightField, places: Places) -> str:

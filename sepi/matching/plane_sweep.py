@@ -61,10 +61,7 @@ class SweepParameters(CandidateParameters):
     )
     window_radius: int = Field(3, ge=0, le=10, description="cost window of 2 r + 1 pixels, in pixels; 0: none")
     window_sigma: float = Field(
-        0.02,
-        ge=1e-6,
-        le=10,
-        description="RGB distance at which a window pixel's weight falls, colours in 0..1",
+        0.02, ge=1e-6, le=10, description="RGB distance at which a window pixel's weight falls, colours in 0..1"
     )
     correct_noise: bool = Field(
         True,

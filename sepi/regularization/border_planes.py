@@ -27,9 +27,7 @@ of the shortest way round, two pixels wide."""
 class BorderPlaneParameters(Parameters):
     """Parameters of planes by borders."""
 
-    tolerance: float = Field(
-        0.05, gt=0, description="largest distance of an inlier from the plane, pixels per view step"
-    )
+    tolerance: float = Field(0.05, gt=0, description="largest distance of an inlier, pixels per view step")
     behind_penalty: float = Field(
         2.0, ge=0, description="penalty on border pixels behind the plane, relative to inliers"
     )

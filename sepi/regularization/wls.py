@@ -44,10 +44,7 @@ class WlsParameters(Parameters):
         0.2, ge=0, description="standard deviation of the depth in 3x3 pixels that marks a discontinuity"
     )
     discontinuity_weight: float = Field(
-        0.1,
-        gt=0,
-        le=1,
-        description="share of its weight that data keeps at a discontinuity; Eq. 9: 0",
+        0.1, gt=0, le=1, description="share of its weight that data keeps at a discontinuity; Eq. 9: 0"
     )
     tau_2: float = Field(1.5, ge=0, description="how strongly confidence weakens smoothness")
     textureless_confidence: float = Field(0.8, ge=0, le=1, description="c_tl, confidence of textureless regions")

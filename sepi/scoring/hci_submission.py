@@ -96,9 +96,7 @@ def entry_of(folder: Path, runtimes: Mapping[str, float]) -> tuple[str, Entry]:
     result = read_result(folder)
     scene = result.scene
     if result.from_centre != (0, 0):
-        raise SepiError(
-            f"{folder}: depth of another view; expected that of the centre view (sepi depth without --view)"
-        )
+        raise SepiError(f"{folder}: depth of another view; expected that of the centre view, made without --view")
     require_known(f"{folder}: scenes of the benchmark", [scene], SCENES)
     disparity, runtime = folder / "disparity.pfm", folder / RUNTIME
     if not disparity.is_file():

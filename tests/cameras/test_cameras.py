@@ -474,7 +474,7 @@ def test_a_lens_is_that_of_the_picture_at_hand_whoever_tells_it(tmp_path: Path, 
     assert {(shot.lens.width, shot.lens.focal, shot.lens.principal) for shot in model.shots} == {
         (64, LENS.focal, (30.5, 20.5))
     }
-    with pytest.raises(SepiError, match="column 70, row 20 .*128x96"):
+    with pytest.raises(SepiError, match=r"column 70, row 20 .*128x96"):
         read_model(cut, crop_of=(128, 96, 70, 20))
 
 

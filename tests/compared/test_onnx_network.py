@@ -137,7 +137,7 @@ def test_a_wrong_file_or_none_is_told_in_one_line(tmp_path: Path, light_field: L
         estimated(light_field, tmp_path / "text.onnx")
     with pytest.raises(SepiError, match=r"absent\.onnx: no such file"):
         estimated(light_field, tmp_path / "absent.onnx")
-    with pytest.raises(SepiError, match="initial.onnx.model: .*ONNX file"):
+    with pytest.raises(SepiError, match=r"initial\.onnx\.model: .*ONNX file"):
         estimated(light_field, None)
 
 
