@@ -1,4 +1,4 @@
-"""The path-traced scenes: what each one tests, and whether parameters may be chosen on it."""
+"""Catalogue of the path-traced scenes: their difficulty, and whether parameters may be chosen on them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from sepi.validation import require_known
 NoiseLevel = Literal["off", "low", "high"]
 
 NOISE_LEVELS: tuple[NoiseLevel, ...] = get_args(NoiseLevel)
-"""How many electrons each pixel of a camera has: without end, those of a quiet camera, and those of a dim evening."""
+"""Levels of sensor noise: none, that of a quiet camera, and that of a dim evening."""
 
 WITHOUT_NOISE: NoiseLevel = "off"
-"""The level of noise that is in no name, and of which there is one seed alone."""
+"""The level without noise; it is not part of a scene's name, and has one seed only."""
 
 
 @dataclass(frozen=True)
@@ -25,11 +25,11 @@ class Entry:
     Attributes
     ----------
     description : str
-        What is seen.
+        Content of the scene.
     tests : str
-        What it is hard for.
+        Difficulty that it poses.
     for_choosing : bool
-        Whether parameters may be chosen on it; the others are for finding out what the choice is worth.
+        Whether parameters may be chosen on it; other scenes are held out to evaluate the choice.
     """
 
     description: str
@@ -55,13 +55,13 @@ RENDERED: dict[str, Entry] = {
 
 
 def exposed_name(scene: str, noise: str = WITHOUT_NOISE, seed: int = 1) -> str:
-    """What a scene is called at a noise level: ``sticks``, ``sticks_low``, and with another seed ``sticks_low_2``."""
+    """Name of a scene at a noise level: ``sticks``, ``sticks_low``, or with another seed ``sticks_low_2``."""
     parts = [scene] if noise == WITHOUT_NOISE else [scene, noise, *([str(seed)] if seed != 1 else [])]
     return "_".join(parts)
 
 
 def world_of(name: str) -> World:
-    """The things, lights and depths of a scene.
+    """The world of a scene: things, lights and depths.
 
     Raises
     ------

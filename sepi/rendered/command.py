@@ -1,4 +1,4 @@
-"""Render a path-traced scene into a file, for the workflow."""
+"""The workflow's command that renders a path-traced scene into a file."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def main(
     output: Path,
     timing: Path | None,
 ) -> None:
-    """Render the scene NAME; views that are done are kept if it is interrupted."""
+    """Render the scene NAME; an interrupted run keeps finished views."""
     started = time.perf_counter()
     values = {"size": size, "grid": [views, views], "samples": samples, **settings_of(settings, "lens=0.5")}
     with progress_bar(name) as progress:

@@ -1,4 +1,4 @@
-"""From light to pictures: photons, the sensor's noise, vignetting, exposure, curve and bits."""
+"""Pictures of a sensor from rendered light: photon and read noise, vignetting, exposure, tone curve, bits."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ def read_exposed(path: Path, noise: str = "off", seed: int = 1) -> LightField:
     noise : str
         One of :data:`sepi.rendered.NOISE_LEVELS`.
     seed : int
-        Of the noise.
+        Seed of the noise.
 
     Returns
     -------
     LightField
-        As :func:`exposed` makes it.
+        From :func:`exposed`.
 
     Raises
     ------
     SepiError
-        If the file is no render, or there is no such level or seed.
+        If the file is not a render, or there is no such level or seed.
     """
     return exposed(read_render(path), validated(Exposure, {"noise": noise, "noise_seed": seed}, "noise"))
 
 
 def exposed(render: Render, exposure: Exposure) -> LightField:
-    """The pictures that a sensor takes of a rendered scene.
+    """The light field that a sensor takes of a rendered scene.
 
     Parameters
     ----------
@@ -55,11 +55,11 @@ def exposed(render: Render, exposure: Exposure) -> LightField:
     -------
     LightField
         Views uint8 or uint16 RGB, with disparity range, camera, and ground truth and masks of the centre view. Equal
-        arguments give equal bytes. The views' true positions are not told, as a camera's are not.
+        arguments give equal bytes. It has no true positions of the views, like a camera's.
     """
     rows, columns = render.views.shape[:2]
     views = np.empty(render.views.shape, np.uint8 if exposure.bits == 8 else np.uint16)
-    # a scene, level and seed of its own each: no two pictures share their noise
+    # seeded by scene, level and seed, so that no two pictures share their noise
     key = zlib.crc32(f"{render.name} {exposure.noise}".encode())
     factors = np.exp2(
         exposure.exposure_spread * np.random.default_rng([exposure.noise_seed, key]).standard_normal((rows, columns))
@@ -84,18 +84,18 @@ def exposed(render: Render, exposure: Exposure) -> LightField:
 def _noisy(
     light: npt.NDArray[np.float64], exposure: Exposure, share: float, rng: np.random.Generator
 ) -> npt.NDArray[np.float64]:
-    """Light as electrons tell it: photons come one by one, and reading adds a little."""
+    """Light with photon noise and read noise."""
     sensor = NOISE[exposure.noise]
     if sensor is None:
         return light
     white = sensor.white * share
-    # a well holds no more than white
+    # a full well is white
     electrons = rng.poisson(np.minimum(light, 1) * white) + sensor.read * rng.standard_normal(light.shape)
     return electrons / white
 
 
 def _values(light: npt.NDArray[np.float64], exposure: Exposure) -> npt.NDArray[np.float64]:
-    """Values that are to be rounded to whole ones."""
+    """Pixel values before rounding."""
     light = np.clip(light, 0, 1)
     curve = (
         np.float64(srgb_encoded(light.astype(np.float32))) if exposure.gamma is None else light ** (1 / exposure.gamma)
@@ -105,15 +105,15 @@ def _values(light: npt.NDArray[np.float64], exposure: Exposure) -> npt.NDArray[n
 
 
 def _vignette(shape: tuple[int, int], strength: float) -> npt.NDArray[np.float64]:
-    """Part of the light that arrives, ``(H, W, 1)``: falls with the square of the distance from the middle."""
+    """Share of the light that arrives, falling with the squared distance from the middle; shape (H, W, 1)."""
     down, across = (np.linspace(-1, 1, length) for length in shape)
     return (1 - strength * (down[:, None] ** 2 + across[None, :] ** 2) / 2)[..., None]
 
 
 def _range_of(disparity: npt.NDArray[np.float32]) -> DisparityRange:
-    """Bounds of all views in tenths, as the benchmark gives them."""
-    # rounded first, so that a bound that is a tenth up to the last bits stays one
+    """Disparity range of all views, rounded outwards to tenths as in the benchmark."""
+    # rounded first, so that a bound at a tenth, up to the last bits, stays there
     low, high = (round(10 * float(value), 3) for value in (disparity.min(), disparity.max()))
     low, high = math.floor(low) / 10, math.ceil(high) / 10
-    # a scene of one plane still has to be searched
+    # a scene of one plane still needs a range
     return DisparityRange(low, max(high, low + 0.2), "parameters")

@@ -1,7 +1,7 @@
-"""Which pixels of a view show what: its surfaces' kinds, and which other views see them.
+"""Masks of a view's pixels: kinds of surfaces, depth steps, and which other views see them.
 
-A pixel shows what the ray through its middle meets first. Masks of a view are bits of one number, in the order of
-:data:`MASKS`.
+A pixel shows the surface that the ray through its middle meets first. Masks of a view are bits of one number, in the
+order of :data:`MASKS`.
 """
 
 from __future__ import annotations
@@ -20,24 +20,26 @@ from sepi.scoring.edges import edges_of
 from sepi.scoring.regions import textureless
 
 MASKS = ("textured", "textureless", "glossy", "mirror", "glass", "thin", "discontinuities", "occluded", "alone")
-"""Textured and textureless: matte or glossy surfaces on which the painted colours change, or hardly do
+"""Names of the masks.
+
+Textured and textureless: matte or glossy surfaces with and without a change of the painted colours
 (:func:`sepi.scoring.regions.textureless` on colours without light); glossy, mirror, glass: surfaces of these kinds;
-thin: wires, sticks, twigs; discontinuities: two pixels beside a depth step; occluded: hidden from some other view;
-alone: seen by no other view.
+thin: wires, sticks, twigs; discontinuities: two pixels beside a depth step; occluded: hidden from another view; alone:
+seen by no other view.
 """
 
 Bits = npt.NDArray[np.uint16]
 
 _BIT = {name: 1 << number for number, name in enumerate(MASKS)}
 
-# pixels per view step: what lies as near as this to a view's own surface is that surface
+# largest difference of disparities of one surface, pixels per view step
 _SAME = 0.05
 
 
 def albedo_of(things: Sequence[Thing], seen: FirstSurface) -> FloatArray:
-    """The colours of what a view shows, without light, ``(H, W, 3)``, as on a screen."""
+    """Colours of a view's surfaces without light, sRGB; shape (H, W, 3)."""
     colours, uv = np.zeros((seen.thing.size, 3), np.float32), seen.uv.reshape(-1, 2)
-    # thing by thing, without looking through the picture for each
+    # sorted by thing, instead of a pass over the picture for each
     order = np.argsort(seen.thing.astype(np.int16), axis=None, kind="stable")
     ends = np.searchsorted(seen.thing.ravel()[order], np.arange(-1, len(things)), side="right")
     for thing, (first, last) in zip(things, pairwise(ends), strict=True):
@@ -53,7 +55,7 @@ def albedo_of(things: Sequence[Thing], seen: FirstSurface) -> FloatArray:
 
 
 def surface_bits(things: Sequence[Thing], seen: FirstSurface, disparity: FloatMap) -> Bits:
-    """Masks of a view that do not depend on others: kinds of surfaces, and depth steps."""
+    """Masks of a view that do not depend on other views: kinds of surfaces, and depth steps."""
     kinds = np.array([thing.material.kind for thing in things] + ["matte"])[seen.thing]
     thin = np.array([thing.thin for thing in things] + [False])[seen.thing]
     plain = textureless(albedo_of(things, seen))
@@ -75,9 +77,9 @@ def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64]) -> Bi
     Parameters
     ----------
     disparities : ndarray, shape (N, H, W), float32
-        Of all views, in pixels per view step.
+        Disparity of all views, pixels per view step.
     positions : ndarray, shape (N, 2), float64
-        Where they stand, in view steps: down, across.
+        Positions of the views, ``(down, across)`` in view steps.
     """
     bits = np.empty(disparities.shape, np.uint16)
     hidden, seen = np.empty((2, *disparities.shape[1:]), bool)

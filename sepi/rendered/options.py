@@ -1,4 +1,4 @@
-"""What a path-traced scene is taken with: cameras, and what their sensors do to light."""
+"""Options of path-traced scenes: cameras, and sensors."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _Seed = Annotated[int, Field(ge=0, lt=2**31)]
 
 
 class RenderOptions(CheckedModel):
-    """What has to be known before a scene is rendered."""
+    """Options of rendering."""
 
     size: int = Field(512, ge=32, le=4096, description="height and width of a view in pixels; disparities stay")
     grid: tuple[_Rows, _Rows] = Field((9, 9), description="rows and columns of views")
@@ -36,13 +36,13 @@ class RenderOptions(CheckedModel):
 
     @property
     def shares_light(self) -> bool:
-        """Whether views share the light of matte surfaces: they show the same points, sharp, where disparity says."""
+        """Whether views share the light of matte surfaces, which needs sharp views without turns."""
         return not (self.lens or self.rotation_error)
 
 
 @dataclass(frozen=True)
 class Electrons:
-    """A sensor: how many electrons a white pixel holds, and the deviation of what reading adds to each."""
+    """A sensor: electrons of a white pixel, and standard deviation of the read noise in electrons."""
 
     white: float
     read: float
@@ -50,15 +50,15 @@ class Electrons:
 
 NOISE: dict[NoiseLevel, Electrons | None] = {
     "off": None,
-    # in grey of 18 % deviations of 3 and of 9 of 255
+    # standard deviations of 3 and 9 of 255 in grey of 18 %
     "low": Electrons(2000.0, 4.0),
     "high": Electrons(250.0, 4.0),
 }
-"""The sensors of the noise levels; none for pictures without noise."""
+"""Noise level to sensor; None without noise."""
 
 
 class Exposure(CheckedModel):
-    """What a sensor makes of the light."""
+    """Options of the sensor."""
 
     noise: NoiseLevel = Field(
         "off", description="photons and reading of a sensor that holds 2,000 (low) or 250 (high) electrons at white"

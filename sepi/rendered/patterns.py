@@ -1,6 +1,6 @@
-"""Patterns by NumPy, seeded: noise, wood, stone, bricks, tiles, weave, stripes, print.
+"""Seeded patterns: noise, wood, stone, bricks, tiles, weave, stripes, print.
 
-A pattern has 1024 texels a side unless it is asked for otherwise, and repeats without a seam.
+A pattern has 1024 texels a side by default, and repeats without a seam.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def field(seed: int, finest: float, coarsest: float, texels: int = TEXELS, stret
     texels : int
         Height and width.
     stretch : float
-        By how much it is longer across than down.
+        Factor by which structures are longer across than down.
     """
     white = np.random.default_rng(seed).standard_normal((texels, texels), np.float32)
     amplitude = _amplitude(finest, coarsest, texels, stretch)
@@ -42,7 +42,7 @@ def field(seed: int, finest: float, coarsest: float, texels: int = TEXELS, stret
 
 @lru_cache(maxsize=16)
 def _amplitude(finest: float, coarsest: float, texels: int, stretch: float) -> FloatArray:
-    # negative frequencies have what positive ones have
+    # negative frequencies have the amplitudes of positive ones
     down = np.arange(texels)
     frequency = np.hypot(np.fft.rfftfreq(texels)[:, None], stretch * np.fft.rfftfreq(texels)[None, :])
     fourth = np.square(np.square(frequency))
@@ -62,7 +62,7 @@ def noise(
     coarsest: float = 256.0,
     chroma: float = 0.3,
 ) -> Pattern:
-    """Noise round a colour: ``contrast`` is the deviation of the brightness, ``chroma`` the colours' part of it."""
+    """Noise about a colour: ``contrast`` is the deviation of the brightness, ``chroma`` the share of colour in it."""
     found = field(seed, finest, coarsest)[..., None]
     if chroma:
         colours = [field(seed + 1 + channel, finest, coarsest) for channel in range(3)]
@@ -142,7 +142,7 @@ def plaid(seed: int, size: float, ground: Vector, bands: Vector, count: int = 4,
 
 
 def printed(seed: int, size: float, lines: int = 40, paper: Vector = (0.9, 0.89, 0.85), ink: float = 0.12) -> Pattern:
-    """Lines of words, as on a page."""
+    """Lines of printed words."""
     rng = np.random.default_rng(seed)
     cell = TEXELS // (2 * lines)
     page = np.zeros((TEXELS, TEXELS))
@@ -158,7 +158,7 @@ def printed(seed: int, size: float, lines: int = 40, paper: Vector = (0.9, 0.89,
 
 
 def painted(colours: npt.ArrayLike, width: float, height: float | None = None) -> Pattern:
-    """Colours as a pattern; none is quite black or white. It is as high as wide unless said otherwise."""
+    """Colours as a pattern, kept off black and white; default height: the width."""
     raster: FloatArray = np.clip(np.asarray(colours), 0.02, 0.98).astype(np.float32)
     return Pattern(raster, (width, height or width))
 

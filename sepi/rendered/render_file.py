@@ -1,9 +1,9 @@
-"""A path-traced light field as light, with the truth of every view: what noise and exposure are added to.
+"""Files of path-traced light fields: linear light, and ground truth of every view.
 
 An HDF5 file holds ``views (T, S, H, W, 3) float16`` (linear, 1 is white), ``disparity (T, S, H, W) float32`` (pixels
 per view step, at pixel centres), ``normal (T, S, H, W, 3) float16`` (right, down, away), ``masks (T, S, H, W) uint16``
-(bits in the order of its attribute ``names``), ``positions (T, S, 2) float64`` and ``turns (T, S, 3) float64`` (where
-views stand, in view steps, and how they are turned, in radians), and attributes that say what made it.
+(bits in the order of its attribute ``names``), ``positions (T, S, 2) float64`` (view steps), ``turns (T, S, 3)
+float64`` (radians), and attributes with the scene, the camera and the options.
 """
 
 from __future__ import annotations
@@ -37,25 +37,25 @@ class Render:
     Attributes
     ----------
     name : str
-        The scene's.
+        Name of the scene.
     views : ndarray, shape (T, S, H, W, 3), float16
-        Light, linear; 1 is white.
+        Linear light; 1 is white.
     disparity : ndarray, shape (T, S, H, W), float32
-        Of the first surface at the middle of each pixel, in pixels per view step.
+        Disparity of the first surface at the middle of each pixel, pixels per view step.
     normal : ndarray, shape (T, S, H, W, 3), float16
-        Of that surface, towards the camera: right, down, away.
+        Normal of that surface, towards the camera: right, down, away.
     masks : ndarray, shape (T, S, H, W), uint16
         Bits, in the order of :data:`sepi.rendered.masks.MASKS`.
     positions : ndarray, shape (T, S, 2), float64
-        Where views stand, in view steps from the centre view: down, across.
+        Positions of the views from the centre view, ``(down, across)`` in view steps.
     turns : ndarray, shape (T, S, 3), float64
-        How they are turned about x, y and z, in radians.
+        Rotations of the views about x, y and z, radians.
     settings : mapping of str to float
         ``focal_length_mm``, ``baseline_mm``, ``focus_distance_m``, ``sensor_size_mm``.
     light : float
-        Light that the cameras get, as part of what they get in other scenes.
+        Light of the scene relative to other scenes.
     made_by : mapping
-        What it was rendered with.
+        Record of the scene's options and versions.
     """
 
     name: str
@@ -85,7 +85,7 @@ def write_render(path: Path, render: Render) -> None:
     with create_hdf5(path) as file:
         for name in _ARRAYS:
             values = getattr(render, name)
-            # masks shrink to almost nothing, light and depth hardly
+            # compression is worth while for masks only
             file.create_dataset(name, data=values, **({"compression": "gzip"} if name == "masks" else {}))
             if name in _AXES:
                 file[name].attrs["axes"] = _AXES[name]
@@ -98,12 +98,12 @@ def write_render(path: Path, render: Render) -> None:
 
 
 def read_render(path: Path) -> Render:
-    """Read a render.
+    """The render in a file.
 
     Raises
     ------
     SepiError
-        If the file is none, or damaged.
+        If the file is not a render, or damaged.
     """
     with open_hdf5(path, "render of a scene") as file:
         arrays: dict[str, Any] = {name: read_dataset(path, file[name]) for name in _ARRAYS}
@@ -112,7 +112,7 @@ def read_render(path: Path) -> Render:
 
 
 def read_truth(path: Path) -> tuple[FloatMap, dict[str, BoolMap]]:
-    """Disparity and masks of a render's reference view, without its pictures."""
+    """Disparity and masks of a render's reference view, read without its pictures."""
     with open_hdf5(path, "render of a scene") as file:
         rows, columns = file["disparity"].shape[:2]
         centre = (rows // 2, columns // 2)

@@ -1,4 +1,4 @@
-"""A path-traced scene, view by view; what is done is kept, and an interrupted run goes on from there."""
+"""Rendering of a path-traced scene, view by view; a later run continues an interrupted one."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from sepi.stage import no_progress
 from sepi.threads import available_cores, threads_used, use_threads
 from sepi.validation import require_known
 
-# what is kept of a view until all are done
+# arrays of a view that are kept until all views are finished
 _TYPES = {
     "views": np.float32,
     "albedo": np.float32,
@@ -59,12 +59,12 @@ def render_scene(
         A key of :data:`sepi.rendered.RENDERED`.
     options : RenderOptions
     path : Path
-        HDF5 file to write (:mod:`sepi.rendered.render_file`). Views that are done lie in a folder beside it until all
-        are, and are taken over by a later run of the same scene and options.
+        HDF5 file to write (:mod:`sepi.rendered.render_file`). Finished views lie in a folder beside it until all are
+        finished; a later run with the same scene and options uses them.
     progress : callable, optional
         Called with the fraction done.
     threads : int, optional
-        As many as there are cores unless given; the same bytes for any number.
+        Default: one per core; the file does not depend on it.
 
     Raises
     ------
@@ -78,14 +78,14 @@ def render_scene(
 
 
 def made_by(name: str, options: RenderOptions) -> dict[str, Any]:
-    """What a file of a render says that it was rendered with."""
+    """Record of the options and versions of a render, for its file."""
     return {"scene": name, "version": package_version(), **options.model_dump(mode="json")}
 
 
 def render_world(
     name: str, world: World, options: RenderOptions, path: Path, progress: Callable[[float], None] = no_progress
 ) -> None:
-    """Render a world of one's own; see :func:`render_scene`."""
+    """Render a world of your own; see :func:`render_scene`."""
     rig = rig_of(world, options.size, options.grid, options.baseline)
     count = math.prod(options.grid)
     parts = _parts(path)
@@ -102,17 +102,17 @@ def render_world(
 
 
 def views_done(path: Path) -> int:
-    """How many views of a scene that is being rendered into this file are done."""
+    """Number of finished views of a scene that is being rendered into this file."""
     return len(list(_parts(path).glob("view_*.npz")))
 
 
 def _parts(path: Path) -> Path:
-    """The folder of what is done."""
+    """The folder of finished views."""
     return path.with_name(f"{path.name}.parts")
 
 
 class _View(NamedTuple):
-    """A view, all but its picture: its truth by the names of what is kept, where it stands, and how it is sampled."""
+    """A view before its picture: ground truth by name, position, and plan of samples."""
 
     truth: dict[str, npt.NDArray[Any]]
     position: Position
@@ -123,9 +123,9 @@ class _View(NamedTuple):
 def _views(
     world: World, rig: Rig, options: RenderOptions, numbers: Sequence[int]
 ) -> Iterator[tuple[int, dict[str, npt.NDArray[np.generic]]]]:
-    """Picture and truth of these views, in turn.
+    """Picture and ground truth of each of these views.
 
-    What the next view shows is found beside the renderer: all of its cores have work where that has for one alone.
+    A thread prepares the next view while the renderer works, since the preparation uses one core only.
     """
     if not numbers:
         return
@@ -141,10 +141,10 @@ def _views(
 
 
 def _looked_at(world: World, tracer: Tracer, rig: Rig, options: RenderOptions, number: int) -> _View:
-    """What a view shows."""
+    """A view before its picture."""
     positions, turns = _stand(rig, options)
     (down, across), (x, y, z) = positions.reshape(-1, 2)[number].tolist(), turns.reshape(-1, 3)[number].tolist()
-    # of its own for all that takes samples: a view's tiles ask for a few
+    # one seed per view, far from others: a view's tiles use several in a row
     seed = int(np.random.SeedSequence([options.seed, number]).generate_state(1)[0])
     at = tracer.position(down, across, (x, y, z))
     seen = tracer.first_surface(at)
@@ -161,19 +161,19 @@ def _looked_at(world: World, tracer: Tracer, rig: Rig, options: RenderOptions, n
         "disparity": disparity,
         "normal": seen.normal,
         "masks": surface_bits(world.things, seen, disparity),
-        # which views see a point is asked of cameras that are not turned
+        # occlusion masks need a view without a turn
         "upright": rig.disparity(straight.depth),
     }
     return _View(truth, at, seed, plan)
 
 
 def _picture(tracer: Tracer, options: RenderOptions, view: _View) -> FloatArray:
-    """Of a view, ``(H, W, 3)``."""
+    """Picture of a view, shape (H, W, 3)."""
     return pictured(tracer, view.plan) if view.plan else tracer.picture(view.position, view.seed, options.samples)
 
 
 def _stand(rig: Rig, options: RenderOptions) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Where views stand and how they are turned; the reference view as it should."""
+    """Positions and turns of the views; those of the reference view are exact."""
     rng = np.random.default_rng(options.seed)
     positions = rig.positions
     shift, turns = rng.standard_normal(positions.shape), rng.standard_normal((*positions.shape[:2], 3))
@@ -183,7 +183,7 @@ def _stand(rig: Rig, options: RenderOptions) -> tuple[npt.NDArray[np.float64], n
 
 
 def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files: Sequence[Path]) -> Render:
-    """The views together, and which views see what."""
+    """The render of all views, with their occlusion masks."""
     positions, turns = _stand(rig, options)
     views: dict[str, npt.NDArray[Any]] = {}
     for number, file in enumerate(files):
@@ -196,9 +196,9 @@ def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files:
     stands, turned = positions.reshape(-1, 2), turns.reshape(-1, 3).any(axis=1)
     if options.shares_light:
         views["views"] = with_shared_light(views["views"], albedo, upright, things, whole, stands)
-    # beyond half precision is far beyond white
+    # the limit of half precision lies far beyond white
     views["views"] = np.minimum(views["views"], 60000.0).astype(np.float16)
-    # of a turned view it is not told
+    # unknown for turned views
     views["masks"][~turned] |= seen_bits(upright, stands)[~turned]
     return Render(
         name=name,
@@ -212,7 +212,7 @@ def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files:
 
 
 def _digest(world: World) -> str:
-    """Of all that a world consists of: views of one that was changed since are not mixed with those of another."""
+    """Digest of a world's contents, so that views of a changed world are not mixed with older ones."""
     digest = hashlib.sha256()
 
     def add(part: Any) -> None:
@@ -232,7 +232,7 @@ def _digest(world: World) -> str:
 
 
 def _take_over(parts: Path, made_by: str) -> None:
-    """Make the folder of views, or keep one of the same scene and options."""
+    """Make the folder of views; keep an existing one with the same scene and options."""
     note = parts / "made_by.json"
     if note.is_file() and note.read_text(encoding="utf-8") == made_by:
         return
@@ -243,7 +243,7 @@ def _take_over(parts: Path, made_by: str) -> None:
 
 
 def _is_whole(file: Path) -> bool:
-    """Whether a view was written to its end."""
+    """Whether a view's file is complete."""
     if not file.is_file():
         return False
     try:

@@ -1,7 +1,7 @@
-"""Where the cameras of a path-traced scene stand, and what a depth is in pixels per view step.
+"""Cameras of a path-traced scene, and their conversion of depth to disparity.
 
-Cameras stand on a grid ``b`` apart and are sheared so that what lies at the focus distance ``F`` has disparity zero, as
-in the HCI 4D benchmark: a point at depth ``Z`` has ``d = b f (1 / Z - 1 / F)``, ``f`` being the focal length in pixels.
+Cameras stand on a grid with spacing ``b``, sheared so that points at the focus distance ``F`` have disparity zero, as
+in the HCI 4D benchmark. With the focal length ``f`` in pixels, depth ``Z`` has disparity ``d = b f (1 / Z - 1 / F)``.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Rig:
     baseline : float
         Metres from one view to the next.
     focus : float
-        Metres to what has disparity zero.
+        Focus distance, metres.
     """
 
     size: int
@@ -43,12 +43,12 @@ class Rig:
 
     @property
     def camera(self) -> Camera:
-        """What turns disparity into depth."""
+        """Camera of the light field."""
         return camera_from(**self.settings, shape=(self.size, self.size), crop_of=None)
 
     @property
     def settings(self) -> dict[str, float]:
-        """What the benchmark's ``parameters.cfg`` says of it."""
+        """Values for the benchmark's ``parameters.cfg``."""
         return {
             "focal_length_mm": self.focal_px / self.size * SENSOR_MM,
             "baseline_mm": 1000 * self.baseline,
@@ -58,18 +58,18 @@ class Rig:
 
     @property
     def positions(self) -> npt.NDArray[np.float64]:
-        """Views' positions from the centre view, ``(T, S, 2)``: down, across, in view steps."""
+        """Positions of the views from the centre view, ``(down, across)`` in view steps; shape (T, S, 2)."""
         rows, columns = self.grid
         down, across = np.arange(rows) - rows // 2, np.arange(columns) - columns // 2
         return np.stack(np.broadcast_arrays(down[:, None], across[None, :]), axis=-1).astype(np.float64)
 
     def disparity(self, depth: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Pixels per view step of what lies at depths, in metres along the viewing direction."""
+        """Disparity in pixels per view step of depths along the viewing direction in metres."""
         return self.baseline * self.focal_px * (1 / depth - 1 / self.focus)
 
 
 def rig_of(world: World, size: int, grid: tuple[int, int], baseline: float = 1.0) -> Rig:
-    """The cameras with which a scene's near and far depths have its disparities, times ``baseline``."""
+    """The cameras for which a scene's near and far depths have its disparities, times ``baseline``."""
     focal = size / (2 * np.tan(np.radians(world.field_of_view) / 2))
     step = (world.at_near - world.at_far) / (focal * (1 / world.near - 1 / world.far))
     focus = 1 / (1 / world.near - world.at_near / (step * focal))

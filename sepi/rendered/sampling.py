@@ -1,8 +1,7 @@
-"""How many paths of light each pixel of a view takes: as many as what it shows asks for.
+"""Number of paths for each pixel of a view, by the surface that it shows.
 
-Light on a matte surface is gathered from all views (:mod:`sepi.rendered.shared_light`), so that a few paths in each
-will do. Pixels in which surfaces mix take some, and those that show mostly what depends on where it is seen from take
-all: gloss, mirrors and glass.
+Views share the light on matte surfaces (:mod:`sepi.rendered.shared_light`), so a few paths in each view are enough.
+Pixels with several surfaces need more, and specular surfaces (gloss, mirrors and glass) all.
 """
 
 from __future__ import annotations
@@ -18,45 +17,45 @@ from sepi.rendered.surfaces import FirstSurface
 from sepi.rendered.tracing import SPREAD, Position, Tiles, Tracer
 from sepi.rendered.world import FloatArray
 
-# to make a camera for a tile takes as long as so many paths
+# number of paths that take as long as making a camera for a tile
 _CAMERA = 16
-# greatest side of a tile in pixels, a power of two
+# largest side of a tile in pixels, a power of two
 _WIDEST = 64
-# rays of a pixel, across and down, that look for things in it
+# rays per pixel, across and down, to find the things in it
 _FINE = 4
-# pixels per view step: how far a surface may bend from pixel to pixel to be one
+# largest second difference of one surface, pixels per view step
 _BEND = 0.005
-# linear; on what is darker there is no telling the light
+# least linear albedo from which the light can be computed
 _DARKEST = 1e-3
 
 
 def shared_samples(samples: int, views: int) -> int:
-    """Paths of a pixel of a matte surface: with those of all views about three times ``samples``."""
+    """Paths of a pixel on a matte surface; over all views about three times ``samples``."""
     return min(samples, math.ceil(3 * samples / views))
 
 
 def mixed_samples(samples: int, few: int) -> int:
-    """Paths of a pixel in which surfaces mix: few, but those after the first ``few`` are spread evenly."""
+    """Paths of a pixel with several surfaces: so many that those after the first ``few`` are spread evenly."""
     return max(samples // 6, min(samples, few + SPREAD))
 
 
 def gloss_samples(samples: int, part: float) -> int:
-    """Paths of a pixel of gloss where ``part`` of many do: so many that they are spread evenly."""
+    """Paths of a glossy pixel, for a share ``part`` of all: so many that they are spread evenly."""
     return max(round(part * samples), min(samples, SPREAD))
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How a view is sampled.
+    """Plan of a view's samples.
 
     Attributes
     ----------
     tiles : list of (Tiles, int)
-        In turn; and how many paths their pixels have taken before.
+        Tiles in order, with the number of earlier paths of their pixels.
     albedo : ndarray, shape (H, W, 3), float32
-        Linear; 0 where it is not known.
+        Linear albedo; 0 where unknown.
     whole : ndarray, shape (H, W), bool
-        Pixels of known albedo that show one matte surface, about flat there.
+        Pixels of known albedo that show one matte, nearly flat surface.
     """
 
     tiles: list[tuple[Tiles, int]]
@@ -74,27 +73,27 @@ def planned(
     seed: int,
     gloss: float = 1.0,
 ) -> Plan:
-    """Which pixels of a view take how many paths.
+    """The plan of a view's samples.
 
     Parameters
     ----------
     tracer : Tracer
     position : Position
-        Without a turn.
+        Position of the view, without a turn.
     seen : FirstSurface
-        From there.
+        Surfaces seen from there.
     disparity : ndarray, shape (H, W), float32
-        Of that, in pixels per view step.
+        Disparity of these, pixels per view step.
     samples : int
-        Paths of a pixel that needs all.
+        Largest number of paths of a pixel.
     views : int
-        That share light.
+        Number of views that share light.
     seed : int
-        Of the paths; with some of those that follow.
+        First seed of the paths; some that follow are used, too.
     gloss : float, optional
-        What part of ``samples`` pixels of gloss need, of many (:class:`sepi.rendered.world.World`).
+        Share of ``samples`` that glossy pixels need (:class:`sepi.rendered.world.World`).
     """
-    # what is narrower than a pixel may stand between rays through middles
+    # things narrower than a pixel may lie between the rays through middles
     beside = tracer.things(position, _FINE)
     matte = _of_pixels(tracer.surfaces.matte(beside))
     same = _of_pixels(beside == seen.thing[:, None, :, None])
@@ -118,7 +117,7 @@ def planned(
 
 
 def _of_pixels(rays: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
-    """Of how many rays of each pixel, ``(H, F, W, F)``, something is true."""
+    """Number of true values among each pixel's rays, ``(H, F, W, F)``; shape (H, W)."""
     fine, found = rays.shape[1], np.zeros(rays.shape[::2], np.uint8)
     for n in range(fine**2):
         found += rays[:, n // fine, :, n % fine]
@@ -126,7 +125,7 @@ def _of_pixels(rays: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
 
 
 def pictured(tracer: Tracer, plan: Plan) -> FloatArray:
-    """The picture of a view, ``(H, W, 3)`` float32: linear, 1 is white."""
+    """The picture of a view, linear, 1 is white; shape (H, W, 3), float32."""
     picture = np.zeros_like(plan.albedo)
     for tiles, taken in plan.tiles:
         rows, columns = tiles.pixels[..., 0], tiles.pixels[..., 1]
@@ -136,14 +135,14 @@ def pictured(tracer: Tracer, plan: Plan) -> FloatArray:
 
 
 def _tiles(asked: BoolMap, paths: int) -> list[npt.NDArray[np.int64]]:
-    """Squares that hold all pixels asked for, and take least time; of each side ``(N, side, side, 2)``.
+    """Squares that contain all pixels of a mask in the least time; an array ``(N, side, side, 2)`` for each side.
 
-    Four squares become one where its paths cost less than the cameras that it saves.
+    Four squares become one if its further paths take less time than the cameras that it saves.
     """
     height, width = asked.shape
     needed = np.pad(asked, ((0, -height % _WIDEST), (0, -width % _WIDEST)))
     cost, side = np.where(needed, paths + _CAMERA, 0), 1
-    # by side, where each square is one, or made of lesser ones
+    # for each side: whether a square is one tile, or made of smaller ones
     whole = [needed]
     while 2 * side <= min(_WIDEST, height, width):
         side *= 2
@@ -155,7 +154,7 @@ def _tiles(asked: BoolMap, paths: int) -> list[npt.NDArray[np.int64]]:
     taken = np.zeros_like(whole[-1])
     for squares in reversed(whole):
         corners = side * np.argwhere(squares & ~taken)
-        # the last ones reach over those before
+        # the last tiles overlap those before
         corners = np.minimum(corners, np.array([height, width]) - side)
         found.append(corners[:, None, None] + np.moveaxis(np.mgrid[:side, :side], 0, -1))
         taken = (taken | squares).repeat(2, axis=0).repeat(2, axis=1)
@@ -164,8 +163,8 @@ def _tiles(asked: BoolMap, paths: int) -> list[npt.NDArray[np.int64]]:
 
 
 def _flat(disparity: FloatMap, things: npt.NDArray[np.int64]) -> BoolMap:
-    """Pixels about which a surface bends little: in each direction across them, or beside them where it ends."""
-    # nothing goes on beyond the border
+    """Pixels with a nearly flat surface: in each direction across them, or on one side at the surface's end."""
+    # no surface continues beyond the border
     shown, depth = np.pad(things, 1, constant_values=-2), np.pad(disparity, 1)
     found = np.ones(shown.shape, bool)
     for step in ((0, 1), (1, 0), (1, 1), (1, -1)):

@@ -1,6 +1,6 @@
-"""Meshes by NumPy: sheets, boxes, balls, tubes, rods, turned and cut-out bodies, moved and put together.
+"""Meshes: sheets, boxes, balls, tubes, rods, bodies of revolution, plates, and their moves and copies.
 
-``uv`` are metres along the surface, as well as its bending allows, so that a pattern has its size wherever it is.
+``uv`` are approximate metres along the surface, so that a pattern has the same size everywhere.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from sepi.rendered.world import FloatArray, Mesh, Vector
 
 Points = npt.NDArray[np.float64]
 
-# angles round a body: the seam of its pattern is behind
+# angles round a body; the seam of its pattern lies behind
 _ROUND = (-np.pi / 2, 3 * np.pi / 2)
 
 
@@ -102,7 +102,7 @@ def tube(path: Points, radius: float | npt.NDArray[np.float64], sides: int = 12)
     path = np.asarray(path, float)
     along = np.gradient(path, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    # carried along so that it does not turn about the line
+    # parallel transport, so that the tube does not twist
     normal = np.cross(along[0], np.eye(3)[np.argmin(np.abs(along[0]))])
     normals = []
     for direction in along:
@@ -121,7 +121,7 @@ def rod(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 12
     first, last = np.asarray(start, float), np.asarray(end, float)
     length = np.linalg.norm(last - first)
     cap = np.array([0, 0.3, 1.0]) * min(radius, 0.4 * length)
-    # rays find short triangles sooner than long ones aslant
+    # rays find short triangles faster than long oblique ones
     between = np.linspace(cap[-1], length - cap[-1], 2 + int(length / (16 * radius)))
     along = np.concatenate([cap[:-1], between, length - cap[-2::-1]])
     widths = radius * np.concatenate([[0, 0.7], np.ones(len(between)), [0.7, 0]])
@@ -129,7 +129,7 @@ def rod(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 12
 
 
 def bevelled(outline: Points, by: float) -> Points:
-    """An outline ``(N, 2)``, each corner between whose ends is cut off: smooth bodies have sharp edges by it."""
+    """An outline ``(N, 2)`` with its corners cut off, so that smooth bodies have sharp edges."""
     outline = np.asarray(outline, float)
     points = [outline[0]]
     for before, corner, after in zip(outline[:-2], outline[1:-1], outline[2:], strict=True):
@@ -140,7 +140,7 @@ def bevelled(outline: Points, by: float) -> Points:
 
 
 def painted_from(mesh: Mesh, across: float, down: float) -> Mesh:
-    """The mesh with another part of its pattern: so many metres further."""
+    """The mesh with its pattern shifted by these metres."""
     return _mesh(mesh.vertices, mesh.faces, mesh.uv + np.array([across, down]), mesh.smooth)
 
 
@@ -163,7 +163,7 @@ def turned_body(profile: Points, centre: Vector, sides: int = 96) -> Mesh:
 
 
 def plate(outline: Points, thickness: float) -> Mesh:
-    """A flat body of an outline that is seen whole from its mean: leaves, discs, stars.
+    """A flat body of a star-shaped outline, such as a leaf or a disc.
 
     Parameters
     ----------
@@ -236,15 +236,15 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
 
 
 def copies(mesh: Mesh, axes: Points, places: Points, scales: npt.ArrayLike = 1.0) -> Mesh:
-    """Copies of a mesh as one, each with another part of its pattern.
+    """Copies of a mesh as one mesh, each with its pattern shifted.
 
     Parameters
     ----------
     mesh : Mesh
     axes : ndarray, shape (N, 3, 3), float64
-        Where each copy's ``x``, ``y`` and ``z`` point: ``axes[n, 0]`` is where its ``x`` does.
+        Axes of each copy: ``axes[n, 0]`` is the direction of its ``x``.
     places : ndarray, shape (N, 3), float64
-        Where the origin of each goes.
+        Origin of each copy.
     scales : float or ndarray, shape (N,)
     """
     count, scale = len(places), np.broadcast_to(scales, len(places))[:, None, None]
@@ -263,10 +263,10 @@ def about_vertical(turns: npt.ArrayLike) -> Points:
 
 
 def normals(mesh: Mesh) -> FloatArray:
-    """Normals of the vertices: means of those of the triangles round them, weighted by area, for a smooth mesh."""
+    """Normals of a smooth mesh's vertices: means over the adjacent triangles, weighted by area."""
     corners = mesh.vertices[mesh.faces].astype(np.float64)
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # vertices that lie in one place, such as along a seam, are one
+    # vertices at one place, such as along a seam, count as one
     _, same = np.unique(np.round(mesh.vertices, 6), axis=0, return_inverse=True)
     same = same.ravel()
     total = np.zeros((same.max() + 1, 3))

@@ -1,10 +1,10 @@
-"""Light on matte surfaces, gathered by all views together: a path tracer's noise without its paths.
+"""Light on matte surfaces averaged over all views, which reduces the path tracer's noise.
 
-A matte surface sends the same light to all views. What a pixel shows of it, divided by what is painted there, is the
-light that falls on it; where several views see the same point by the exact disparity, the mean of theirs takes the
-place of each: with 81 views a ninth of the noise, and one light for all of them. That again is the mean of all pixels
-about it which may have the same light for all that chance allows, as the views' spread tells. Pixels in which surfaces
-mix keep what paths brought, and so do gloss, mirrors and glass, which send each view something else.
+A matte surface sends the same light to all views. A pixel's colour divided by its albedo is the light that falls on it.
+The mean over the views that see the same point, by the exact disparity, replaces each view's light; 81 views have a
+ninth of the noise. This mean is averaged again over nearby pixels whose light is the same within the spread of the
+views. Pixels with several surfaces keep their own light, as do gloss, mirrors and glass, which look different from view
+to view.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from sepi.kernels import reprojection as kernels
 from sepi.lightfield import BoolMap
 from sepi.rendered.world import FloatArray
 
-# pixels per view step: how far the disparities of one point may be apart
+# largest difference between disparities of one point, pixels per view step
 _BEND = 0.02
-# half width in pixels of the window in which light is asked whether it is the same
+# half width in pixels of the window of nearby pixels
 _REACH = 3
-# times what chance makes of the same light, on average: what is farther apart is not
+# largest difference of the same light, as a multiple of that by noise
 _DOUBT = 2.0
-# half width in pixels of the window that says what bends and corners of a surface may show
+# half width in pixels of the window that limits the light at bends and corners of a surface
 _BESIDE = 2
 
 
@@ -35,22 +35,22 @@ def with_shared_light(
     whole: BoolMap,
     positions: npt.NDArray[np.float64],
 ) -> FloatArray:
-    """The pictures of all views with the light of matte surfaces from all of them.
+    """The pictures of all views with shared light on matte surfaces.
 
     Parameters
     ----------
     pictures : ndarray, shape (N, H, W, 3), float32
-        Linear, path-traced.
+        Path-traced pictures, linear.
     albedo : ndarray, shape (N, H, W, 3), float32
-        Of matte surfaces; 0 where it is not known.
+        Albedo of matte surfaces; 0 where unknown.
     disparities : ndarray, shape (N, H, W), float32
-        In pixels per view step.
+        Pixels per view step.
     things : ndarray, shape (N, H, W), int16
-        What each pixel shows.
+        Number of each pixel's thing.
     whole : ndarray, shape (N, H, W), bool
-        Whether that, and what is beside it, is one matte surface.
+        Pixels that show, with their neighbours, one matte surface.
     positions : ndarray, shape (N, 2), float64
-        Where the views stand, in view steps: down, across.
+        Positions of the views, ``(down, across)`` in view steps.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def with_shared_light(
 
 
 def limit_bent(things: npt.NDArray[np.int16], whole: BoolMap, shown: FloatArray) -> None:
-    """Keep pixels (H, W, 3) that are not whole, amid one thing, within the light of its whole ones beside them."""
+    """Limit pixels (H, W, 3) that are not whole, within one thing, to the range of nearby whole ones."""
     height, width = whole.shape
     bent = ~whole & (cv2.erode(things, np.ones((3, 3))) == cv2.dilate(things, np.ones((3, 3))))
     around = ((_BESIDE, _BESIDE), (_BESIDE, _BESIDE))
@@ -87,15 +87,15 @@ def limit_bent(things: npt.NDArray[np.int16], whole: BoolMap, shown: FloatArray)
 
 
 def alike_light(light: FloatArray, variance: FloatArray, surface: npt.NDArray[np.int16]) -> FloatArray:
-    """Mean light of the pixels about each whole one that chance alone may tell from it: 3x3 pixels from 3x3.
+    """Mean light over the pixels near each whole one whose 3x3 patches differ by noise only.
 
     Parameters
     ----------
     light : ndarray, shape (H, W, 3), float32
     variance : ndarray, shape (H, W), float32
-        Of the sum of its colours.
+        Variance of the sum of its colours.
     surface : ndarray, shape (H, W), int16
-        Which thing pixels show whole, -1 for none; these keep their light.
+        Thing of each whole pixel; pixels with -1 keep their light.
 
     Returns
     -------
@@ -103,14 +103,14 @@ def alike_light(light: FloatArray, variance: FloatArray, surface: npt.NDArray[np
     """
     height, width = surface.shape
     whole = surface >= 0
-    # of a patch its grey, the variance of that, and 1 where it counts: not beyond the picture
+    # sums over a patch: grey, its variance, and number of pixels in the picture
     patches = np.pad([light.sum(axis=2), variance, whole], ((0, 0), (_REACH + 1,) * 2, (_REACH + 1,) * 2))
     colours = np.pad([*np.moveaxis(light, 2, 0), np.ones_like(variance)], ((0, 0), (_REACH,) * 2, (_REACH,) * 2))
     things = np.pad(surface, _REACH, constant_values=-1)
     own, total = patches[:, _REACH:-_REACH, _REACH:-_REACH], np.zeros((4, height, width), np.float32)
     for y, x in np.ndindex(2 * _REACH + 1, 2 * _REACH + 1):
         other = patches[:, y : y + height + 2, x : x + width + 2]
-        # what is apart beyond what chance makes of it
+        # difference beyond that by noise
         apart = own[2] * other[2] * (np.square(own[0] - other[0]) - np.float32(_DOUBT) * (own[1] + other[1]))
         rows = apart[:-2] + apart[1:-1] + apart[2:]
         alike = rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:] <= 0

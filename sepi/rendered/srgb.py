@@ -1,4 +1,4 @@
-"""Values as on a screen, and linear ones."""
+"""Conversion between sRGB and linear values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sepi.rendered.world import FloatArray
 
 
 def srgb_encoded(values: FloatArray) -> FloatArray:
-    """Values as on a screen (sRGB) of linear ones, both 0..1."""
+    """Values in sRGB of linear ones, both 0..1."""
     found: FloatArray = np.where(
         values <= 0.0031308, 12.92 * values, 1.055 * np.maximum(values, 1e-9) ** (1 / 2.4) - 0.055
     )
@@ -19,6 +19,6 @@ def srgb_encoded(values: FloatArray) -> FloatArray:
 
 
 def srgb_decoded(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Linear values of those on a screen, both 0..1."""
+    """Linear values of sRGB ones, both 0..1."""
     found: npt.NDArray[Any] = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
     return found

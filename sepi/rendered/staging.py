@@ -1,4 +1,4 @@
-"""What scenes are set up with: books, crates, chairs, tables, houses; and a world seen from any place in it."""
+"""Furniture of scenes (books, crates, chairs, tables, houses), and a world seen from any place in it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from sepi.rendered.world import Lamp, Material, Mesh, Sun, Thing, Vector, World
 
 
 def seen_from(world: World, eye: Vector, below: float = 0.0, rightwards: float = 0.0) -> World:
-    """A world that was built elsewhere, as the reference camera sees it.
+    """A world in the axes of a reference camera anywhere in it.
 
     Parameters
     ----------
     world : World
         ``y`` points down; a panorama stays as it is.
     eye : (float, float, float)
-        Where the reference camera stands in it.
+        Position of the reference camera.
     below, rightwards : float
         Degrees by which it looks below the horizon, and to the right of ``z``.
     """
@@ -93,7 +93,7 @@ def crate(size: Vector, rows: int, turn: float, by: Vector) -> Mesh:
 
 
 def of_boards(parts: Sequence[Mesh]) -> Mesh:
-    """Boards as one, none of which shows the grain of another."""
+    """Boards as one mesh, each with different grain."""
     return joined([painted_from(part, 0.137 * n, 0.091 * n) for n, part in enumerate(parts)])
 
 
@@ -147,7 +147,7 @@ def house(wide: float, deep: float, tall: float, rise: float) -> tuple[Mesh, Mes
 
 
 def leaning(foot: npt.ArrayLike, over: npt.ArrayLike, beyond: float, radius: float) -> Mesh:
-    """A stick from its foot that lies upon a point and goes on for so many metres."""
+    """A stick from its foot over a point that supports it, and ``beyond`` metres further."""
     start, rest = np.asarray(foot, float), np.asarray(over, float)
     along = (rest - start) / np.linalg.norm(rest - start)
     lift = np.array([0.0, -radius, 0.0])

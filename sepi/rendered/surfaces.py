@@ -1,4 +1,4 @@
-"""All triangles of a world in one list: what is at a ray's end follows from which of them it meets, exactly."""
+"""All triangles of a world in one list, from which the surface at a ray's end follows exactly."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from sepi.lightfield import BoolMap
 from sepi.rendered.srgb import srgb_decoded
 from sepi.rendered.world import FloatArray, Material, Mesh, Pattern, Vector, World
 
-# rays of a pixel, across and down, that find what is painted there
+# rays per pixel, across and down, for its albedo
 _FINE = 8
-# pixels that are looked at together: what is known of them stays in the cache
+# number of pixels computed together, so that their data stays in the cache
 _AT_ONCE = 4096
 
 Faces = npt.NDArray[np.int32]
 
 
 class Planes(NamedTuple):
-    """Planes of triangles, and where on its pattern each is."""
+    """Planes of triangles, and their coordinates on patterns."""
 
     corner: npt.NDArray[np.float64]
-    """The first one, shape (M, 3)."""
+    """First corner, shape (M, 3)."""
     normal: npt.NDArray[np.float64]
-    """Shape (M, 3)."""
+    """Normal, shape (M, 3)."""
     uv: npt.NDArray[np.float64]
-    """Of the corner, in periods, shape (M, 2)."""
+    """uv of the corner, in periods, shape (M, 2)."""
     gradient: npt.NDArray[np.float64]
-    """Of uv, shape (M, 2, 3)."""
+    """Gradients of uv, shape (M, 2, 3)."""
 
 
 @dataclass(frozen=True)
 class FirstSurface:
-    """What the rays through the middles of a view's pixels meet first.
+    """First surfaces on the rays through the middles of a view's pixels.
 
     Attributes
     ----------
@@ -46,11 +46,11 @@ class FirstSurface:
     depth : ndarray, shape (H, W), float64
         Metres along the viewing direction; infinite where there is nothing.
     normal : ndarray, shape (H, W, 3), float32
-        Of the triangles, towards the camera: right, down, away.
+        Normals of the triangles, towards the camera: right, down, away.
     uv : ndarray, shape (H, W, 2), float32
-        Where on its pattern, in periods.
+        Coordinates on the pattern, in periods.
     thing : ndarray, shape (H, W), int64
-        Which of the world's things; -1 where there is none.
+        Number of the world's thing; -1 where there is none.
     """
 
     face: Faces
@@ -61,14 +61,14 @@ class FirstSurface:
 
 
 class Surfaces:
-    """The triangles of a world's things and lamps. The first one is nothing, which no ray meets.
+    """The triangles of a world's things and lamps; triangle 0 means that a ray meets nothing.
 
     Attributes
     ----------
     mesh : Mesh
-        All of them.
+        All triangles.
     thing : ndarray, shape (M,), int64
-        Whose they are; -1 for lamps and nothing.
+        Thing of each triangle; -1 for lamps and triangle 0.
     """
 
     def __init__(self, world: World) -> None:
@@ -91,7 +91,7 @@ class Surfaces:
         self._corners = self.mesh.vertices.astype(np.float64)[self.mesh.faces]
         first, second, third = np.moveaxis(self._corners, 1, 0)
         normal = np.cross(second - first, third - first)
-        # uv rises along the triangle by this much in each direction
+        # gradient of uv along the triangle
         at, along, beyond = (self.mesh.uv.astype(np.float64)[self.mesh.faces[:, n]] for n in range(3))
         square = np.maximum(np.sum(normal**2, axis=1), 1e-300)[:, None]
         rise = [np.cross(third - first, normal) / square, np.cross(normal, second - first) / square]
@@ -101,7 +101,7 @@ class Surfaces:
         self._matte = np.array([thing.material.kind == "matte" for thing in world.things] + [False])
 
     def matte(self, things: npt.NDArray[np.int64]) -> BoolMap:
-        """Whether things are matte; lamps, and what is of no thing, are not."""
+        """Whether things are matte; False for lamps and without a thing."""
         found: BoolMap = self._matte[things]
         return found
 
@@ -118,30 +118,29 @@ class Surfaces:
         Parameters
         ----------
         origin : ndarray, shape (3,), float64
-            Where the camera is.
+            Position of the camera.
         rotation : ndarray, shape (3, 3), float64
-            Carries its directions into the world.
+            From directions of the camera to those of the world.
         frame : ndarray, shape (3,), float64
-            Its focal length in pixels, and the row and column, in pixels from the upper left corner, that its axis
-            meets.
+            Focal length in pixels, and row and column of the camera's axis in pixels from the upper left corner.
         size : int
         near : float
-            Metres along the axis from which on something is met.
+            Least distance along the axis, metres.
         """
         found = np.zeros((size, size), np.int32)
         kernels.first_met(self._corners, origin, rotation, frame, near, found)
         return found
 
     def first(self, faces: Faces, directions: npt.NDArray[np.float64], origin: Vector) -> FirstSurface:
-        """What is seen where these triangles are met.
+        """The first surfaces on these triangles.
 
         Parameters
         ----------
         faces : ndarray, shape (H, W), int32
         directions : ndarray, shape (H, W, 3), float64
-            Of the rays; 1 along the camera's axis.
+            Directions of the rays; 1 along the camera's axis.
         origin : (float, float, float)
-            Where they begin.
+            Origin of the rays.
         """
         corner, normal, uv, gradient = (part[faces] for part in self._planes)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -160,7 +159,7 @@ class Surfaces:
         )
 
     def albedo(self, faces: Faces, pixels: npt.NDArray[np.int64], frame: npt.NDArray[np.float64]) -> FloatArray:
-        """Mean albedo of what pixels show, ``(N, 3)`` float32, linear, where each shows the plane of one triangle.
+        """Mean linear albedo of pixels, each of which shows the plane of one triangle; shape (N, 3), float32.
 
         Parameters
         ----------
@@ -169,7 +168,7 @@ class Surfaces:
         pixels : ndarray, shape (N, 2), int64
             Rows and columns.
         frame : ndarray, shape (5,), float64
-            Where the camera is (right, down), the row and column that its axis meets, its focal length in pixels.
+            Position of the camera (right, down), row and column of its axis, focal length in pixels.
         """
         found = np.empty((len(faces), 3), np.float32)
         for begin in range(0, len(faces), _AT_ONCE):
@@ -187,24 +186,24 @@ class Surfaces:
         for fine in np.ndindex(_FINE, _FINE):
             down, across = ((pixels + (np.array(fine) + 0.5) / _FINE - frame[2:4]) / frame[4]).T
             ray = np.stack([across, down, np.ones(len(faces))], axis=1)
-            # a plane seen from its edge ends nowhere
+            # for planes seen edge-on
             with np.errstate(divide="ignore", invalid="ignore"):
                 point = (volume / np.sum(normal * ray, axis=1))[:, None] * ray - corner
                 periods = uv + np.einsum("nij,nj->ni", gradient, point)
                 texel = ((periods - np.floor(periods))[:, ::-1] * sizes).astype(int)
-            # what is left of a whole period may round to one
+            # the remainder of a period may round to a whole one
             row, column = np.clip(texel, 0, sizes - 1).T
             total += texels[start + row * sizes[:, 1] + column]
         return np.asarray(total / _FINE**2, np.float32)
 
     def linear(self, pattern: Pattern) -> FloatArray:
-        """The raster of a pattern of the world's things, linear."""
+        """The linear raster of a pattern."""
         at, (height, width) = self._texels[0][id(pattern)], pattern.raster.shape[:2]
         return self._texels[1][at : at + height * width].reshape(height, width, 3)
 
     @cached_property
     def _texels(self) -> tuple[dict[int, int], FloatArray]:
-        """Where each pattern, told by identity, begins in a list of all texels; and these, linear."""
+        """Start of each pattern (by identity) in a list of all texels, and the linear texels."""
         rasters: dict[int, FloatArray] = {}
         for pattern in self._patterns:
             rasters.setdefault(id(pattern), _raster(pattern))
@@ -216,13 +215,13 @@ class Surfaces:
 
     @cached_property
     def _starts(self) -> npt.NDArray[np.int64]:
-        """Of each thing's pattern: where it begins in the list of texels, its height and width."""
+        """Start in the list of texels, height and width of each thing's pattern."""
         begins, _ = self._texels
         return np.array([(begins[id(pattern)], *_raster(pattern).shape[:2]) for pattern in self._patterns])
 
 
 def _raster(pattern: Pattern | Vector) -> FloatArray:
-    """A pattern's; one texel of a colour."""
+    """Raster of a pattern; one texel for a colour."""
     return pattern.raster if isinstance(pattern, Pattern) else np.array([[pattern]], np.float32)
 
 

@@ -1,7 +1,7 @@
-"""Pictures of a world by Mitsuba 3, one view at a time, and what their pixels show first.
+"""Pictures of a world by Mitsuba 3, one view at a time, and the first surfaces of their pixels.
 
-Variant ``scalar_rgb`` needs nothing beside the wheel. It seeds the sampler by view and block, blocks are of one size,
-and a box filter keeps each pixel to its own: the same bytes from run to run, for any number of threads.
+Mitsuba's variant ``scalar_rgb`` needs only the wheel. The sampler is seeded by view and block, blocks have one size,
+and a box filter keeps pixels separate, so results are the same in each run and for any number of threads.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from sepi.rendered.surfaces import FirstSurface, Surfaces, period
 from sepi.rendered.world import FloatArray, Lamp, Material, Mesh, Pattern, Vector, World
 from sepi.threads import threads_used
 
-# metres at which rays begin; far less would cost digits of their directions
+# metres at which rays begin; much less would lose digits of their directions
 _NEAR = 0.1
-# where a camera's square lies, as Mitsuba calls it
+# Mitsuba's names for the position of a camera's square
 _OFFSETS = ("principal_point_offset_x", "principal_point_offset_y")
-# side of the blocks that Mitsuba renders; left to it, they would be smaller for many threads, and seeded otherwise
+# side of Mitsuba's blocks; by default, it depends on the number of threads, and so would the seeds
 _BLOCK = 16
-# samples of a pixel from which on it pays to spread them evenly
+# least number of samples of a pixel for which an even spread pays
 SPREAD = 9
-# how often paths ask the sky for light, for once that they ask a sun: noise where surfaces mix falls by a sixth
+# samples of the sky for each of a sun; reduces noise in pixels with several surfaces by a sixth
 _SKY_BESIDE_SUN = 0.3
 # Vogel's spiral: points that fill a disc evenly
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
@@ -46,13 +46,13 @@ class Tiles(NamedTuple):
     Attributes
     ----------
     pixels : ndarray, shape (N, T, T, 2), int64
-        Their rows and columns.
+        Rows and columns of their pixels.
     paths : int
-        Of each pixel.
+        Number of paths of each pixel.
     seed : int
-        Of the paths; with some of those that follow.
+        First seed of the paths; some that follow are used, too.
     cameras : list
-        That see them.
+        Cameras of the tiles.
     """
 
     pixels: Pixels
@@ -63,16 +63,16 @@ class Tiles(NamedTuple):
 
 @dataclass(frozen=True)
 class Position:
-    """Where a view is taken, from the reference camera, and how it is turned.
+    """Pose of a view relative to the reference camera.
 
     Attributes
     ----------
     right, down : float
-        Metres.
+        Position, metres.
     shear_right, shear_down : float
-        By how much the picture is shifted to converge at the focus distance, as parts of its width.
+        Shift of the picture to converge at the focus distance, as a share of its width.
     turn : (float, float, float)
-        Radians about ``x``, ``y`` and ``z``.
+        Rotation about ``x``, ``y`` and ``z``, radians.
     """
 
     right: float
@@ -83,7 +83,7 @@ class Position:
 
     @property
     def rotation(self) -> npt.NDArray[np.float64]:
-        """Matrix, ``(3, 3)``, that carries directions of the camera into the world."""
+        """Rotation matrix from the camera to the world, shape (3, 3)."""
         matrix = np.eye(3)
         for axis, angle in enumerate(self.turn):
             i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -108,22 +108,22 @@ def _mitsuba() -> ModuleType:
 
     mitsuba.set_variant("scalar_rgb")
     drjit.set_thread_count(threads_used())
-    # it says what it makes of odd numbers of samples
+    # it reports how it rounds numbers of samples
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
     return mitsuba
 
 
 class Tracer:
-    """A world, ready to be looked at.
+    """Renderer of a world.
 
     Parameters
     ----------
     world : World
     rig : Rig
     lens : float
-        Radius of the lens in metres; 0 for a pinhole. It is in focus where the disparity is zero.
+        Radius of the lens in metres; 0 for a pinhole. Disparity zero is in focus.
     lens_points : int
-        Into so many pinholes, at most, a lens is divided.
+        Largest number of pinholes into which a lens is divided.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ class Tracer:
         self._exposure, self._bounces = world.exposure, {"max_depth": world.depth, "rr_depth": world.roulette}
         self.surfaces = Surfaces(world)
         parts: dict[str, Any] = {}
-        # things that share a material share its pictures
+        # things with the same material share its textures
         surfaces = {id(thing.material): thing.material for thing in world.things}
         loaded = {key: self._mi.load_dict(self._surface(material)) for key, material in surfaces.items()}
         for number, thing in enumerate(world.things):
@@ -159,7 +159,7 @@ class Tracer:
         return Position(right, down, right * shear, down * shear, turn)
 
     def picture(self, position: Position, seed: int, samples: int) -> FloatArray:
-        """Radiance times exposure, ``(H, W, 3)`` float32, linear: 1 is white; of so many paths a pixel."""
+        """Linear picture of a view from ``samples`` paths per pixel, 1 is white; shape (H, W, 3), float32."""
         count = min(samples, self._lens_points)
         total = np.zeros((self._rig.size, self._rig.size, 3), np.float64)
         for number, (right, down) in enumerate(_in_disc(self._lens, count)):
@@ -170,11 +170,11 @@ class Tracer:
         return (self._exposure / samples * total).astype(np.float32)
 
     def tiles(self, position: Position, pixels: Pixels, paths: int, seed: int) -> Tiles:
-        """Cameras for square tiles of what :meth:`picture` is, by their pixels ``(N, T, T, 2)``."""
+        """Cameras for square tiles of :meth:`picture`, given their pixels ``(N, T, T, 2)``."""
         return Tiles(pixels, paths, seed, [self._side_by_side(position, some, paths) for some in _some(pixels)])
 
     def seen(self, tiles: Tiles) -> FloatArray:
-        """Pictures of tiles, ``(N, T, T, 3)``: radiance times exposure."""
+        """Linear pictures of tiles, 1 is white; shape (N, T, T, 3)."""
         side = tiles.pixels.shape[1]
         integrator = self._paths(min(side, _BLOCK))
         found = [
@@ -184,19 +184,19 @@ class Tracer:
         return np.float32(self._exposure) * np.concatenate(found, axis=1).transpose(1, 0, 2, 3)
 
     def first_surface(self, position: Position) -> FirstSurface:
-        """What one ray through the middle of each pixel meets."""
+        """First surfaces on the rays through the middles of the pixels."""
         straight = self.directions(position)
         return self.surfaces.first(
             self._faces(position, 1), straight @ position.rotation.T, (position.right, position.down, 0.0)
         )
 
     def things(self, position: Position, fine: int) -> npt.NDArray[np.int64]:
-        """Which things F by F rays of each pixel meet first, ``(H, F, W, F)``; -1 for none."""
+        """First things on F by F rays of each pixel, -1 for none; shape (H, F, W, F)."""
         size = self._rig.size
         return self.surfaces.thing[self._faces(position, fine)].reshape(size, fine, size, fine)
 
     def _faces(self, position: Position, fine: int) -> npt.NDArray[np.int32]:
-        """Triangles of :attr:`surfaces` that F by F rays of each pixel meet, ``(H F, W F)``."""
+        """First triangles of :attr:`surfaces` on F by F rays of each pixel; shape (H F, W F)."""
         size, shears = fine * self._rig.size, (position.shear_down, position.shear_right)
         return self.surfaces.met(
             np.array([position.right, position.down, 0.0]),
@@ -207,15 +207,15 @@ class Tracer:
         )
 
     def albedo(self, position: Position, faces: npt.NDArray[np.int32], pixels: npt.NDArray[np.int64]) -> FloatArray:
-        """Mean albedo, ``(N, 3)``, of pixels each of which shows one triangle; without a turn."""
+        """Mean albedo of pixels, each of which shows one triangle, for a view without a turn; shape (N, 3)."""
         focal, size = self._rig.focal_px, self._rig.size
         axis = [(0.5 + shear) * size for shear in (position.shear_down, position.shear_right)]
         return self.surfaces.albedo(faces, pixels, np.array([position.right, position.down, *axis, focal]))
 
     def _side_by_side(self, position: Position, pixels: Pixels, paths: int) -> Any:
-        """One camera for each tile, in a picture of all."""
+        """Cameras of all tiles, side by side in one picture."""
         count, side = pixels.shape[:2]
-        # one set of properties for all, changed in turn: from a dictionary each, cameras take three times as long
+        # one set of properties, changed for each camera: a dictionary for each would take three times as long
         camera, create = self._mi.Properties("perspective"), self._mi.PluginManager.instance().create_object
         for name, value in {**self._camera(position, side), **self._film(side)}.items():
             camera[name] = self._mi.load_dict(value) if isinstance(value, dict) else value
@@ -245,7 +245,7 @@ class Tracer:
         return {"film": {"type": "hdrfilm", "pixel_format": "rgb", "component_format": "float32", **values}}
 
     def _camera(self, position: Position, side: int) -> dict[str, Any]:
-        """A camera that sees a square of the picture."""
+        """Camera of a square of the picture."""
         transform = self._mi.ScalarTransform4f
         turn = transform(np.vstack([np.c_[position.rotation, np.zeros(3)], [0, 0, 0, 1]]))
         stand = transform().translate([position.right, position.down, 0.0])
@@ -259,13 +259,13 @@ class Tracer:
     def _offsets(
         self, position: Position, top: npt.NDArray[np.int64], left: npt.NDArray[np.int64], side: int
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """Where squares lie, to the right and down; Mitsuba moves the window, not the picture."""
+        """Offsets of squares to the right and down; Mitsuba moves the window, not the picture."""
         shears = ((left, position.shear_right), (top, position.shear_down))
         right, down = ((first + side / 2 - (0.5 + shear) * self._rig.size) / side for first, shear in shears)
         return right, down
 
     def directions(self, position: Position) -> npt.NDArray[np.float64]:
-        """Of the rays through the middles of the pixels, ``(H, W, 3)``, in the camera's own frame; 1 along its axis."""
+        """Directions of the rays through the pixels' middles in the camera's axes, with z = 1; shape (H, W, 3)."""
         middles = np.arange(self._rig.size) + 0.5 - self._rig.size / 2
         right = (middles - position.shear_right * self._rig.size) / self._rig.focal_px
         down = (middles - position.shear_down * self._rig.size) / self._rig.focal_px
@@ -273,7 +273,7 @@ class Tracer:
         return np.stack([x, y, np.ones_like(x)], axis=-1)
 
     def _shape(self, mesh: Mesh, material: Material, parts: dict[str, Any]) -> Any:
-        """A mesh with its surface."""
+        """Mitsuba's shape of a mesh."""
         properties = self._mi.Properties()
         for name, part in parts.items():
             properties[name] = part
@@ -297,7 +297,7 @@ class Tracer:
         return shape
 
     def _lamp(self, lamp: Lamp) -> dict[str, Any]:
-        """Mitsuba's square from -1 to 1 in x and y, which shines towards z, laid on the lamp's corner and edges."""
+        """Mitsuba's rectangle (-1 to 1 in x and y, shining towards z), moved to the lamp's corner and edges."""
         corner, across, down = (np.array(values, float) for values in (lamp.corner, lamp.across, lamp.down))
         facing = np.cross(across, down)
         columns = [across / 2, down / 2, facing / np.linalg.norm(facing), corner + across / 2 + down / 2]
@@ -310,7 +310,7 @@ class Tracer:
         }
 
     def _surface(self, material: Material) -> dict[str, Any]:
-        """Mitsuba's name for a material."""
+        """Mitsuba's description of a material."""
         if material.kind == "glass":
             return {"type": "thindielectric" if material.pane else "dielectric", "int_ior": 1.5}
         rough = {"alpha": material.roughness} if material.roughness else {}
@@ -318,7 +318,7 @@ class Tracer:
             inner: dict[str, Any] = {"type": "roughconductor" if rough else "conductor", "material": material.metal}
         elif material.kind == "glossy":
             inner = {"type": "roughplastic" if rough else "plastic", "diffuse_reflectance": self._texture(material)}
-            # a coat darkens and saturates what is under it
+            # a coat darkens and saturates the colour below
             inner["nonlinear"] = False
         else:
             inner = {"type": "diffuse", "reflectance": self._texture(material)}
@@ -328,35 +328,35 @@ class Tracer:
         if not isinstance(material.pattern, Pattern):
             return {"type": "rgb", "value": srgb_decoded(np.array(material.pattern)).tolist()}
         raster = self._mi.Bitmap(self.surfaces.linear(material.pattern))
-        # paths spread over a pixel, which is no smaller than a texel: interpolation would cost a fifth of their time
+        # without interpolation, for a fifth of the time: pixels are at least texels, and paths spread over them
         return {"type": "bitmap", "bitmap": raster, "raw": True, "format": "fp16", "filter_type": "nearest"}
 
     def _sky(self, world: World) -> dict[str, Any]:
-        # of all light, each path asks one at a time; of a sun and a sky, the sun's has the most to say
+        # each path samples one light at a time, and a sun contributes more than the sky
         asked = {"sampling_weight": _SKY_BESIDE_SUN if world.suns else 1.0}
         if not isinstance(world.sky, np.ndarray):
             light = {"type": "rgb", "value": list(world.sky)}
             return {"sky": {"type": "constant", "radiance": light, **asked}} if any(world.sky) else {}
-        # Mitsuba's panoramas have y above
+        # Mitsuba's panoramas have y up
         upright = self._mi.ScalarTransform4f().rotate([0, 0, 1], 180.0)
         bitmap = self._mi.Bitmap(world.sky.astype(np.float32))
         return {"sky": {"type": "envmap", "bitmap": bitmap, "to_world": upright, **asked}}
 
 
 def _sampler(samples: int) -> dict[str, Any]:
-    """Few samples are independent: all pixels of a block spread theirs alike, which shows where there are few."""
+    """Sampler; few samples are independent, since an even spread repeats visibly from pixel to pixel."""
     spread = "stratified" if samples == 4 ** round(math.log(samples, 4)) else "multijitter"
     return {"sampler": {"type": spread if samples >= SPREAD else "independent", "sample_count": samples}}
 
 
 def _in_disc(radius: float, count: int) -> npt.NDArray[np.float64]:
-    """Points spread evenly over a disc, ``(N, 2)``; the middle alone of one without a radius."""
+    """Points spread evenly over a disc; only its middle without a radius; shape (N, 2)."""
     angle = np.arange(count) * _GOLDEN_ANGLE
     distance = radius * np.sqrt((np.arange(count) + 0.5) / count)
     return np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1)
 
 
 def _some(tiles: Pixels) -> list[Pixels]:
-    """So few at a time that single precision tells the rays of all of them apart."""
+    """Groups of tiles, small enough for single precision to distinguish their rays."""
     count = max(4096 // tiles.shape[1], 1)
     return [tiles[first : first + count] for first in range(0, len(tiles), count)]

@@ -1,7 +1,7 @@
-"""What a path-traced scene consists of: meshes with materials, light, and how far things are away.
+"""Contents of a path-traced scene: meshes with materials, light, and depths.
 
-Lengths are in metres. The reference camera stands in the origin and looks along ``z``; ``x`` points right, ``y`` down.
-Colours are as on a screen (sRGB, 0..1).
+Lengths are in metres. The reference camera stands at the origin and looks along ``z``; ``x`` points right, ``y`` down.
+Colours are sRGB, 0..1.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class Mesh:
     faces : ndarray, shape (M, 3), uint32
         Vertices of each triangle.
     uv : ndarray, shape (N, 2), float32
-        Where each vertex lies on its pattern, in metres along the surface: across, down.
+        Coordinates of each vertex on its pattern, in metres along the surface: across, down.
     smooth : bool
-        Whether light is reflected as by the curved surface that the triangles stand for.
+        Whether the mesh reflects light like a curved surface.
     """
 
     vertices: FloatArray
@@ -43,14 +43,14 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Pattern:
-    """What is painted on a surface; it repeats.
+    """Colours painted on a surface; the pattern repeats.
 
     Attributes
     ----------
     raster : ndarray, shape (H, W, 3), float32
         Colours.
     size : (float, float)
-        Metres that it is wide and high.
+        Width and height, metres.
     """
 
     raster: FloatArray
@@ -59,20 +59,20 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Material:
-    """How a surface reflects light.
+    """Material of a surface.
 
     Attributes
     ----------
     pattern : Pattern or (float, float, float)
-        Its colours, or its colour; of glass and metal none is asked for.
+        Colours, or one colour; glass and metal ignore it.
     kind : {"matte", "glossy", "mirror", "glass"}
         Glossy: a coat, such as lacquer, over a coloured ground. Mirror: bare metal.
     roughness : float
-        Of a glossy surface or a mirror: 0 reflects like a pane, 0.3 like satin.
+        For glossy surfaces and mirrors: 0 reflects like a pane, 0.3 like satin.
     metal : {"Ag", "Al", "Au", "Cr", "Cu"}
-        Of a mirror.
+        For mirrors.
     pane : bool
-        Of glass: whether the mesh is a thin pane, or the surface of a solid body.
+        For glass: whether the mesh is a thin pane, not the surface of a solid body.
     """
 
     pattern: Pattern | Vector = (0.8, 0.8, 0.8)
@@ -101,14 +101,14 @@ class Thing:
 
 @dataclass(frozen=True)
 class Lamp:
-    """A rectangle that shines to one side: that from which ``across``, then ``down``, turn clockwise.
+    """A rectangle that shines to the side from which ``across``, then ``down``, turn clockwise.
 
     Attributes
     ----------
     corner, across, down : (float, float, float)
         One corner, and the two edges that leave it, in metres.
     radiance : (float, float, float)
-        Linear; 1 is what a white sheet sends out that a sky of radiance 1 lights.
+        Linear; 1 is the radiance of a white sheet under a sky of radiance 1.
     """
 
     corner: Vector
@@ -124,9 +124,9 @@ class Sun:
     Attributes
     ----------
     direction : (float, float, float)
-        In which it travels.
+        Direction in which the light travels.
     irradiance : (float, float, float)
-        Linear, on a surface that faces it.
+        Linear irradiance of a surface that faces the sun.
     """
 
     direction: Vector
@@ -140,11 +140,11 @@ class World:
     Attributes
     ----------
     things : sequence of Thing
-        They must fill the pictures: where a ray meets nothing there is no disparity.
+        They must fill the pictures, since a ray that meets nothing has no disparity.
     near, far : float
-        Depths, in metres, that have the disparities ``at_near`` and ``at_far``.
+        Depths with the disparities ``at_near`` and ``at_far``, metres.
     at_near, at_far : float
-        Pixels per view step, whatever the pictures' size.
+        Pixels per view step, for any size of the pictures.
     sky : (float, float, float) or ndarray, shape (H, W, 3), float32
         Radiance of all around, linear: one for all directions, or a panorama (its middle column in direction ``z``,
         its first row above).
@@ -155,15 +155,14 @@ class World:
     field_of_view : float
         Degrees from the left to the right border.
     light : float
-        Light that the cameras get, as part of what they get in the other scenes: as much weaker it stands out of noise.
+        Light of the scene relative to other scenes; less light has more noise.
     depth : int
-        How often light is reflected or refracted, at most.
+        Largest number of reflections and refractions.
     roulette : int
-        From which of these on paths of light end by Russian roulette.
+        Number of these after which Russian roulette may end a path.
     paths : float
-        Those of a pixel of gloss, as part of the samples asked for, where these are many: where paths that end later
-        bring more, as many as have no more noise, by two renderings' mean distance, than all of those that may end at
-        the second.
+        Paths of a glossy pixel as a share of the samples, if these are many. Longer paths reduce noise, so fewer of
+        them give no more noise (mean difference of two renderings) than all paths with ``roulette`` 2.
     """
 
     things: Sequence[Thing]
