@@ -1,6 +1,6 @@
-"""Benchmarks: time, memory and growth of the pipeline, what bounds it, and other ways to compute the same.
+"""Benchmarks: time, memory and growth of the pipeline, its bounds, and other implementations.
 
-``python -m bench run`` measures, ``python -m bench compare BEFORE AFTER`` sets two results side by side. A
-case is measured in a process of its own, so that its peak memory is its own and nothing is warm from the case before;
-times are medians. Machines and moments differ: figures of one run compare with each other, those of two runs as ratios.
+``python -m bench run`` measures, ``python -m bench compare BEFORE AFTER`` compares two results. Each case runs in its
+own process, with its own peak memory and nothing cached by an earlier case; times are medians. Figures of one run are
+comparable; those of two runs only as ratios, since machines and loads differ.
 """

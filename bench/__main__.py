@@ -75,7 +75,7 @@ def run(scene: str, repeats: int, threads: int | None, groups: tuple[str, ...], 
             "views": f"{T}x{S}",
             "pixels": f"{light_field.views.dtype} x {light_field.views.shape[4]}",
         }
-        # those asked for in their own order; all unless any is
+        # the groups asked for, in the order of the table; default: all
         chosen = [name for name in GROUPS if name in (groups or GROUPS) and not (small and name == "large")]
         found, failed = _all_measured([case for name in chosen for case in GROUPS[name](files)], repeats, threads)
     result = Result(this_machine(), settings, tuple(found))
@@ -105,10 +105,9 @@ def compare(before: Path, after: Path) -> None:
 @main.command()
 @click.argument("light_fields", metavar="INPUT[@ORDER]...", nargs=-1, required=True)
 def disturb(light_fields: tuple[str, ...]) -> None:
-    """What is found in light fields and in disturbed copies: order of the views, range, spacing of rows.
+    """Print estimates for light fields and disturbed copies: order of the views, range, row spacing.
 
-    Each INPUT is a built-in scene or the path of a light field whose views are in the right order, or are so in the
-    order named after '@'.
+    Each INPUT is a built-in scene, or the path of a light field, with '@ORDER' if its views are not in the right order.
     """
     from bench.disturbed import disturbed_verdicts
 
@@ -136,9 +135,9 @@ def disturb(light_fields: tuple[str, ...]) -> None:
 @main.command()
 @click.argument("benchmarks", type=_PATH)
 def estimates(benchmarks: Path) -> None:
-    """Print what the workflow's jobs took, beside the time and the memory that they had asked a cluster for.
+    """Print time and memory of the workflow's jobs beside those requested from a cluster.
 
-    BENCHMARKS is the folder of that name of a run with --benchmark-extended.
+    BENCHMARKS is the folder of this name from a run with --benchmark-extended.
     """
     from bench.estimates import jobs_below, rows
 
@@ -154,12 +153,12 @@ def estimates(benchmarks: Path) -> None:
 @click.option("--threads", type=click.IntRange(min=1), multiple=True, default=(1, 2, 4, 8), show_default=True)
 @click.option("--variant", "variants", type=click.Choice(list(VARIANTS)), multiple=True, help="Only this; repeatable.")
 def digests(scene: str, size: int, views: int, threads: tuple[int, ...], variants: tuple[str, ...]) -> None:
-    """Print a digest of the maps of every variant, and fail where threads or the processor's kernels change it."""
+    """Print a digest of each variant's maps, and fail if threads or the processor's kernels change it."""
     from bench.digests import Condition
     from bench.digests import digests as digests_of
 
     conditions = [*map(Condition, threads), Condition(threads[-1], baseline=True)]
-    # a network is not among the things that the package brings
+    # the package includes no network
     chosen = variants or tuple(name for name in VARIANTS if name not in LEARNED)
     with tqdm(conditions, disable=None, leave=False, bar_format="{n}/{total} {desc} |{bar}|") as bar:
         found = [digests_of(condition, chosen, scene, size, views) for condition in bar]
@@ -196,7 +195,7 @@ def sweep(
     score: str,
     threads: int | None,
 ) -> None:
-    """Print scores of final maps for each VALUE of a parameter, and which value wins without each of the scenes.
+    """Print scores of final maps for each VALUE of a parameter, and the best value without each scene in turn.
 
     \b
     Example:
@@ -208,7 +207,7 @@ def sweep(
     use_threads(threads or available_cores())
     chosen = variant_named(variant)
     stage, settings = settings_of(chosen, parameter, values)
-    # all are read before the first is computed: one that is refused is told at once
+    # all scenes are read first, so that a refused one ends the command at once
     light_fields = {found.name: found for found in (scene_for_choosing(scene, noise) for scene in scenes)}
     if len(light_fields) < 2:
         raise click.UsageError("expected at least two scenes, by --scene")
@@ -237,8 +236,8 @@ def noise(
 ) -> None:
     """Print scores of variants on light fields with noise added: MSE x100 / Q25 x100 / BadPix 0.07 %.
 
-    What noise allows a pixel alone, and in a window of its surface, is Cramer's and Rao's bound: scores of errors that
-    are normal and no larger than they must be.
+    The scores that noise allows, for a pixel alone and for a window of its surface, follow from the Cramer-Rao bound:
+    they are those of normal errors of this standard deviation.
 
     \b
     Example:
@@ -262,7 +261,7 @@ def noise(
 @click.option("--variant", type=click.Choice(list(VARIANTS)), default="best", show_default=True)
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 def cameras(scenes: tuple[str, ...], size: int, views: int, seeds: int, variant: str, threads: int | None) -> None:
-    """Print scores of scenes seen by calibrated cameras, over those of perfect cameras in their place.
+    """Print scores of scenes with calibrated cameras, relative to perfect cameras in their place.
 
     \b
     Example:
@@ -302,10 +301,11 @@ def errors(
     kept: Path | None,
     threads: int | None,
 ) -> None:
-    """Fit the numbers of the error bars (sepi/error_bars/calibration.py) and print them, and what they are worth.
+    """Fit the constants of the error bars (sepi/error_bars/calibration.py), and print them with their scores.
 
-    Coverage of the interval of 90 %; for the first variant its median width, in pixels per view step of which the
-    farthest view is four away, and the area under the sparsification error curve by sigma and by smoothness.
+    Scores are the coverage of the interval of 90 %, and for the first variant its median width (pixels per view step,
+    with the farthest view four steps away) and the area under the sparsification error curve by sigma and by
+    smoothness.
 
     \b
     Example:
@@ -347,7 +347,7 @@ def errors(
 
 
 def _all_measured(cases: list[Case], repeats: int, threads: int) -> tuple[list[Measurement], int]:
-    """Measurements, and how many cases failed; each of those is warned of."""
+    """Measurements, and the number of failed cases; each gives a warning."""
     found = []
     with tqdm(cases, disable=None, leave=False, bar_format="{n}/{total} {desc} |{bar}|") as bar:
         for case in bar:

@@ -1,8 +1,7 @@
-"""How good and how quick the maps of all views are: ``python -m bench.all_views``.
+"""Accuracy and time of the maps of all views: ``python -m bench.all_views``.
 
-Beside them stand what they are to be as good as, and better than: every view estimated by itself, which takes as many
-estimates as there are views, and so is done for a few of them, which ours are scored on, too; and the reference view's
-map moved pixel by pixel, gaps taking the nearest value.
+The table compares them with separate estimates of a few views, which take one estimate each, and with the reference
+view's map moved pixel by pixel, with gaps filled by the nearest value.
 """
 
 from __future__ import annotations
@@ -27,14 +26,14 @@ from sepi.threads import use_threads
 from sepi.variants import VARIANTS
 
 BAD = 0.07
-"""Error from which a pixel is bad, pixels per view step."""
+"""Error above which a pixel is bad, pixels per view step."""
 
 # of 9x9 views: inside the grid and at its border, one of them a corner
 _BY_THEMSELVES = ((0, 0), (1, 6), (4, 2), (6, 3), (8, 5))
 
 
 class Scores(NamedTuple):
-    """MSE x100 and percentage of bad pixels of each view, and what they took: seconds; ``(views,)``."""
+    """MSE x100 and percentage of bad pixels of each view, shape (views,), and the time in seconds."""
 
     mse: npt.NDArray[np.float64]
     bad: npt.NDArray[np.float64]
@@ -48,7 +47,7 @@ def scores(disparity: FloatMap, truth: FloatMap, seconds: float) -> Scores:
 
 
 def moved_pixels(disparity: FloatMap, baseline: npt.NDArray[np.float64]) -> FloatMap:
-    """A map moved to another view pixel by pixel, the nearest winning; gaps take the value that is nearest to them."""
+    """A map moved to another view pixel by pixel; the nearest surface wins, gaps take the closest pixel's value."""
     from scipy import ndimage
 
     H, W = disparity.shape
@@ -61,7 +60,7 @@ def moved_pixels(disparity: FloatMap, baseline: npt.NDArray[np.float64]) -> Floa
 
 
 def disagreement(disparity: FloatMap, baselines: npt.NDArray[np.float64]) -> tuple[float, float]:
-    """How far views' maps differ from each other: each is carried to the next view of its row and compared there.
+    """Differences between the maps of neighbouring views, each warped to the next view of its row.
 
     Parameters
     ----------
@@ -122,9 +121,9 @@ def _columns(name: str, found: Scores) -> dict[str, str]:
 @click.option("--variant", type=click.Choice(list(VARIANTS)), default=DEFAULT_VARIANT, show_default=True)
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True)
 def main(names: tuple[str, ...], size: int, views: int, variant: str, threads: int) -> None:
-    """Print MSE x100 / BadPix 0.07 of all views of built-in scenes, in all ways, and times as estimates of one view."""
+    """Print MSE x100 / BadPix 0.07 of all views of built-in scenes, and times in units of one estimate."""
     use_threads(threads)
-    # what is compiled at first is none of the times
+    # first, so that no time includes loading
     measured(render("pyramids", size=64, views=3), variant)
     rows = []
     with tqdm(names or tuple(SCENES), disable=None, leave=False, bar_format="{n}/{total} {desc} |{bar}|") as bar:

@@ -1,13 +1,12 @@
-"""What noise allows: by how much the disparity of a pixel must scatter, whoever estimates it.
+"""Least standard deviation of a disparity that noise allows, by the Cramer-Rao bound.
 
-A view at ``b`` view steps from the reference view has at ``p - d b`` the colours ``c(p)`` and noise of its own. Of such
-samples neither the colours nor the disparity are known; what they tell of the latter is, in Fisher's sense,
+A view at ``b`` view steps from the reference view has the colours ``c(p)`` at ``p - d b``, with its own noise. Colours
+and disparity are both unknown. The Fisher information of such samples on the disparity is
 
 ``J = sum_channels sum_views (g_v - mean g)^2 / sigma^2``, with ``g_v = b_v . grad c``,
 
-over the views that see the pixel, and no unbiased estimate has a smaller variance than ``1 / J`` (Cramer and Rao [1]_).
-Pixels of one surface tell of each other: over a window whose disparity is one, ``J`` adds up. What is assumed beyond it
-(smooth surfaces, as all maps assume) may do better where it holds.
+over the views that see the pixel. No unbiased estimate has a smaller variance than ``1 / J`` [1]_. Over a window of one
+disparity, ``J`` adds up. Further assumptions, such as smooth surfaces, may give a smaller variance where they hold.
 
 References
 ----------
@@ -31,7 +30,7 @@ from sepi.stage import OcclusionMarginParameters
 Deviations = npt.NDArray[np.float64]
 
 _MOST = 1000.0
-"""Where the quartile of errors is looked for, pixels per view step."""
+"""Largest quartile of errors, pixels per view step."""
 
 
 def deviations_allowed(light_field: LightField, sigma: float, radius: int = 0) -> Deviations:
@@ -40,23 +39,23 @@ def deviations_allowed(light_field: LightField, sigma: float, radius: int = 0) -
     Parameters
     ----------
     light_field : LightField
-        With ground truth; its views are taken for free of noise, but for what their mean has.
+        With ground truth; its views count as free of noise.
     sigma : float
         Standard deviation of the noise of one channel of each view, colours in 0..1.
     radius : int
-        What is told by the pixels of a window of ``2 radius + 1`` counts, too, where the truth has them on one surface.
+        Information adds up over the pixels of a window of ``2 radius + 1`` on one surface of the truth.
 
     Returns
     -------
     ndarray, shape (H, W), float64
-        Pixels per view step; infinite where no view tells anything, NaN where there is no truth.
+        Pixels per view step; infinite without information, NaN without truth.
     """
     truth = np.asarray(light_field.ground_truth, np.float32)
     known = np.isfinite(truth)
     disparity = np.where(known, truth, np.float32(np.median(truth[known])))
     margin = OcclusionMarginParameters().occlusion_margin
     mean = AlignedViews(light_field, BaseDetailParameters(use_detail=False), margin).mean(disparity)
-    # grey is there three times, with the same noise
+    # grey has three channels with the same noise
     mean = np.ascontiguousarray(mean[..., : light_field.views.shape[-1]])
     down, across = (slope.astype(np.float64) for slope in spline_derivatives(mean))
     of_v, of_both, of_u = (each[..., None] for each in _spreads_of_baselines(light_field, disparity, margin))
@@ -68,12 +67,12 @@ def deviations_allowed(light_field: LightField, sigma: float, radius: int = 0) -
 
 
 def scores_allowed(deviations: Deviations) -> dict[str, float]:
-    """Scores that a map has on average whose errors are normal, and have these standard deviations.
+    """Expected scores of a map with normal errors of these standard deviations.
 
     Returns
     -------
     dict
-        ``q25`` and ``badpix007`` as :func:`sepi.scoring.scores.score` has them.
+        ``q25`` and ``badpix007`` as in :func:`sepi.scoring.scores.score`.
     """
     known = deviations[~np.isnan(deviations)]
 
@@ -87,7 +86,7 @@ def scores_allowed(deviations: Deviations) -> dict[str, float]:
 def _spreads_of_baselines(
     light_field: LightField, disparity: FloatMap, margin: float
 ) -> tuple[Deviations, Deviations, Deviations]:
-    """Of the views that see each pixel: sums of ``v^2``, ``2 v u`` and ``u^2``, from their means on."""
+    """Sums of ``v^2``, ``2 v u`` and ``u^2`` about their means, over the views that see each pixel."""
     H, W = disparity.shape
     y, x = np.mgrid[:H, :W]
     number, sums, products = np.zeros((H, W)), np.zeros((2, H, W)), np.zeros((3, H, W))
@@ -96,7 +95,7 @@ def _spreads_of_baselines(
         row, column = np.floor(y - disparity * v + 0.5).astype(int), np.floor(x - disparity * u + 0.5).astype(int)
         inside = (row >= 0) & (row < H) & (column >= 0) & (column < W)
         row, column = row.clip(0, H - 1), column.clip(0, W - 1)
-        # only what lies right before it hides a pixel: a bound must not leave out a view that may see it
+        # a bound must include every view that may see the pixel
         nearest = np.full((H, W), -np.inf, np.float32)
         np.maximum.at(nearest, (row[inside], column[inside]), disparity[inside])
         sees = inside & (nearest[row, column] <= disparity + margin)
@@ -108,7 +107,7 @@ def _spreads_of_baselines(
 
 
 def _over_windows(information: Deviations, disparity: FloatMap, radius: int, margin: float) -> Deviations:
-    """Sums over the pixels of each window that are on the surface of the one in its middle."""
+    """Sums over the pixels of each window that are on the surface of its middle pixel."""
     if not radius:
         return information
     padded, depths = np.pad(information, radius), np.pad(disparity, radius)

@@ -1,4 +1,4 @@
-"""How long stages take beside another program that keeps one core busy."""
+"""Time of stages beside another program that keeps one core busy."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _TURNS = 3
 
 
 def stages_beside_another_program(path: Path, variant: str) -> Prepared:
-    """All stages, with and without the other program in turn; says how many times as long each takes."""
+    """All stages, with and without the other program in turn, with the ratio of their times."""
     light_field, chosen = read_light_field(path), variant_named(variant)
-    # kernels are loaded before
+    # loads the kernels first
     _seconds(light_field, chosen)
 
     def call() -> Figures:

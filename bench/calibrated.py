@@ -1,4 +1,4 @@
-"""What calibrated cameras cost: scores on a scene seen by an array that is bent, and by a perfect one in its place."""
+"""Scores of scenes seen by a disturbed array of calibrated cameras, relative to a perfect array in its place."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ DISTURBANCES: dict[str, dict[str, float]] = {
     "out of the plane": {"ahead": 0.05},
     "all": {"turn": 3.0, "zoom": 0.05, "bend": 0.08, "aside": 0.3, "ahead": 0.05},
 }
-"""Greatest turns in degrees, change of focal length, radial distortion, steps off the grid and out of its plane."""
+"""Largest turns in degrees, change of focal length, radial distortion, steps off the grid and out of its plane."""
 
-# the middle of a picture moves by this from view to view: where its cameras converge
+# movement of the picture's middle from view to view, by converging cameras
 _OFFSET = 4.0
 
 
 def camera_of(size: int) -> Camera:
-    """The camera of the scene: a step is 0.05 of the distance at which nothing moves."""
+    """The camera of the scene; a view step is 0.05 of the focus distance."""
     return Camera(scale=_OFFSET, offset=_OFFSET, focal_px=1.25 * size)
 
 
 def shots_of(size: int, count: int, seed: int, disturbance: dict[str, float]) -> list[Shot]:
-    """Cameras about a grid of ``count`` x ``count``, the middle one undisturbed in its place."""
+    """Cameras near a grid of ``count`` x ``count``; the middle one is undisturbed."""
     camera, rng, shots = camera_of(size), np.random.default_rng(seed), []
     amounts = {"turn": 0.0, "zoom": 0.0, "bend": 0.0, "aside": 0.0, "ahead": 0.0, **disturbance}
     step = camera.scale / camera.focal_px
@@ -57,7 +57,7 @@ def shots_of(size: int, count: int, seed: int, disturbance: dict[str, float]) ->
 
 
 def seen_by(name: str, shots: Sequence[Shot], size: int) -> LightField:
-    """The light field that calibrated cameras before a built-in scene make."""
+    """The light field of a built-in scene from calibrated cameras."""
     with tempfile.TemporaryDirectory() as folder:
         entries = []
         for shot in shots:
@@ -71,7 +71,7 @@ def seen_by(name: str, shots: Sequence[Shot], size: int) -> LightField:
 
 
 def perfect_in_place_of(light_field: LightField, name: str, size: int, count: int) -> LightField:
-    """The scene seen by ``count`` x ``count`` perfect cameras with the rectified views' pinhole."""
+    """The scene seen by ``count`` x ``count`` perfect cameras like those of the rectified views."""
     camera, rig = light_field.camera, light_field.reference_rig
     assert camera is not None
     assert rig is not None
@@ -85,7 +85,7 @@ def perfect_in_place_of(light_field: LightField, name: str, size: int, count: in
 
 
 def rectified_shot(light_field: LightField, baseline: tuple[float, ...] = (0, 0)) -> Shot:
-    """The camera of the rectified reference view, or one so many view steps down and across from it."""
+    """The camera of a rectified view at this baseline from the reference view."""
     camera, rig, (height, width) = light_field.camera, light_field.reference_rig, light_field.shape
     assert camera is not None
     assert rig is not None

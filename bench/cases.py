@@ -1,4 +1,4 @@
-"""The table of cases: for each group, what is measured on which files, with what known beforehand."""
+"""The cases of each group."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from sepi.variants import HANDED_ON, STAGES, stage_parameters, variant_named
 GROWTH = {"size": (128, 256, 512, 1024), "views": (3, 5, 7, 9, 13, 17), "num_disparities": (46, 91, 181, 362)}
 SMALL_GROWTH = {"size": (64, 128), "views": (3,), "num_disparities": (11, 21)}
 GROWTH_REPEATS = 3
-"""Long enough to see how time grows, short enough to wait for."""
+"""Number of timed calls of the cases of growth."""
 
 LARGE = (1024, 17)
 """Size and views a side of the large light field."""
@@ -48,7 +48,7 @@ COMPRESSIONS: dict[str, dict[str, Any]] = {
 
 
 def _stage_cases(scene: Scene) -> Iterator[Case]:
-    """The command as a whole, a job on next to nothing, the arithmetic floor, and each step from files to maps."""
+    """The whole command, a job on a tiny scene, the arithmetic floor, and each step from files to maps."""
     sweeps = [
         f"--set={name}.num_disparities={scene.num_disparities}" for name in ("initial.sepi", "occlusion.half_sepi")
     ]
@@ -70,7 +70,7 @@ def _stage_cases(scene: Scene) -> Iterator[Case]:
         yield Case("floor", name, floor.prepare, (name, scene.threads))
     yield Case("stages", "read the views", read, (scene.source,))
     yield Case("stages", "check their order", inspect, (scene.path, check_order))
-    # where the scene does not give it
+    # for scenes without a range
     if read_light_field(scene.path).require_disparity_range().source == "estimated":
         yield Case("stages", "estimate the range", inspect, (scene.path, estimate_range))
     for name, choice in variant_named(VARIANT).choices.items():
@@ -79,7 +79,7 @@ def _stage_cases(scene: Scene) -> Iterator[Case]:
 
 
 def _variant_cases(scene: Scene) -> Iterator[Case]:
-    """Variants side by side: from files to maps, in one process, on one thread; and each stage of them."""
+    """Variants: from files to maps, in one process, on one thread, and by stage."""
     output = str(scene.folder / "variant")
     for variant in VARIANTS_BESIDE:
         words = ("depth", str(scene.source), "--output", output, "--threads", str(scene.threads), "--variant", variant)
@@ -102,7 +102,7 @@ def _busy_cases(scene: Scene) -> Iterator[Case]:
 
 
 def _growth_cases(scene: Scene) -> Iterator[Case]:
-    """Initial stage and all stages, one axis growing at a time."""
+    """Initial stage and all stages, with one axis growing at a time."""
     axes = SMALL_GROWTH if scene.small else GROWTH
     powers = {2**n for n in range(scene.threads.bit_length())} | {scene.threads}
     start = {
@@ -112,7 +112,7 @@ def _growth_cases(scene: Scene) -> Iterator[Case]:
         "threads": scene.threads,
     }
     points = [(axis, start | {axis: value}) for axis, values in axes.items() for value in values]
-    # threads are for large pictures
+    # threads help with large pictures
     size = min(512, max(axes["size"]))
     points += [("threads", start | {"size": size, "threads": value}) for value in sorted(powers)]
     scene.write_grown([(at["size"], at["views"]) for _, at in points])
@@ -129,14 +129,14 @@ def _growth_cases(scene: Scene) -> Iterator[Case]:
 
 def _large_case(scene: Scene) -> Iterator[Case]:
     scene.write_grown([LARGE, (64, 3)])
-    # kernels for such views are compiled before the timed call
+    # an untimed call loads the kernels for such views
     whole(scene.grown(64, 3), scene.num_disparities).call()
     size, views = LARGE
     path, name = scene.grown(size, views), f"{views}x{views} views of {size}x{size}"
     yield Case("large", f"{VARIANT}: {name}", whole, (path, scene.num_disparities), most=1)
     whole_variant(scene.grown(64, 3), "best").call()
     yield Case("large", f"best: {name}", whole_variant, (path, "best"), most=1)
-    # in a folder of its own: all jobs are to be done
+    # in a new folder, so that all jobs run
     folder = scene.folder / "workflow"
     folder.mkdir()
     words = ("--snakefile", str(SNAKEFILE), "--directory", str(folder), "--cores", str(scene.threads), "--quiet", "all")
@@ -144,7 +144,7 @@ def _large_case(scene: Scene) -> Iterator[Case]:
 
 
 def _plain_cases(scene: Scene) -> Iterator[Case]:
-    """The initial stage, then the plain ones: long enough to measure once, and nothing in them is compiled then."""
+    """The initial stage, then the plain ones, which take long enough to be measured once."""
     known = {"num_disparities": float(scene.num_disparities)}
     yield Case("beside", "sepi", stage, (scene.path, "initial", "sepi", scene.parameters["initial"]), known)
     number = 3 if scene.small else 20
@@ -177,22 +177,22 @@ GROUPS: dict[str, Callable[[Scene], Iterator[Case]]] = {
     "storage": _storage_cases,
     "large": _large_case,
 }
-"""Name of each group to the function that gives its cases, their files written."""
+"""Group to the function that writes its files and yields its cases."""
 
 
 def read(source: Path) -> Prepared:
-    """Read the light field as the user has it, without the check of its order."""
+    """Read the light field from its source, without the check of its order."""
     return Prepared(lambda: read_any(source, check_order=False))
 
 
 def inspect(path: Path, question: Callable[[LightField], Any]) -> Prepared:
-    """Ask something of a light field: whether its views are in the right order, which disparities it has."""
+    """Check or estimate something of a light field: the order of its views, its disparity range."""
     light_field = read_light_field(path)
     return Prepared(lambda: question(light_field))
 
 
 def stage(path: Path, name: str, choice: str, settings: Parameters) -> Prepared:
-    """Run one stage on the maps of the one before; says its scores, and what its sweep computes."""
+    """Run one stage on the maps of the one before; figures are scores and operations of its sweep."""
     light_field, before = inputs(path, name)
 
     def figures(maps: StageMaps) -> Figures:
@@ -209,13 +209,13 @@ def whole(path: Path, num_disparities: int) -> Prepared:
 
 
 def whole_variant(path: Path, variant: str) -> Prepared:
-    """All stages of a variant, from a light field in memory to its maps; says their scores."""
+    """All stages of a variant, from a light field in memory to its maps; figures are scores."""
     light_field = read_light_field(path)
     return Prepared(lambda: estimate_depth(light_field, variant), lambda maps: _scores(light_field, maps))
 
 
 def stage_of_variant(path: Path, variant: str, name: str) -> Prepared:
-    """One stage of a variant, on the maps that the stages before it make first."""
+    """One stage of a variant, on the maps of the stages before it."""
     light_field = read_light_field(path)
     chosen = variant_named(variant)
     settings = stage_parameters(chosen)
@@ -243,7 +243,7 @@ def write(path: Path) -> Prepared:
 
 
 def store(path: Path, content: str, option: str) -> Prepared:
-    """Write all views, or the maps of 32 bits or the masks of 8 of the last stage; says the file's size."""
+    """Write all views, or the last stage's maps of 32 bits or masks of 8; the figure is the file's size."""
     if content == "views":
         arrays: dict[str, Any] = {"views": read_light_field(path).views}
     else:
@@ -260,7 +260,7 @@ def store(path: Path, content: str, option: str) -> Prepared:
 
 
 def load(path: Path, content: str, option: str) -> Prepared:
-    """Read the file that :func:`store` left."""
+    """Read the file that :func:`store` wrote."""
 
     def call() -> None:
         with h5py.File(path.with_name(f"{content} {option}.h5")) as file:
@@ -271,7 +271,7 @@ def load(path: Path, content: str, option: str) -> Prepared:
 
 
 def _scores(light_field: LightField, maps: StageMaps) -> Figures:
-    """What is made faster must not be made worse; nothing without ground truth."""
+    """Scores of the maps; empty without ground truth."""
     if light_field.ground_truth is None:
         return {}
     scores = score(maps.disparity, light_field.ground_truth)
@@ -279,7 +279,7 @@ def _scores(light_field: LightField, maps: StageMaps) -> Figures:
 
 
 def _operations(light_field: LightField, choice: str, settings: Any, maps: StageMaps) -> Figures:
-    """Samples that a stage's sweep compares, and multiply-adds of its windows; nothing for other stages."""
+    """Number of samples of a stage's sweep, and of multiply-adds of its windows; empty for other stages."""
     H, W = light_field.shape
     if choice == "sepi":
         pixels, groups = H * W, 1

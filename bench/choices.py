@@ -1,7 +1,7 @@
-"""What the open choices of the method are worth: the final score with one of them changed at a time.
+"""Final scores with one of the method's open choices changed at a time.
 
-The paper leaves steps open; docs/method/paper.md names what was chosen instead. This prints the table that
-decided it, for any scenes with ground truth, given as folders, files or names of built-in scenes:
+The paper leaves steps open; docs/method/paper.md names the choices made. This command prints the table behind them, for
+scenes with ground truth, given as folders, files or names of built-in scenes:
 ``python -m bench.choices SCENE...``
 """
 

@@ -1,8 +1,8 @@
-"""The arithmetic floor: what the multiply-adds of the plane sweep cost where nothing else does.
+"""The arithmetic floor: the time of the plane sweep's multiply-adds alone.
 
-The kernels of :mod:`sepi.kernels.floor` do the operations of the sweep (a sample: the polynomial of its squared
-difference, and the robust residual; a row of the window) on a few hundred numbers that stay in the first cache, at
-fixed places. A sweep cannot be faster than its operations at this price.
+The kernels of :mod:`sepi.kernels.floor` do the operations of the sweep (for a sample, the polynomial of its squared
+difference and the robust residual; a row of the window) on a few hundred numbers in the first cache. A sweep cannot be
+faster than this.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ KERNELS: dict[str, tuple[Any, int]] = {
     "sample": (kernels.samples, 1),
     "multiply-add of the window": (kernels.windows, 7),
 }
-"""Name to kernel, and how many operations it does on a number; their price is seconds over operations."""
+"""Name to kernel, and its number of operations on a number; their price is seconds over operations."""
 
 WINDOW_OPERATIONS = "window_operations"
 """Figure of a sweep: multiply-adds of its windows, beside its ``samples``."""
 
 
 def prepare(name: str, threads: int) -> Prepared:
-    """One of the kernels, all ``threads`` at work; says how many operations it did."""
+    """One of the kernels on all ``threads``; the figure is its number of operations."""
     kernel, per_number = KERNELS[name]
     data = np.random.default_rng(0).random((threads, 7, NUMBERS), np.float32)
     out = np.zeros((threads, NUMBERS), np.float32)
@@ -38,7 +38,7 @@ def prepare(name: str, threads: int) -> Prepared:
 
 
 def seconds(prices: Mapping[str, Measurement], figures: Figures) -> float | None:
-    """Seconds that a sweep's operations alone take; None for what is no sweep or of grey views.
+    """Seconds of a sweep's operations alone; None for other stages and grey views.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Measuring: a case in a process of its own, its median time and its peak memory; and the result of all as a file."""
+"""Measurement of a case in its own process: median time and peak memory; and the file of all results."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class Prepared(NamedTuple):
     Attributes
     ----------
     call : callable
-        What is timed.
+        The timed function.
     figures : callable
-        Takes what the last call returned; what is to be said of it (scores, residual, size). Not timed.
+        Function from the last call's result to figures (scores, residual, size); not timed.
     """
 
     call: Callable[[], Any]
@@ -43,21 +43,21 @@ class Prepared(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """Something to measure.
+    """A case to measure.
 
     Attributes
     ----------
     group, name : str
-        Where its figures stand; together unique.
+        Names of its figures; together unique.
     prepare : callable
         A function of a module, called with ``arguments`` in the process of the case; returns a :class:`Prepared`.
     arguments : tuple
     figures : mapping of str to number
-        What is known beforehand, such as the number of candidates.
+        Figures known beforehand, such as the number of candidates.
     threads : int or None
-        None for those of the whole run.
+        None: those of the run.
     most : int
-        At most so many timed calls. A case of 1 is too long to be repeated: timed at its first call,
+        Most timed calls. With 1, the first call is timed, for cases too long to be repeated.
     """
 
     group: str
@@ -71,17 +71,17 @@ class Case:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What was measured of a case.
+    """Measurements of a case.
 
     Attributes
     ----------
     group, name : str
     seconds : tuple of float
-        Of each repetition.
+        Seconds of each repetition.
     peak_memory_mb : float
-        Of the whole process: interpreter, libraries and inputs included.
+        Peak memory of the whole process, with interpreter, libraries and inputs.
     figures : mapping of str to number
-        What was known beforehand, and what the case itself found (scores, residual, size).
+        Figures known beforehand, and those of the case (scores, residual, size).
     """
 
     group: str
@@ -98,7 +98,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Result:
-    """What one run measured: the content of ``bench.json``.
+    """Result of a run, the content of ``bench.json``.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Result:
         Scene, size, views, num_disparities, threads, repeats.
     measurements : tuple of Measurement
     format : int
-        Of the file.
+        Version of the file's format.
     """
 
     machine: dict[str, Any]
@@ -129,12 +129,12 @@ _RESULT = TypeAdapter(Result)
 
 
 def read_result(path: Path) -> Result:
-    """Read a result.
+    """The result in a file.
 
     Raises
     ------
     SepiError
-        If the file is no result of a benchmark.
+        If the file is not a benchmark's result.
     """
     try:
         return _RESULT.validate_json(path.read_bytes())
@@ -144,14 +144,14 @@ def read_result(path: Path) -> Result:
 
 
 def measured(case: Case, repeats: int, threads: int = 1) -> Measurement:
-    """Measure a case in a fresh process: one call to load what is loaded once, then ``repeats`` timed ones.
+    """Measurements of a case in a new process: an untimed call to load modules, then ``repeats`` timed ones.
 
     Raises
     ------
     SepiError
         If the case fails; the message is that of its error.
     """
-    # forked from a process that has imported what all cases need and done nothing: none inherits another's memory
+    # forked from a process that has only imported modules, so that no case inherits another's memory
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["bench.cases", "sepi.kernels", "sepi.image.mean_shift", "skimage.segmentation"])
     try:
@@ -169,8 +169,8 @@ def measured(case: Case, repeats: int, threads: int = 1) -> Measurement:
 
 
 def _measure(case: Case, repeats: int, threads: int) -> Measurement:
-    """In the new process: prepare and call."""
-    # as the command does
+    """Prepare and call a case, in the new process."""
+    # as in the command
     use_memory_again()
     use_threads(case.threads or threads)
     prepared = case.prepare(*case.arguments)
@@ -186,7 +186,7 @@ def _measure(case: Case, repeats: int, threads: int) -> Measurement:
     return Measurement(case.group, case.name, tuple(seconds), figures.pop(PEAK_MEMORY, memory), figures)
 
 
-# the module named first, as `python -m` runs it; the last thing it says is its peak memory
+# runs the named module like `python -m`, and prints its peak memory at the end
 _MODULE = """
 import atexit, runpy, sys
 from sepi.command import peak_memory_mb
@@ -197,8 +197,8 @@ runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
 
 
 def command(*arguments: str) -> Prepared:
-    """A module of Python and its arguments, run as a user would: a whole process from start to end."""
-    # an interrupted benchmark ends this process, and an exception ends what it waits for
+    """A Python module with arguments, run as a whole process."""
+    # an exception on interruption also ends the process that it waits for
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
 
     def call() -> str:

@@ -1,4 +1,4 @@
-"""What noise costs: scores of variants on copies of light fields to which noise was added."""
+"""Scores of variants on copies of light fields with added noise."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from sepi.scoring.scores import score
 Row = dict[str, str]
 
 ALLOWED = {"allowed, alone": 0, "allowed, 5x5": 2}
-"""What noise allows whoever is asked, by how many pixels around tell: radius of the window."""
+"""Column of scores that noise allows, to the radius of the window of pixels."""
 
 DIGITS = {"mse100": 2, "q25": 2, "badpix007": 1}
-"""Scores, and their decimals."""
+"""Score to its number of decimals."""
 
 
 NO_NOISE = 1e-9
-"""So that what no view tells stays unknown."""
+"""Noise so small that unknown pixels stay unknown."""
 
 
 def with_noise(light_field: LightField, sigma: float) -> LightField:
-    """A copy with white noise of so many of 255 levels, rounded and cut off as a camera does.
+    """A copy with white noise of this standard deviation (of 255), rounded and clipped like a camera's.
 
     Equal arguments give equal bytes.
     """
@@ -46,7 +46,7 @@ def rows(
     scores: Sequence[str],
     allowed: bool,
 ) -> Iterator[Row]:
-    """A row for each light field and level of noise: each variant's scores, and what the measured noise allows."""
+    """A row for each light field and level of noise: scores of each variant, and those that the noise allows."""
     for light_field in light_fields:
         assert light_field.ground_truth is not None
         of_unit_noise = {

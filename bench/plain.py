@@ -1,7 +1,7 @@
-"""The initial stage written plainly, with NumPy and SciPy or OpenCV: what a reader of the paper would write first.
+"""Plain implementations of the initial stage with NumPy, SciPy and OpenCV, to compare speed with.
 
-Whole pictures at a time, float32, no loop over pixels; the three differ in who interpolates. They give the costs that
-:func:`sepi.matching.plane_sweep.sweep` gives, and are the yardstick of its speed.
+They work on whole pictures in float32, without loops over pixels, and differ in the interpolation. Their costs are
+those of :func:`sepi.matching.plane_sweep.sweep`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.plane_sweep import SweepParameters, sweep
 
 Warp = Callable[[FloatMap, float, float], FloatMap]
-"""Takes a view ``(H, W, C)`` and how far down and across to look; gives that picture, anything outside the view."""
+"""Function of a view ``(H, W, C)`` and an offset down and across to the moved view; any values outside."""
 
 
 def by_numpy(view: FloatMap, down: float, across: float) -> FloatMap:
@@ -128,7 +128,7 @@ def _windows(values: FloatMap, radius: int, outside: float) -> FloatMap:
 
 
 def prepare(path: Path, num_disparities: int, warp: Warp) -> Prepared:
-    """The plain sweep of a scene; says how far its lowest costs are from those of the compiled one."""
+    """The plain sweep of a scene; the figure is the difference of its lowest costs from the compiled sweep's."""
     light_field = read_light_field(path)
     parameters = SweepParameters(num_disparities=num_disparities)
 

@@ -14,7 +14,7 @@ from sepi.io.files import atomic_path
 
 
 def write(result: Result, path: Path) -> None:
-    """Draw where the time goes, how it grows, and the plain implementations beside ours; as PNG."""
+    """Write a PNG of times, their growth, and the plain implementations beside ours."""
     figure = Figure(figsize=(13, 7), layout="constrained")
     FigureCanvasAgg(figure)
     first, *others, last = figure.subplots(2, 3).ravel()
@@ -27,7 +27,7 @@ def write(result: Result, path: Path) -> None:
     for panel, axis in zip(others, AXES, strict=True):
         _growth(panel, result, axis)
     with atomic_path(path) as temporary:
-        # no version of the library, so that equal results give equal files
+        # without the library's version, so that equal results give equal files
         figure.savefig(temporary, dpi=100, format="png", metadata={"Software": None})
 
 

@@ -1,4 +1,4 @@
-"""What the cases measure on: a scene as files, and light fields of other sizes made of one."""
+"""Inputs of the cases: a scene as files, and light fields of other sizes made from it."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ class Scene:
     Attributes
     ----------
     name : str
-        Of a built-in scene, or the path of a light field.
+        Name of a built-in scene, or the path of a light field.
     folder : Path
         Holds the light field ``scene.h5``, its range settled, and the maps after each stage, such as ``initial.h5``.
     num_disparities : int
         Candidates of the stages that sweep.
     threads : int
-        Of the run.
+        Threads of the run.
     small : bool
-        Whether to measure on next to nothing.
+        Whether to measure on a tiny scene.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Scene:
 
     @property
     def source(self) -> Path:
-        """The light field as a user has it: a folder of PNG files, or the path given."""
+        """The light field's source: a folder of PNG files, or the path given."""
         return self.folder / self.name if self.name in SCENES else Path(self.name).absolute()
 
     @property
@@ -61,7 +61,7 @@ class Scene:
 
     @cached_property
     def parameters(self) -> dict[str, Parameters]:
-        """What each stage runs with."""
+        """Parameters of each stage."""
         return stage_parameters(variant_named(VARIANT), sweep_values(self.num_disparities))
 
     def write_files(self) -> LightField:
@@ -88,7 +88,7 @@ class Scene:
     def write_grown(self, needed: Collection[tuple[int, int]]) -> None:
         """Write the files of :meth:`grown`, each of a size and a number of views a side.
 
-        The picture is cut off or laid side by side with itself, which keeps its texture; the outer views are left out.
+        The picture is cropped or tiled, which keeps its texture; outer views are left out.
         """
         whole = render(GROWING_SCENE, size=64 if self.small else 192, views=max(views for _, views in needed))
         for size, views in set(needed):
@@ -106,7 +106,7 @@ def sweep_values(num_disparities: int) -> dict[str, dict[str, int]]:
 
 
 def inputs(path: Path, stage: str) -> tuple[LightField, StageMaps | None]:
-    """A light field, and beside it the maps that a stage builds on; none for the first stage."""
+    """A light field and the maps of the stage before; None for the first stage."""
     names = list(STAGES)
     number = names.index(stage)
     return read_light_field(path), read_stage(path.with_name(f"{names[number - 1]}.h5")) if number else None

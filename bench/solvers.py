@@ -26,7 +26,7 @@ from sepi.regularization.wls import (
 
 Vector = npt.NDArray[np.float64]
 Solver = Callable[[Any, Vector, Vector, float], Vector]
-"""Takes matrix, right side, start and the relative residual to reach."""
+"""Function of matrix, right side, start and relative residual to the solution."""
 
 MAX_ITERATIONS = 20_000
 
@@ -70,7 +70,7 @@ SOLVERS: dict[str, Solver] = {
 
 
 def prepare(path: Path, name: str) -> Prepared:
-    """Solve a scene's system; the exact solver leaves its solution beside for the others to be held against."""
+    """Solve a scene's system; the exact solver stores its solution, with which others are compared."""
     light_field, before = inputs(path, "optimize")
     assert before is not None  # it is not the first stage
     parameters = WlsParameters()

@@ -1,4 +1,4 @@
-"""What a parameter is worth over scenes, and whether its best value on some holds on another, left out in turn.
+"""Scores of a parameter's values over scenes, and the best value with each scene left out in turn.
 
 Rendered scenes that are held out from choosing (:data:`sepi.rendered.RENDERED`) are refused.
 """
@@ -30,12 +30,12 @@ Scores = Mapping[str, Sequence[float]]
 
 
 def scene_for_choosing(given: str, noise: str) -> LightField:
-    """A built-in scene by its name, or by its path a light field, or a render in a level of noise.
+    """A built-in scene by its name, or a light field or a render at a level of noise by its path.
 
     Raises
     ------
     SepiError
-        If it is none, has no ground truth, or is held out.
+        If there is no such scene, it has no ground truth, or it is held out.
     """
     if given in SCENES:
         light_field = render(given)
@@ -45,14 +45,14 @@ def scene_for_choosing(given: str, noise: str) -> LightField:
         light_field = read_exposed(Path(given), noise, 1)
     else:
         light_field = read_light_field(Path(given))
-    # as the files have it: a folder may have any name
+    # the name in the files, since folders may have any name
     world = rendered_scene(light_field.name).world
     if world in RENDERED and not RENDERED[world].for_choosing:
         free = ", ".join(name for name, entry in RENDERED.items() if entry.for_choosing)
         raise SepiError(f"{given}: scene '{world}' is held out, no parameter may be chosen on it; on {free} one may")
     if light_field.ground_truth is None:
         raise SepiError(f"{given}: has no ground truth to score against")
-    # as the stages are given it
+    # as in the stages
     return equally_bright(settle_range(light_field))
 
 
@@ -74,7 +74,7 @@ def settings_of(variant: Variant, target: str, texts: Sequence[str]) -> tuple[st
 def scores_of(
     light_field: LightField, variant: Variant, stage: str, settings: Sequence[Mapping[str, Parameters]], which: str
 ) -> list[float]:
-    """A score of the final map for each of some settings that differ in one stage."""
+    """A score of the final map for each of several settings of one stage."""
     place = list(STAGES).index(stage)
     before, after = list(STAGES)[:place], list(STAGES)[place:]
     first = _run(light_field, None, variant, before, settings[0])
@@ -84,7 +84,7 @@ def scores_of(
 
 
 def tables(texts: Sequence[str], scores: Scores) -> str:
-    """Markdown: scores of each value; then for each scene the value that is best on the others, and what it gives."""
+    """Markdown of the scores of each value; then for each scene the best value on the others, and its score."""
     scenes = list(scores)
     rows = [[text, _mean(scores, i, scenes), *(scores[one][i] for one in scenes)] for i, text in enumerate(texts)]
     folds: list[tuple[str, str, float, float]] = []

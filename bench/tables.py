@@ -1,4 +1,4 @@
-"""A benchmark's result as tables to read, and two results side by side."""
+"""Tables of a benchmark's result, and of two results side by side."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Row = dict[str, str]
 """Heading to text; a cell without a figure is empty."""
 
 AXES = {"size": 2, "views": 2, "num_disparities": 1, "threads": -1}
-"""What grows, and the power of it that time grows with if it is linear in pixels, views, candidates and work."""
+"""Growing axis to the power with which time grows if it is linear in pixels, views, candidates and work."""
 
 UNITS = {"size": "pixels a side", "views": "views a side", "num_disparities": "candidates"}
 
@@ -47,7 +47,7 @@ def longer_side_down(rows: list[Row]) -> list[Row]:
 
 
 def sections(result: Result) -> dict[str, list[Row]]:
-    """Every table for which there are measurements, by its heading."""
+    """Heading to table, for all measurements."""
     tables = {
         "Whole": [_row(m) for m in result.group("whole").values()],
         "Variants": variants(result),
@@ -67,7 +67,7 @@ def sections(result: Result) -> dict[str, list[Row]]:
 
 
 def steps(result: Result) -> list[Row]:
-    """The steps from files to maps: time, share, memory, how near the arithmetic floor, scores."""
+    """The steps from files to maps: time, share, memory, ratio to the arithmetic floor, scores."""
     steps, prices = result.group("stages"), result.group("floor")
     total = sum(m.median for m in steps.values())
     rows = []
@@ -79,7 +79,7 @@ def steps(result: Result) -> list[Row]:
 
 
 def variants(result: Result) -> list[Row]:
-    """A row for each part of what variants do: seconds, and memory where it is more than one stage."""
+    """A row for each part of the variants: seconds, and memory if it is more than one stage."""
     rows: dict[str, Row] = {}
     for name, m in (result.group("variants") | result.group("large")).items():
         variant, _, part = name.partition(": ")
@@ -89,7 +89,7 @@ def variants(result: Result) -> list[Row]:
 
 
 def growth(result: Result) -> list[Row]:
-    """Nanoseconds per sample while one of pixels, views and candidates grows; they stay level if time is linear."""
+    """Nanoseconds per sample while pixels, views or candidates grow; constant if time is linear."""
     rows = []
     for axis, unit in UNITS.items():
         points = [name for name in result.group("growth, initial") if name.startswith(f"{axis} ")]
@@ -111,7 +111,7 @@ def per_candidate(result: Result) -> dict[str, float]:
 
 
 def comparison(before: Result, after: Result) -> list[Row]:
-    """What both measured: seconds, their ratio, memory, and scores."""
+    """Cases of both results: seconds, their ratio, memory, and scores."""
     earlier = {(m.group, m.name): m for m in before.measurements}
     pairs = [(earlier[m.group, m.name], m) for m in after.measurements if (m.group, m.name) in earlier]
     return [
@@ -130,7 +130,7 @@ def comparison(before: Result, after: Result) -> list[Row]:
 
 
 def differences(before: Result, after: Result) -> list[str]:
-    """Settings and parts of the machine that differ, so that ratios may mean something else than the code."""
+    """Settings and parts of the machine that differ, and may change ratios, too."""
     return [
         f"{key}: {old.get(key)} before, {new.get(key)} after"
         for old, new in ((before.machine, after.machine), (before.settings, after.settings))
