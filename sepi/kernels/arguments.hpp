@@ -1,4 +1,4 @@
-// How arguments of Python become what kernels take: arrays are looked at where they are, and never copied or converted.
+// Conversion of Python's arguments to those of kernels: arrays are used in place, never copied or converted.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -18,7 +18,7 @@ struct array_caster {
 
     NB_TYPE_CASTER(View, make_caster<Given>::Name)
 
-    // once for each type, not for each argument: modules are smaller, and built sooner
+    // once for each type, not each argument, for smaller modules and faster builds
     [[gnu::noinline]] bool from_python(handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
         make_caster<Given> caster;
         if (!caster.from_python(source, flags & ~uint32_t(cast_flags::convert), cleanup)) return false;
@@ -27,7 +27,7 @@ struct array_caster {
             value.shape[axis] = sepi::Index(caster.value.shape(axis));
             value.strides[axis] = caster.value.stride(axis);
         }
-        // NumPy says of empty arrays that their strides are 0
+        // NumPy's empty arrays may have strides of 0
         return any_strides || value.strides[N - 1] == 1 || value.shape[N - 1] <= 1 || caster.value.size() == 0;
     }
 };
@@ -55,7 +55,7 @@ struct type_caster<Struct> {
     template <class Field>
     [[gnu::noinline]] static bool taken(handle source, uint32_t flags, cleanup_list *cleanup, Field &field) noexcept {
         make_caster<Field> caster;
-        // numbers may be NumPy's
+        // also for NumPy's numbers
         if (!caster.from_python(source, flags | cast_flags::convert, cleanup)) return false;
         field = caster.operator cast_t<Field>();
         return true;
@@ -69,7 +69,7 @@ namespace sepi {
 // Kernels run outside Python's lock.
 using Unlocked = nanobind::call_guard<nanobind::gil_scoped_release>;
 
-// What Python sees of a source of kernels. Each source has one, and fills it when the extension module is made.
+// Submodule of a source of kernels in Python. Each source has one, filled when the extension module is loaded.
 struct Submodule {
     Submodule(const char *name, void (*fill)(nanobind::module_ &)) : name(name), fill(fill) { all().push_back(*this); }
 
@@ -84,7 +84,7 @@ struct Submodule {
 
 }  // namespace sepi
 
-// What all sources say
+// Names that all sources use
 namespace nb = nanobind;
 using namespace nb::literals;
 using sepi::Unlocked;

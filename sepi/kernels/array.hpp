@@ -1,4 +1,4 @@
-// Views of arrays, and scratch memory: what kernels work on. Nothing here knows Python.
+// Views of arrays, and scratch memory, for kernels; independent of Python.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@ struct Array {
     Index shape[N];
     Index strides[N];  // in elements
 
-    // Where an element is, or where the rest of the axes begins if fewer indices than axes are given.
+    // Address of an element, or of the first element of the remaining axes if there are fewer indices than axes.
     template <class... Indices>
     T *at(Indices... indices) const {
         static_assert(sizeof...(Indices) <= N);
@@ -49,7 +49,7 @@ struct Array {
         return part;
     }
 
-    // Who may only read takes an array of who may write, too.
+    // A writable array converts to a read-only one.
     operator Array<const T, N>() const
         requires(!std::is_const_v<T>)
     {
@@ -67,13 +67,13 @@ struct Array {
     }
 };
 
-// An array whose elements need not lie side by side along its last axis; those of Array do.
+// An array with any stride along its last axis; elements of Array are contiguous there.
 template <class T, int N>
 struct Strided : Array<T, N> {};
 
 constexpr std::align_val_t ALIGNED{64};  // to lines of the cache
 
-// Memory of a C-contiguous array, not initialised, that goes when its owner does.
+// Uninitialised memory of a C-contiguous array, freed with its owner.
 template <class T, int N>
 class Scratch {
   public:

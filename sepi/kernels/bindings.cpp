@@ -1,4 +1,4 @@
-// The extension module: a submodule for each source of kernels, by what that says itself.
+// The extension module, with a submodule for each source of kernels.
 #include "arguments.hpp"
 #include "lanes.hpp"
 #include "parallel.hpp"
@@ -7,8 +7,8 @@
 #include <cpuid.h>
 #endif
 
-// Whether the processor has what x86-64-v3 adds to the baseline, as far as kernels use it, and the system keeps its
-// registers. Not by __builtin_cpu_supports: zig's own library, linked for that, brings an exp and a memcpy that are slow.
+// Whether processor and system support the instructions of x86-64-v3 that kernels use. Not by __builtin_cpu_supports,
+// which links zig's library with its slow exp and memcpy.
 static bool has_x86_64_v3() {
 #if defined(__x86_64__)
     constexpr unsigned of_1 = bit_AVX | bit_FMA | bit_OSXSAVE, of_7 = bit_AVX2 | bit_BMI | bit_BMI2, both_registers = 6;

@@ -1,4 +1,4 @@
-// The exponential function where single precision is enough: libraries differ in its last bit, and this one does not.
+// Exponential function for single precision with the same bits everywhere; libraries differ in the last bit.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// The operations of the plane sweep, on a few numbers that stay in the first cache, at fixed places: what they cost where
-// nothing else does.
+// The operations of the plane sweep on a few numbers in the first cache, to measure their time alone.
 #include "arguments.hpp"
 #include "lanes.hpp"
 #include "parallel.hpp"
@@ -7,7 +6,7 @@
 namespace sepi::floor {
 namespace {
 
-// A thread adds what one makes of seven vectors, and of a weight that changes, as it does from candidate to candidate.
+// A thread adds the results for seven vectors and a weight that changes, as it does from candidate to candidate.
 template <class One>
 void add_passes(Index passes, Array<const float, 3> data, Array<float, 2> out, const One &one) {
     parallel_for(0, out.shape[0], [=](Index thread) {

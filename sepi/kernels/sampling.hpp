@@ -1,5 +1,4 @@
-// What kernels decide alike about pixels: where a line goes on beyond its end, how a sample weighs its neighbours,
-// which of two surfaces a view shows.
+// Sampling shared by kernels: continuation of lines beyond their ends, interpolation weights, nearest pixels.
 #pragma once
 
 #include <algorithm>
@@ -11,14 +10,14 @@
 
 namespace sepi {
 
-// Index in a line of n that is mirrored at its ends, for ever.
+// Index in a line of n that is mirrored at its ends, repeatedly.
 inline Index mirrored(Index i, Index n) {
     const Index period = std::max<Index>(1, 2 * n - 2);
     i = std::abs(i) % period;
     return std::min(i, period - i);
 }
 
-// Index in a line of n that goes on as it ends.
+// Index in a line of n that repeats its ends.
 inline Index clamped(Index i, Index n) { return std::min(std::max<Index>(i, 0), n - 1); }
 
 // Weights of the pixels at -1, 0, 1 and 2 for a sample at fraction f, 0..1: cubic convolution (Keys 1981,
@@ -40,34 +39,34 @@ inline float squared_distance(const float *one, const float *other) {
     return r * r + g * g + b * b;
 }
 
-// Weights of a pixel, its right neighbour, and both below them, for a sample so far below and to the right of it, 0..1.
+// Bilinear weights of a pixel, its right neighbour, and both below, for a sample at fractions below and to the right.
 inline std::array<float, 4> bilinear_weights(float fy, float fx) { return {(1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx}; }
 
-// Whether what is moved by some whole pixels and a fraction is nearer to the next: halves go to even moves, alike to both sides.
+// Whether a move by whole pixels and a fraction rounds up; halves go to even moves, symmetric in sign.
 inline Index is_nearer_next(Index moved, double fraction) { return fraction > 0.5 || (fraction == 0.5 && moved % 2 != 0); }
 
-// Where a sample lies: a pixel, and how far below and to the right of it, 0..1.
+// Position of a sample: a pixel, and fractions 0..1 below and to the right of it.
 struct Place {
     Index row, column;
     double fy, fx;
 
-    // The pixels on the other side. A sample that lies on a pixel looks at that alone, so that a mirrored picture, too, has
-    // its mirrored samples.
+    // The pixels on the other side. A sample exactly on a pixel uses that one only, so that a mirrored picture has
+    // mirrored samples.
     Index below() const { return row + (fy > 0); }
     Index right() const { return column + (fx > 0); }
 
-    // Row and column of the pixel that is nearest, of a sample that was moved from (y, x).
+    // Row and column of the nearest pixel, for a sample moved from (y, x).
     std::array<Index, 2> nearest(Index y, Index x) const { return {row + is_nearer_next(row - y, fy), column + is_nearer_next(column - x, fx)}; }
 };
 
-// A place in a picture (H, W), unless it lies outside, or is not known.
+// Position in a picture (H, W), unless outside or not finite.
 inline std::optional<Place> place_within(double down, double across, Index H, Index W) {
     if (!(0 <= down && down <= double(H - 1) && 0 <= across && across <= double(W - 1))) return std::nullopt;
     const auto row = Index(down), column = Index(across);
     return Place{row, column, down - double(row), across - double(column)};
 }
 
-// Whether a test holds for all pixels (i, j) that a bilinear sample looks at.
+// Whether a test holds for all pixels (i, j) of a bilinear sample.
 template <class Test>
 bool all_about(const Place &at, const Test &test) {
     return test(at.row, at.column) && test(at.row, at.right()) && test(at.below(), at.column) && test(at.below(), at.right());

@@ -1,9 +1,9 @@
-// The maps of all views, made of those of some.
+// Maps of all views, made from maps of a few.
 //
-// A pixel of a map is a square of a surface: its middle has the pixel's disparity, each corner what the pixels that
-// meet there, and belong together, agree on. Where they do not, the corner comes apart, each pixel going on by its own
-// slope. Seen from another view, a square becomes four triangles round its middle; disparity is linear on each of them,
-// since a plane in one view is a plane in all.
+// A pixel of a map is a square of a surface. Its middle has the pixel's disparity; a corner has the disparity on which
+// the pixels of one surface agree there. Pixels of different surfaces do not share a corner; each continues with its own
+// slope. In another view, a square becomes four triangles round its middle. Disparity is linear on each triangle, since
+// a plane in one view is a plane in all.
 #include <cmath>
 #include <vector>
 
@@ -16,8 +16,8 @@ namespace {
 
 constexpr float EMPTY = -1e9f;          // disparity where no surface is seen: nothing is nearer
 constexpr float TOLERANCE = 0.1f;       // disparities that differ by no more are of one surface, pixels per view step
-constexpr double MOST_STRETCHED = 2;    // a surface that a view sees so many times larger is left to maps that saw it better
-constexpr float LEAST_WEIGHT = 0.05f;   // vote of a map where its confidence is 0: beside depth steps all are small, and there they differ
+constexpr double MOST_STRETCHED = 2;    // surfaces that a view sees larger than this factor are left to other maps
+constexpr float LEAST_WEIGHT = 0.05f;   // vote of a map with confidence 0: where maps differ, beside depth steps, all confidences are low
 
 // The maps that are carried: the fields of sepi.applications.all_views.Sources, in their order.
 struct Sources {
@@ -29,16 +29,16 @@ struct Sources {
     bool fields(auto visit) { return visit(disparity, confidence, bars, corners, baselines); }
 };
 
-constexpr double TOUCHING = -1e-3;  // part of a triangle by which a pixel may miss it: no cracks between neighbours
-constexpr double EDGE_ON = 1e-3;    // part of its area in its own view below which a triangle is seen from its edge, or from behind
-constexpr float FARTHER = 1e9f;     // than anything is near
+constexpr double TOUCHING = -1e-3;  // share of a triangle by which a pixel may miss it, to leave no cracks between neighbours
+constexpr double EDGE_ON = 1e-3;    // share of its own area below which a triangle is seen edge-on, or from behind
+constexpr float FARTHER = 1e9f;     // above all disparities
 
 // From the middle of a pixel to its corners, clockwise from the top left.
 constexpr struct {
     double down, across;
 } CORNERS[] = {{-0.5, -0.5}, {-0.5, 0.5}, {0.5, 0.5}, {0.5, -0.5}};
 
-// Slope at pixel i of n, by the neighbour that is nearer in disparity: the other may be across a step.
+// Slope at pixel i of n, by the neighbour of closer disparity, since the other may lie across a step.
 float slope(const float *here, Index stride, Index i, Index n) {
     const float back = i > 0 ? here[0] - here[-stride] : 0, ahead = i < n - 1 ? here[stride] - here[0] : 0;
     if (i == 0 || i == n - 1) return i == 0 ? ahead : back;
@@ -54,7 +54,7 @@ void draw_triangle(Point a, Point b, Point c, std::int32_t pixel, Array<float, 2
     const double area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
     // in its own view the triangle is a quarter of a pixel
     if (!(0.5 * EDGE_ON < area && area <= 0.5 * MOST_STRETCHED)) return;
-    // the pixels along an axis of n that it may touch: mostly one, or none
+    // pixels along an axis of n that the triangle may touch, mostly one or none
     const auto touched = [](double p, double q, double r, Index n) {
         const auto [least, most] = std::minmax({p, q, r});
         return std::pair(std::max(0.0, std::ceil(least - 1e-3)), std::min(double(n - 1), std::floor(most + 1e-3)));
@@ -73,9 +73,8 @@ void draw_triangle(Point a, Point b, Point c, std::int32_t pixel, Array<float, 2
     }
 }
 
-// The surfaces of a map as a view sees them that stands v down and u across from the map's: the nearest disparity
-// (H, W), EMPTY where there is none, and the number of the map's pixel that is seen, or -1. What it sees stretched too
-// much is left out.
+// Surfaces of a map in a view at v down and u across from the map's view: nearest disparity (H, W), EMPTY where there is
+// none, and number of the map's pixel, or -1. Surfaces that are stretched too much are left out.
 void carry(Array<const float, 2> disparity, Array<const float, 3> corners, double v, double u, Array<float, 2> nearest,
            Array<std::int32_t, 2> origin) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
@@ -99,12 +98,12 @@ void carry(Array<const float, 2> disparity, Array<const float, 3> corners, doubl
     }
 }
 
-// Maps that are carried to a view v down and u across from the reference view, and what they say of it.
+// Maps warped to a view at v down and u across from the reference view, and their fusion.
 struct Fusion {
     const Sources &sources;
     const double v, u;
 
-    // What a map shows at a pixel of the view.
+    // A map's disparity at a pixel of the view.
     struct Shown {
         float disparity, confidence, weight;
         const float *bars;
@@ -129,14 +128,14 @@ struct Fusion {
             for (Index x = 0; x < W; ++x) {
                 for (Index n = 0; n < N; ++n) maps[n] = shown(n, y, x);
                 const float best = best_disparity(y, x);
-                // of the maps that agree with the best, the mean
+                // mean of the maps that agree with the best
                 float total = 0, belief = 0, weight = 0, sums[3] = {};
                 for (const Shown &map : maps) {
                     if (!(map.disparity > EMPTY) || std::abs(map.disparity - best) > TOLERANCE) continue;
                     total += map.weight * (map.disparity - best);
                     belief += map.weight * map.confidence;
                     weight += map.weight;
-                    // maps of one light field are wrong together: their mean is no surer than they are
+                    // errors of one light field's maps are correlated, so the mean is no surer than each map
                     for (Index k = 0; map.bars && k < 3; ++k) sums[k] += map.weight * map.bars[k];
                 }
                 disparity(y, x) = weight > 0 ? best + total / weight : EMPTY;
@@ -154,7 +153,7 @@ struct Fusion {
         return {nearest.array()(n, y, x), believed, closeness[n] * (LEAST_WEIGHT + believed), bars};
     }
 
-    // The disparity that most maps are for, if they differ.
+    // The disparity with most votes, if maps differ.
     float best_disparity(Index y, Index x) const {
         float low = FARTHER, high = EMPTY, most = -FARTHER;
         for (const Shown &map : maps)
@@ -168,14 +167,14 @@ struct Fusion {
         return best;
     }
 
-    // Sum of the weights of the maps that show a surface, less that of those that see through it.
+    // Sum of the weights of maps that show a surface, minus those of maps that see through it.
     float score(Index y, Index x, float d) const {
         float sum = 0;
         for (Index n = 0; n < N; ++n) {
             if (std::abs(maps[n].disparity - d) <= TOLERANCE) {
                 sum += maps[n].weight;
             } else if (maps[n].disparity < d) {
-                // it shows only what is behind, where it would show the surface
+                // it shows the background where it would show the surface
                 const auto place = place_within(y + d * down(n), x + d * across(n), H, W);
                 const auto is_behind = [&](Index i, Index j) { return sources.disparity(n, i, j) < d - TOLERANCE; };
                 if (place && all_about(*place, is_behind)) sum -= maps[n].weight;
@@ -185,15 +184,14 @@ struct Fusion {
     }
 };
 
-// Fill what is EMPTY with the farther of the two surfaces beside it, along the way that the view has moved: gaps open
-// along it.
+// Fill EMPTY pixels with the farther of the two surfaces beside them along the view's baseline, along which gaps open.
 void extend_background(double v, double u, Array<float, 2> disparity, Array<bool, 2> extended) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const double longest = std::max(std::abs(v), std::abs(u));
     const double down = longest > 0 ? v / longest : 0, across = longest > 0 ? u / longest : 1;
     for (Index y = 0; y < H; ++y)
         for (Index x = 0; x < W; ++x) extended(y, x) = !(disparity(y, x) > EMPTY);
-    // the first known disparity on a way from a pixel, or what is farther than all; halves are rounded away from it
+    // the first known disparity in a direction from a pixel, or FARTHER; halves are rounded away from the pixel
     const auto first_along = [&](Index y, Index x, double dy, double dx) {
         for (Index steps = 1;; ++steps) {
             const Index row = y + Index(std::round(steps * dy)), column = x + Index(std::round(steps * dx));
@@ -205,7 +203,7 @@ void extend_background(double v, double u, Array<float, 2> disparity, Array<bool
         for (Index x = 0; x < W; ++x) {
             if (!extended(y, x)) continue;
             const auto both = [&](double dy, double dx) { return std::min(first_along(y, x, dy, dx), first_along(y, x, -dy, -dx)); };
-            // across it only where nothing lies along it
+            // across the baseline only if there is none along it
             float found = both(down, across);
             if (found == FARTHER) found = both(across, -down);
             disparity(y, x) = found < FARTHER ? found : 0;
@@ -214,7 +212,7 @@ void extend_background(double v, double u, Array<float, 2> disparity, Array<bool
 }
 
 // Disparity at the corners of each pixel of a map (H, W), clockwise from the top left, out (H, W, 4). Pixels that meet
-// in a corner belong together where what they say of it differs by no more than the tolerance.
+// in a corner belong to one surface if their disparities there differ by at most the tolerance.
 void corner_disparities(Array<const float, 2> disparity, Array<float, 3> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const Scratch<float, 3> slopes(2, H, W);
@@ -230,7 +228,7 @@ void corner_disparities(Array<const float, 2> disparity, Array<float, 3> out) {
             const auto [down, across] = CORNERS[corner];
             const double mine = said(y, x, down, across);
             float total = 0, count = 0;
-            // by the rows of the pixels that share the corner: for all of them it adds up alike
+            // in the order of rows, so that all pixels at a corner get the same sum
             for (const Index i : {y + (down > 0) - 1, y + (down > 0)}) {
                 for (const Index j : {x + (across > 0) - 1, x + (across > 0)}) {
                     if (i < 0 || j < 0 || i >= H || j >= W) continue;
@@ -243,14 +241,14 @@ void corner_disparities(Array<const float, 2> disparity, Array<float, 3> out) {
     });
 }
 
-// The maps (V, H, W) of views with baselines (V, 2), bars (V, H, W, 3) where the sources have them, and where no source
-// shows anything and the background was extended.
+// Maps (V, H, W) of views with baselines (V, 2), bars (V, H, W, 3) if the sources have them, and mask of pixels that no
+// source shows, filled with the background.
 void maps_of_views(const Sources &sources, Array<const double, 2> baselines, Array<float, 3> disparity, Array<float, 3> confidence, Array<float, 4> bars,
                    Array<bool, 3> extended) {
     parallel_for(0, baselines.shape[0], [&](Index view) {
         const double v = baselines(view, 0), u = baselines(view, 1);
         Fusion{sources, v, u}.fuse(disparity[view], confidence[view], bars[view]);
-        // gaps open beside the reference view's surfaces, for it is those that most of the maps are made of
+        // gaps lie along the baseline from the reference view, whose map covers most of the view
         extend_background(v, u, disparity[view], extended[view]);
     });
 }

@@ -1,4 +1,4 @@
-// Pictures in focus everywhere, and pictures of the views between the views.
+// Pictures in focus everywhere, and refocused pictures with views interpolated between the views.
 #include <cmath>
 
 #include "kernels/arguments.hpp"
@@ -8,10 +8,10 @@
 namespace sepi::refocusing {
 namespace {
 
-// Pixels of a box at most: views whose pictures of a point are farther apart show it more than once.
+// Largest box in pixels; views farther apart show a point more than once.
 constexpr float WIDEST = 17;
 
-// Over which a point moves while the camera moves through its cell, pixels.
+// Range of a point's movement while the camera moves through its cell, pixels.
 struct Box {
     float height, width;
 
@@ -19,17 +19,17 @@ struct Box {
 
     static float of(float length) { return std::min(WIDEST, std::max(1.0f, length)); }
 
-    // Share of it that falls on a pixel this far away.
+    // Share of the range on a pixel at this distance.
     double share(Index dy, Index dx) const {
         const auto part = [](float length, Index d) { return std::min(1.0, std::max(0.0, double(0.5f * length + 0.5f) - double(std::abs(d)))); };
         return part(height, dy) * part(width, dx) / double(height * width);
     }
 };
 
-// Add what a view (H, W, 1 or 3), v down and u across from the reference view, shows of each pixel that it sees: to sums
-// (H, W, 1 or 3) weighted differences from the expected colour, centre, and to weights (H, W) the weights. Pixels whose
-// disparity is NaN get nothing, nor those before which the view shows something nearer by more than the margin. A colour
-// whose squared difference from the expected one, over the channels, is scale2 counts a quarter.
+// Add the samples of a view (H, W, 1 or 3), at v down and u across from the reference view, for each pixel that it sees:
+// weighted differences from the expected colour, centre, to sums (H, W, 1 or 3), and weights to weights (H, W). Pixels
+// with disparity NaN, or occluded in the view by more than the margin, get nothing. A colour whose squared difference
+// from the expected one, over the channels, is scale2 counts a quarter.
 void add_view(Array<const float, 3> view, double v, double u, Array<const float, 2> disparity, Array<const float, 2> nearest, float margin,
               Array<const float, 3> centre, float scale2, Array<float, 3> sums, Array<float, 2> weights) {
     const Index H = view.shape[0], W = view.shape[1];
@@ -45,7 +45,7 @@ void add_view(Array<const float, 3> view, double v, double u, Array<const float,
             float part[C] = {};
             for (Index j = 0; j < 4; ++j) {
                 const float *pixel = view.at(clamped(place->row + i - 1, H), clamped(place->column + j - 1, W));
-                // exactly 0 where all pixels are as expected
+                // exactly 0 if all pixels are as expected
                 for (Index c = 0; c < C; ++c) part[c] += across[j] * (pixel[c] - expected[c]);
             }
             for (Index c = 0; c < C; ++c) found[c] += down[i] * part[c];
@@ -60,10 +60,10 @@ void add_view(Array<const float, 3> view, double v, double u, Array<const float,
     });
 }
 
-// A view (C, H, W), sheared by the disparity focus, as the mean of all that could be taken in its cell of the aperture,
-// so many view steps high and wide. While the camera moves through the cell, each point moves over a box: its
-// disparity's distance from the focus, times the cell. What is nearer by more than the margin covers a pixel for the
-// share of the cell in which it is before it. Surfaces (H, W): disparities of what the view shows, finite.
+// Mean of all views in a cell of the aperture, from the cell's view (C, H, W) sheared by the disparity focus; the cell
+// is measured in view steps. While the camera moves through the cell, each point moves over a box of the size of the
+// cell times its disparity relative to the focus. Surfaces nearer by more than the margin cover a pixel for a share of
+// the cell. surfaces (H, W): finite disparities of the view.
 void fill_between(Array<const float, 3> sheared, Array<const float, 2> surfaces, float focus, Array<const float, 1> cell, float margin, Array<float, 3> out) {
     const Index C = sheared.shape[0], H = sheared.shape[1], W = sheared.shape[2];
     const auto box = [&](float disparity) { return Box(std::abs(disparity - focus), cell); };
@@ -73,7 +73,7 @@ void fill_between(Array<const float, 3> sheared, Array<const float, 2> surfaces,
     const Box largest(farthest, cell);
     const Index rows = Index(std::ceil(0.5f * largest.height - 0.5f)), columns = Index(std::ceil(0.5f * largest.width - 0.5f));
     parallel_for(0, H, [&](Index y) {
-        // colours and shares of what is nearer, and of all else
+        // colours and shares of nearer surfaces, and of the others
         const Scratch<float, 2> sums(2, C + 1);
         float *near = sums.array().at(0), *rest = sums.array().at(1);
         for (Index x = 0; x < W; ++x) {
@@ -83,7 +83,7 @@ void fill_between(Array<const float, 3> sheared, Array<const float, 2> surfaces,
             for (Index i = std::max<Index>(0, y - rows); i < std::min(H, y + rows + 1); ++i) {
                 for (Index j = std::max<Index>(0, x - columns); j < std::min(W, x + columns + 1); ++j) {
                     const float other = surfaces(i, j);
-                    // what is behind shows where the pixel's own surface moves away
+                    // the background shows where the pixel's own surface moves away
                     const double share = (other < own - margin ? own_box : box(other)).share(i - y, j - x);
                     if (!(share > 0)) continue;
                     float *total = other > own + margin ? near : rest;

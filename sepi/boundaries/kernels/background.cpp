@@ -1,4 +1,4 @@
-// What is behind the nearer surfaces beside depth steps, by the views that see it, and how bright views are.
+// Background behind the nearer surfaces beside depth steps, from the views that see it, and brightness of the views.
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -10,15 +10,15 @@
 namespace sepi::background {
 namespace {
 
-constexpr Index FEWEST_VIEWS = 3;  // that see a piece of background, before its colour counts
-constexpr float UNSEEN = -1;       // in place of the variance of a background that fewer see; negative
+constexpr Index FEWEST_VIEWS = 3;  // least number of views for the colour of a background
+constexpr float UNSEEN = -1;       // variance of a background that fewer views see; negative
 
 constexpr float NONE = std::numeric_limits<float>::infinity();
-constexpr double MOST_DEVIATION2 = 0.01;  // squared residual that one view counts at most in the background's variance
-constexpr Index ACROSS = 64;              // pixels, of the shorter side, that tell the brightness of a view
-constexpr double MOST_DIFFERENCE = 0.1;   // of one channel, that counts in a view's residual
+constexpr double MOST_DEVIATION2 = 0.01;  // largest squared residual of one view in the background's variance
+constexpr Index ACROSS = 64;              // pixels along the shorter side that are used for the brightness of a view
+constexpr double MOST_DIFFERENCE = 0.1;   // largest difference of one channel in a view's residual
 
-// Median of n numbers, NONE after them, by halving the interval that it lies in: counting vectorises, and sorting does not.
+// Median of n numbers, NONE after them, by bisection: counting vectorises, sorting does not.
 float median(const float *values, Index n) {
     const auto least_from = [&](float limit) {
         Float8 least = spread(NONE);
@@ -40,13 +40,13 @@ float median(const float *values, Index n) {
         if (found <= middle) below = found;
         (found <= middle ? low : high) = half;
     }
-    // of an even number, the mean of both in the middle
+    // mean of the middle two of an even number
     return n % 2 || below < middle ? least_from(low) : (most_below(low) + least_from(low)) * 0.5f;
 }
 
-// How bright each view is beside the reference, and how badly it shows the same, over some clean pixels: the ratio of the
-// sums of the colours, and the mean absolute difference of one channel, 0..1, that is left, NaN of views that show none
-// of the pixels; (N,). Pixels that a view does not show are missing (T, S, H, W), none if that is (T, S, 0, 0).
+// Brightness and residual of each view relative to the reference view, over some clean pixels: ratio of the sums of the
+// colours, and remaining mean absolute difference of one channel, 0..1; NaN without pixels; (N,). missing (T, S, H, W):
+// pixels that a view lacks, none if (T, S, 0, 0).
 void brightness_of_views(const RimViews &views, const Sides &sides, Array<const bool, 4> missing, Array<double, 1> brightness,
                          Array<double, 1> residual) {
     const Index H = sides.disparity.shape[0], W = sides.disparity.shape[1], stride = std::max<Index>(1, std::min(H, W) / ACROSS);
@@ -79,9 +79,9 @@ void brightness_of_views(const RimViews &views, const Sides &sides, Array<const 
     });
 }
 
-// Rows begin..end of the more distant surfaces where they are wanted (H, W), medians over the views that see them, and of
-// disparity layer (H, W), also where a nearer one hides them. Into background (H, W, 4): colours, and the variance of the
-// views' colours, mean of the channels, or UNSEEN.
+// Rows begin..end of the farther surfaces, of disparity layer (H, W), where wanted (H, W), also behind nearer ones:
+// medians over the views that see them. Into background (H, W, 4): colours, and variance of the views' colours, mean of
+// the channels, or UNSEEN.
 void background_of(const RimViews &views, Array<const float, 2> layer, Array<const bool, 2> wanted, Index begin, Index end,
                    Array<float, 3> background) {
     const Index W = layer.shape[1];
@@ -96,7 +96,7 @@ void background_of(const RimViews &views, Array<const float, 2> layer, Array<con
         const auto scratch = Scratch<float, 3>(few, 3, views.number() + LANES).filled(NONE);
         const auto samples = scratch.array();
         std::vector<Index> count(few);
-        // view by view: neighbours are near each other in its memory
+        // view by view, since neighbouring pixels are close in memory
         for (Index view = 0; view < views.number(); ++view) {
             for (Index i = 0; i < few; ++i) {
                 const auto place = samples_of.place_seen(view, layer(y, columns[i]), y, columns[i]);

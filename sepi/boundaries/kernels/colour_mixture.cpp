@@ -19,15 +19,15 @@ struct Surroundings {
 
 constexpr double WIDTH = 1;            // of the window's weights, pixels
 constexpr double APART = 0.019;        // squared distance of a colour from all mixtures at which it counts 1/e, in units of their variance
-constexpr double RAMP = 0.07;          // share below the threshold from which on there is no doubt
-constexpr double LEAST_WEIGHT = 0.05;  // of clean pixels of each side, in pixels right beside
+constexpr double RAMP = 0.07;          // distance of the share below the threshold at which the evidence is full
+constexpr double LEAST_WEIGHT = 0.05;  // least weight of the clean pixels of each side; an adjacent pixel has 1
 
 // Weighted sums over the clean pixels of one side.
 struct Side {
     double weight = 0, colour[3] = {}, colour2 = 0;
 };
 
-// How surely little of the nearer surface is in a pixel, 0..1, into out (H, W) where it is any; guide (H, W, 3).
+// Evidence that the nearer surface fills little of a pixel, 0..1, into out (H, W) if above 0; guide (H, W, 3).
 void mixture_evidence(Array<const float, 2> disparity, const Surroundings &around, Strided<const float, 3> guide, double discontinuity, Index radius,
                       double contrast, double threshold, double least_variance, Array<float, 2> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
@@ -42,7 +42,7 @@ void mixture_evidence(Array<const float, 2> disparity, const Surroundings &aroun
         for_window(y, x, radius, H, W, [&](Index row, Index column) {
             const float d = disparity(row, column);
             const bool clean = around.farthest(row, column) > middle || around.nearest(row, column) <= middle;
-            // surfaces beyond the two do not count
+            // other surfaces than the two do not count
             if (!clean || d > highest + discontinuity || d < lowest - discontinuity) return;
             const double weight = weights[(row - y) * (row - y) + (column - x) * (column - x)];
             Side &side = sides[d > middle];
@@ -64,7 +64,7 @@ void mixture_evidence(Array<const float, 2> disparity, const Surroundings &aroun
             apart += squared(own);
             variance -= of_far * of_far + of_near * of_near;
         }
-        // what is left of the colour beside both: a surface darker towards its edge is no mixture
+        // distance of the colour from both: a surface darker towards its edge is no mixture
         distance = std::max(distance, 1e-12);
         apart -= squared(std::max(projection, 0.0)) / distance;
         const double little = std::clamp((threshold - projection / distance) / RAMP, 0.0, 1.0);

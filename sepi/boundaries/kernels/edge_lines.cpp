@@ -7,7 +7,7 @@
 namespace sepi::edge_lines {
 namespace {
 
-// From one share that has a cost to the next that an edge may leave.
+// Steps between shares that have costs, in shares that an edge may leave.
 constexpr Index STEPS = 3;
 
 // Edges through a patch of three by three pixels: the fields of sepi.boundaries.edge_lines.Edges, in their order.
@@ -21,18 +21,18 @@ struct Edges {
 };
 
 constexpr Index PATCH = 9;       // pixels of a patch, row after row
-constexpr float MOST = 0.2f;     // cost of a neighbour that an edge does not fit
-constexpr float OUTSIDE = 0.3f;  // cost of a pixel away from all steps that is the other surface's
-constexpr Index AT_ONCE = 64;    // pixels that a thread does at a stretch
+constexpr float MOST = 0.2f;     // largest cost of a neighbour that an edge does not fit
+constexpr float OUTSIDE = 0.3f;  // cost of the other surface at a pixel away from all steps
+constexpr Index AT_ONCE = 64;    // pixels of a turn of a thread
 
-// By how much the best edge that leaves a pixel to the farther surface costs less than the best that does not, into
-// evidence (n,), for pixels (n,) of the map (H, W). Between their surfaces lies middle (H, W). Shares of the nearer one
-// have costs (n, K), from 0 to 1, the best of each 0; number (H, W) is a pixel's row of them, or -1: it lies beside no
-// step, and stays on its side.
+// Difference of cost between the best edges that give a pixel to the nearer and to the farther surface, into evidence
+// (n,), for pixels (n,) of the map (H, W). middle (H, W) lies between the surfaces. costs (n, K) are those of shares of
+// the nearer surface from 0 to 1, the best 0; number (H, W) is a pixel's row of them, or -1 for a pixel beside no step,
+// which stays on its side.
 void evidence_of_lines(Array<const float, 2> disparity, Array<const float, 2> middle, Array<const std::int64_t, 2> number, Array<const float, 2> costs,
                        const Edges &edges, Array<const std::int64_t, 1> pixels, Array<float, 1> evidence) {
     const Index H = disparity.shape[0], W = disparity.shape[1], K = costs.shape[1], finest = STEPS * (K - 1);
-    // what each share costs in a pixel of the patch about (y, x)
+    // cost of each share in a pixel of the patch about (y, x)
     const auto fill = [&](Index y, Index x, Index p, float *table) {
         const Index row = y + p / 3 - 1, column = x + p % 3 - 1;
         if (row < 0 || column < 0 || row >= H || column >= W) {
@@ -42,7 +42,7 @@ void evidence_of_lines(Array<const float, 2> disparity, Array<const float, 2> mi
             const bool nearer = disparity(row, column) > middle(y, x);
             for (Index k = 0; k <= finest; ++k) table[k] = cost * (nearer ? 1 - float(k) / float(finest) : float(k) / float(finest));
         } else {
-            // an edge may bend, or end, beside the pixel that is asked about
+            // an edge may bend or end beside the pixel in the middle
             const float weight = edges.weights(p), most = p == PATCH / 2 ? std::numeric_limits<float>::infinity() : MOST, *own = costs.at(n);
             for (Index k = 0; k < K - 1; ++k)
                 for (Index step = 0; step <= STEPS; ++step)

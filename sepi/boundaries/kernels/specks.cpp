@@ -9,12 +9,12 @@
 namespace sepi::specks {
 namespace {
 
-// Pixels of parts of a map (H, W) that are small: of most_pixels, or of most_of_hole with nothing but nearer pixels
-// round them. Of one part are neighbours, of eight, that differ by difference at most.
+// Pixels of small parts of a map (H, W): of at most most_pixels, or most_of_hole with only nearer pixels around. A part
+// consists of eight-connected pixels that differ by at most difference.
 void specks_of(Array<const float, 2> disparity, float difference, Index most_pixels, Index most_of_hole, Array<bool, 2> specks) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const float *d = disparity.data;
-    // of each pixel another one of its part, of one pixel of a part itself
+    // union-find: parent of each pixel in its part; the root is its own
     std::vector<std::int32_t> another(H * W);
     std::iota(another.begin(), another.end(), 0);
     const auto part_of = [&](std::int32_t pixel) {

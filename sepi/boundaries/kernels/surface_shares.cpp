@@ -1,5 +1,4 @@
-// How much of a pixel beside a depth step each view shows as the nearer of its two surfaces: how badly each share explains
-// what they show.
+// Share of the nearer surface in a pixel beside a depth step: residuals of the views for each share.
 #include <cmath>
 
 #include "kernels/arguments.hpp"
@@ -9,7 +8,7 @@
 namespace sepi::surface_shares {
 namespace {
 
-// The pixels beside a depth step, and the two surfaces that may be theirs; (H, W).
+// Pixels beside a depth step, and their two possible surfaces; (H, W).
 struct Rim {
     Array<float, 2> near, far;
     Array<bool, 2> inside, is_near;
@@ -17,27 +16,27 @@ struct Rim {
     bool fields(auto visit) { return visit(near, far, inside, is_near); }
 };
 
-constexpr Index FEWEST_SAMPLES = 8;  // views from which a share is told
-constexpr Index FEWEST_ALONE = 3;    // views from which it is told whether a pixel moves with the more distant surface alone
-constexpr Index SHARES = 12;         // that are tried, from 0 to 1; none is one half
+constexpr Index FEWEST_SAMPLES = 8;  // least number of views for a share
+constexpr Index FEWEST_ALONE = 3;    // least number of views for the movement with the farther surface alone
+constexpr Index SHARES = 12;         // number of shares, from 0 to 1; none is one half
 
-constexpr Index LITTLE = 3;            // shares that a pixel may have which moves with the more distant surface
+constexpr Index LITTLE = 3;            // number of shares that fit a pixel moving with the farther surface
 constexpr double SAME_SURFACE = 0.25;  // difference of disparity, pixels per view step
-// standard deviation of a surface's colour from what its clean neighbours say, beyond what they differ by; the same
-// where the colour is free, and where no clean one is known; colours in 0..1
+// standard deviation of a surface's colour from its clean neighbours', beyond their own; the same for a free colour,
+// and without clean neighbours; colours in 0..1
 constexpr double CLEAN_DEVIATION = 0.02, FREE_DEVIATION = 0.2, UNKNOWN_DEVIATION = 1;
-// of a change of colour towards the edge: what its slope is held by, square of pixels; the part of its square that adds
-// to the colour's variance; the least deviation of one channel about it
+// of a change of colour towards the edge: damping of its slope, squared pixels; share of its square that adds to the
+// colour's variance; least standard deviation of one channel about it
 constexpr double LEAST_EXTENT = 0.1, DOUBT = 0.1, LEAST_DEVIATION = 0.004;
-constexpr float UNKNOWN = 1e3f;  // cost where nothing tells
-constexpr Index AT_ONCE = 64;    // pixels that a thread does at a stretch
+constexpr float UNKNOWN = 1e3f;  // cost without information
+constexpr Index AT_ONCE = 64;    // pixels of a turn of a thread
 
-// Three channels, and a number that is not looked at.
+// Three channels, and an unused number.
 using Channels = double __attribute__((vector_size(32)));
 
 double total_of(Channels numbers) { return numbers[0] + numbers[1] + numbers[2]; }
 
-// The nearer surface at a pixel: its colour and the variance of that, and the least and the most that it shows nearby.
+// The nearer surface at a pixel: colour and its variance, and least and largest colours nearby.
 struct NearerSurface {
     Channels own, least = {1, 1, 1}, most = {};
     double variance;
@@ -58,10 +57,10 @@ struct Moments {
     }
 };
 
-// Set the colour and its variance by what clean pixels' colours go on as.
+// Set the colour and its variance by extrapolation of the clean pixels' colours.
 //
-// Surfaces get darker or brighter towards their edge. The colour is linear in the place as far as that is more than its
-// own doubt (James and Stein's estimate): texture has no slope that goes on.
+// Surfaces get darker or brighter towards their edge, so the colour is linear in the position, with the slope shrunk by
+// its uncertainty (James-Stein estimate), since texture has no slope that continues.
 void go_on(const Moments &sums, NearerSurface &surface) {
     const auto positive = [](Channels numbers) { return numbers > 0.0 ? numbers : Channels{}; };
     const double n = sums.weight, at_y = sums.at_y / n, at_x = sums.at_x / n;
@@ -71,7 +70,7 @@ void go_on(const Moments &sums, NearerSurface &surface) {
     const Channels slope_y = (xx * down - yx * across) / determinant, slope_x = (yy * across - yx * down) / determinant;
     const Channels variance = positive(sums.colour2 / n - mean * mean), change = -slope_y * at_y - slope_x * at_x;
     const double plain = total_of(variance), rest = total_of(positive(variance - slope_y * down - slope_x * across)), change2 = total_of(change * change);
-    // variance of the change, by what is left beside it and where the clean pixels lie
+    // variance of the change, from the residuals and the positions of the clean pixels
     const double lever = (xx * at_y * at_y - 2 * yx * at_y * at_x + yy * at_x * at_x) / determinant;
     const double doubt = (rest + 3 * squared(LEAST_DEVIATION)) / std::max(n * n / sums.weight2 - 3, 1.0) * lever;
     const double kept = std::max(0.0, 1 - doubt / (change2 + 1e-12));
@@ -79,7 +78,7 @@ void go_on(const Moments &sums, NearerSurface &surface) {
     surface.variance = (kept * (rest + DOUBT * kept * change2) + (1 - kept) * plain) / 3 + squared(CLEAN_DEVIATION);
 }
 
-// The nearer surface at a pixel: where no clean pixel tells of its colour, that is the pixel's own.
+// The nearer surface at a pixel; without clean pixels, its colour is the pixel's own.
 NearerSurface nearer_surface(const Sides &sides, float near, double middle, Index y, Index x) {
     const auto colour_at = [&](Index i, Index j) { return Channels{sides.guide(i, j, 0), sides.guide(i, j, 1), sides.guide(i, j, 2)}; };
     NearerSurface surface;
@@ -103,7 +102,7 @@ NearerSurface nearer_surface(const Sides &sides, float near, double middle, Inde
 
 Float8 robust(Float8 residual2, Float8 half) { return residual2 / (residual2 + half); }
 
-// Sum over n views of what turn(view, c) gives of eight of them, of each channel.
+// Sum over n views of turn(view, c), which computes eight views of a channel.
 template <class Turn>
 float sum_over(Index n, Index channels, Turn turn) {
     Float8 total{};
@@ -112,7 +111,7 @@ float sum_over(Index n, Index channels, Turn turn) {
     return sum_of(total);
 }
 
-// What the views show of one pixel after the other.
+// Samples of the views for one pixel after the other.
 struct ShownPixel {
     const RimViews &views;
     const ViewSamples samples_of;
@@ -121,21 +120,21 @@ struct ShownPixel {
     const Sides &sides;
     const double least_scale2, contrast2;
 
-    // rows of what the views show: colours, those behind them, and the variance of the latter
+    // rows of samples: colours, colours of the background, and variance of the latter
     static constexpr Index BEHIND = 3, NOISE = 6, ROWS = 7;
     const Scratch<float, 2> rows = zeros<float, 2>(ROWS, views.number() + LANES);
-    Index number = 0;  // views that tell
+    Index number = 0;  // number of views with samples
     NearerSurface surface = {};
     float sums[NOISE] = {}, scale2 = 0, held = 0;
 
-    // Find the costs of all shares; false if the views do not tell.
+    // Compute the costs of all shares; false with too few views.
     bool find(Index y, Index x, float *costs) {
         const float near = rim.near(y, x), far = rim.far(y, x);
         look_along_near(near, far, y, x);
         if (number < FEWEST_SAMPLES) return false;
         surface = nearer_surface(sides, near, double(near + far) / 2, y, x);
-        // to be far, a pixel must be so whatever its colour. To be near it must have the surface's colour: before a bare
-        // background, any is a share of another
+        // a far pixel must be far for any colour of the nearer surface. A near one must have the surface's colour, since
+        // before a plain background any colour is a share of another
         if (rim.is_near(y, x)) surface.variance = squared(FREE_DEVIATION);
         const float contrasts2 = sum_over(number, 3, [&](Index v, Index c) {
             const Float8 apart = samples(BEHIND + c, v) - spread(float(surface.own[c]));
@@ -157,7 +156,7 @@ struct ShownPixel {
     // Colour between pixels of the background, and its variance, if they are known.
     std::optional<std::array<float, 4>> behind(const Place &place) const {
         const auto [row, column, fy, fx] = place;
-        // what has no weight need not be known
+        // pixels of weight 0 need not be known
         for (Index i = row + (fy == 1); i <= row + (fy > 0); ++i)
             for (Index j = column + (fx == 1); j <= column + (fx > 0); ++j)
                 if (background(i, j, 3) < 0) return std::nullopt;
@@ -175,11 +174,11 @@ struct ShownPixel {
         ++number;
     }
 
-    // What the views show of a pixel that moves with the nearer surface, and what is behind it there.
+    // Samples of the views for a pixel that moves with the nearer surface, and the background behind it.
     void look_along_near(float near, float far, Index y, Index x) {
         number = 0;
         for (Index view = 0; view < views.number(); ++view) {
-            // and where the background that is there in the view is in the reference view
+            // and the position in the reference view of the background there
             const auto place = samples_of.place_seen(view, near, y, x), there = samples_of.place_in(view, near - far, y, x);
             if (!place || !there) continue;
             if (const auto known = behind(*there)) {
@@ -189,8 +188,8 @@ struct ShownPixel {
         }
     }
 
-    // Mean robust residual of views that show a share of one colour before the background, 0..1. The colour is that which
-    // fits best within the surface's limits, and is held near its own with the weight of so many views.
+    // Mean robust residual of the views for a share of one colour before the background, 0..1. The colour is the best
+    // within the surface's limits; a penalty with the weight of several views holds it near the surface's own.
     float cost_of(float share) const {
         const float rest = 1 - share;
         float total = 0;
@@ -213,7 +212,7 @@ struct ShownPixel {
         return (total + residuals) / float(3 * number);
     }
 
-    // Mean robust residual of a pixel that moves with the more distant surface, over views that see it.
+    // Mean robust residual of a pixel that moves with the farther surface, over the views that see it.
     float cost_alone(float far, Index y, Index x) {
         number = 0;
         for (Index view = 0; view < views.number(); ++view) {
@@ -230,11 +229,11 @@ struct ShownPixel {
     }
 };
 
-// How badly each share of the nearer surface explains what the views show of the pixels (n,) of a rim: mean robust
-// residuals, 0..1, of shares from 0 to 1, into costs (n, SHARES), and told (n,) set; both left alone where the views do
-// not tell. Along the nearer surface's disparity each view shows the same share of that surface before another piece of
-// background (H, W, 4), which is that of background_of. A view counts half at the squared residual scale2, to which
-// the squared difference of both surfaces' colours adds, times contrast2: errors of samples grow with it.
+// Costs of each share of the nearer surface for the pixels (n,) of a rim: mean robust residuals of the views, 0..1, for
+// shares from 0 to 1, into costs (n, SHARES), with told (n,) set; both stay unchanged with too few views. At the nearer
+// surface's disparity, each view shows the same share of that surface before another part of the background (H, W, 4),
+// from background_of. A view counts half at the squared residual scale2 plus contrast2 times the squared difference of
+// both surfaces' colours, since errors of samples grow with it.
 void costs_of_shares(const RimViews &views, const Rim &rim, Array<const float, 3> background, const Sides &sides, double scale2, double contrast2,
                      Array<const std::int64_t, 1> pixels, Array<float, 2> costs, Array<bool, 1> told) {
     const Index W = sides.disparity.shape[1], count = pixels.shape[0];

@@ -1,4 +1,4 @@
-// What is handed over of a map and its views; where these show a pixel of some disparity, and the colours between their pixels.
+// A map and its views as arguments; positions of a pixel in the views, and colours interpolated between their pixels.
 #pragma once
 
 #include <variant>
@@ -8,7 +8,7 @@
 
 namespace sepi {
 
-// The views that are compared, and what hides what in them.
+// The views that are compared, with their z-buffers.
 struct RimViews {
     std::variant<Array<const std::uint8_t, 4>, Array<const std::uint16_t, 4>, Array<const float, 4>> lines;  // (T, S, H, W C)
     Index channels;
@@ -24,7 +24,7 @@ struct RimViews {
     Index number() const { return units.shape[0]; }
 };
 
-// The surfaces of a map, and what the reference view shows of them.
+// The surfaces of a map, and their colours in the reference view.
 struct Sides {
     Array<const float, 2> disparity;  // (H, W)
     Strided<const float, 3> guide;    // (H, W, 3)
@@ -40,7 +40,7 @@ struct ViewSamples {
     const RimViews &views;
     const Index H = std::visit([](const auto &lines) { return lines.shape[2]; }, views.lines);
 
-    // Where a pixel of disparity d lies in a view, if that is within it: beside the last row and column, not on them.
+    // Position of a pixel of disparity d in a view, if inside, before its last row and column.
     [[gnu::always_inline]] std::optional<Place> place_in(Index view, float d, Index y, Index x) const {
         const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
         const Index W = views.nearest.shape[3];
@@ -49,7 +49,7 @@ struct ViewSamples {
         return Place{row, column, down - double(row), across - double(column)};
     }
 
-    // The same, if nothing hides it.
+    // The same, if nothing occludes it.
     [[gnu::always_inline]] std::optional<Place> place_seen(Index view, float d, Index y, Index x) const {
         const auto place = place_in(view, d, y, x);
         if (!place) return place;
@@ -57,8 +57,8 @@ struct ViewSamples {
         return views.nearest(views.places(view, 0), views.places(view, 1), row - views.low, column) <= d + views.margin ? place : std::nullopt;
     }
 
-    // Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since a bilinear sample takes from
-    // the peak of what is two pixels wide.
+    // Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since bilinear interpolation
+    // lowers peaks that are two pixels wide.
     std::array<float, 3> sample(Index view, const Place &place) const {
         const Index t = views.places(view, 0), s = views.places(view, 1);
         auto colour = std::visit([&](const auto &lines) { return cubic_sample(lines[t][s], place); }, views.lines);
@@ -80,7 +80,7 @@ struct ViewSamples {
                 for (Index k = 1; k < 4; ++k) total = fma(spread(down[k]), load(rows[k] + i), total);
                 return total;
             };
-            // four pixels side by side, of which the first eight numbers and the last eight make up all twelve
+            // four pixels side by side: the first eight numbers and the last eight cover all twelve
             const Float8 left = above_each_other(3 * first), right = above_each_other(3 * first + 4);
             const auto sum = across[0] * __builtin_shufflevector(left, left, 0, 1, 2, 2) + across[1] * __builtin_shufflevector(left, left, 3, 4, 5, 5) +
                              across[2] * __builtin_shufflevector(right, right, 2, 3, 4, 4) + across[3] * __builtin_shufflevector(right, right, 5, 6, 7, 7);

@@ -11,12 +11,12 @@ namespace sepi::cae {
 namespace {
 
 constexpr Index LEVELS = 256;  // bins of the histograms, over colours in 0..1
-constexpr Index PATCH = 5;     // width of a sub-patch in pixels; three by three of them make up the neighbourhood of a pixel
+constexpr Index PATCH = 5;     // width of a sub-patch in pixels; the neighbourhood has three by three of them
 
-// Bin of a colour; what resampling overshoots goes to the last ones.
+// Bin of a colour; values beyond 0..1 by resampling go to the first and last bins.
 inline std::int16_t level_of(float colour) { return std::int16_t(std::clamp(double(colour) * (LEVELS - 1) + 0.5, 0.0, LEVELS - 1.0)); }
 
-// Libraries differ in the last bit of single precision, and hardly ever in what a double is rounded to.
+// In double precision, since libraries differ in the last bit of single precision.
 inline float logarithm(float x) { return float(std::log(double(x))); }
 
 // Entropy of the weighted histogram of an angular patch (N) of bins; leaves histogram at zero.
@@ -29,7 +29,7 @@ float entropy(const std::int16_t *patch, Index N, Index own, Array<const float, 
         histogram[patch[n]] += weights(distance);
         total += weights(distance);
     }
-    // no view is anything like the pixel: as bad as a patch in which all differ
+    // no view resembles the pixel: entropy of a patch in which all views differ
     if (total <= 0) return logarithm(float(N));
     for (Index level = std::max<Index>(0, own - reach); level <= std::min(own + reach, LEVELS - 1); ++level) {
         float &weight = histogram[level];
@@ -39,7 +39,7 @@ float entropy(const std::int16_t *patch, Index N, Index own, Array<const float, 
     return logarithm(total) - mixed / total;
 }
 
-// Entropy of each channel's angular patch, each view weighted by how near its level is to that of the reference view.
+// Entropy of each channel's angular patch, with views weighted by the difference of their level from the reference view's.
 // sheared (N, 3, H, W), own (3, H, W) the reference view, weights[d] at a difference of d levels, 0 beyond; out (3, H, W).
 void constrained_entropies(Array<const float, 4> sheared, Array<const float, 3> own, Array<const float, 1> weights, Array<float, 3> out) {
     const Index N = sheared.shape[0], C = sheared.shape[1], H = sheared.shape[2], W = sheared.shape[3];
@@ -56,8 +56,8 @@ void constrained_entropies(Array<const float, 4> sheared, Array<const float, 3> 
     });
 }
 
-// Least over the sub-patches round a pixel of their weighted mean response and what their colours add to it.
-// response (H, W, K), guide (H, W, 3), out (H, W, K). Beyond its border a picture goes on as it ends.
+// Least weighted mean response of the sub-patches round a pixel, plus the penalty on their colours.
+// response (H, W, K), guide (H, W, 3), out (H, W, K). Pictures repeat their border.
 void constrained_least_patch(Array<const float, 3> response, Array<const float, 3> guide, float sigma, float constraint, Array<float, 3> out) {
     const Index H = response.shape[0], W = response.shape[1], K = response.shape[2], reach = 3 * PATCH / 2;
     const float scale = float(-1 / (6.0 * double(sigma) * double(sigma)));
@@ -73,7 +73,7 @@ void constrained_least_patch(Array<const float, 3> response, Array<const float, 
                 std::fill_n(total, K, 0.0f);
                 for (Index n = 0; n < PATCH * PATCH; ++n) {
                     const Index i = clamped(top + n / PATCH, H), j = clamped(left + n % PATCH, W);
-                    // a patch of nothing alike still has a mean
+                    // a patch without similar pixels still has a mean
                     const float weight = exp_of_negative(std::max(squared_distance(guide.at(i, j), guide.at(y, x)) * scale, -9.0f));
                     const float *costs = response.at(i, j);
                     for (Index k = 0; k < K; ++k) total[k] += weight * costs[k];

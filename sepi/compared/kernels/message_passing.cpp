@@ -1,7 +1,7 @@
-// Tree-reweighted message passing, on one thread: each pixel waits for the one before it.
+// Tree-reweighted message passing, on one thread, since each pixel depends on the one before it.
 //
-// messages (4, H, W, K) is what comes to a pixel from its neighbour at the left, above, at the right, below;
-// costs (H, W, K) are those of its labels, across and down (H, W) the weights of the edges to the next pixels.
+// messages (4, H, W, K): to a pixel from its neighbour at the left, above, at the right, below; costs (H, W, K) of its
+// labels; across and down (H, W): weights of the edges to the next pixels.
 #include <limits>
 
 #include "kernels/arguments.hpp"
@@ -13,7 +13,7 @@ enum Side { LEFT, ABOVE, RIGHT, BELOW };
 
 constexpr float INFINITE = std::numeric_limits<float>::infinity();
 
-// Message over an edge: the lower envelope of truncated cones that stand on half the belief less what came back.
+// Message over an edge: lower envelope of truncated cones on half the belief minus the opposite message.
 void send(const float *belief, const float *back, float weight, float truncation, float *__restrict out, Index K) {
     float least = INFINITE, lowest = INFINITE;
     for (Index k = 0; k < K; ++k) out[k] = 0.5f * belief[k] - back[k];
@@ -26,18 +26,18 @@ void send(const float *belief, const float *back, float weight, float truncation
     for (Index k = 0; k < K; ++k) out[k] = std::min(out[k] - least, most);
 }
 
-// Data cost of a pixel and all that its neighbours say of it.
+// Belief of a pixel: data cost plus all messages from its neighbours.
 void believe(const float *cost, Array<const float, 4> messages, Index y, Index x, float *__restrict out) {
     const float *left = messages.at(LEFT, y, x), *above = messages.at(ABOVE, y, x), *right = messages.at(RIGHT, y, x), *below = messages.at(BELOW, y, x);
     for (Index k = 0; k < messages.shape[3]; ++k) out[k] = cost[k] + left[k] + above[k] + right[k] + below[k];
 }
 
-// One pass forth, to the right and down, and one back.
+// One pass to the right and down, and one back.
 void pass_messages(Array<const float, 3> costs, Array<const float, 2> across, Array<const float, 2> down, float truncation, Array<float, 4> messages) {
     const Index H = costs.shape[0], W = costs.shape[1], K = costs.shape[2];
     const Scratch<float, 1> beliefs(K);
     float *belief = beliefs.array().data;
-    // forth to what is right and below, and back
+    // messages to the right and down, or to the left and up
     for (const Index step : {1, -1}) {
         for (Index n = step > 0 ? 0 : H * W - 1; 0 <= n && n < H * W; n += step) {
             const Index y = n / W, x = n % W, to_y = y + step, to_x = x + step;
@@ -51,13 +51,13 @@ void pass_messages(Array<const float, 3> costs, Array<const float, 2> across, Ar
     }
 }
 
-// A label for each pixel in turn, given those of the pixels before it and what those after it say.
+// Label of each pixel in turn, given the labels of pixels before it and the messages of those after it.
 void decode(Array<const float, 3> costs, Array<const float, 2> across, Array<const float, 2> down, float truncation, Array<const float, 4> messages,
             Array<std::int64_t, 2> labels) {
     for (Index y = 0; y < costs.shape[0]; ++y) {
         for (Index x = 0; x < costs.shape[1]; ++x) {
             const float *cost = costs.at(y, x), *right = messages.at(RIGHT, y, x), *below = messages.at(BELOW, y, x);
-            // no weight where there is no pixel before
+            // weight 0 without a pixel before
             const Index to_left = x > 0 ? labels(y, x - 1) : 0, upwards = y > 0 ? labels(y - 1, x) : 0;
             const float weight_left = x > 0 ? across(y, x - 1) : 0.0f, weight_up = y > 0 ? down(y - 1, x) : 0.0f;
             Index best = 0;

@@ -8,7 +8,7 @@
 namespace sepi::mishiba {
 namespace {
 
-// Row y of a view, that far down, interpolated, into row (W + 2 margin), which goes on as it ends.
+// Row y of a view, interpolated, into row (W + 2 margin), with its ends repeated.
 void interpolate_row(Array<const float, 2> view, Index y, double offset, Index margin, float *__restrict row) {
     const Index H = view.shape[0], W = view.shape[1], down = Index(std::floor(offset));
     const auto w = cubic_weights(offset - double(down));
@@ -19,7 +19,7 @@ void interpolate_row(Array<const float, 2> view, Index y, double offset, Index m
     std::fill_n(row + margin + W, margin, row[margin + W - 1]);
 }
 
-// Least of the values up to which half of the weight lies, by bisection.
+// Weighted median of the values, by bisection.
 std::int32_t weighted_median(const std::int32_t *values, const std::int32_t *weights, Index count) {
     std::int32_t low = values[0], high = values[0], total = 0;
     for (Index n = 0; n < count; ++n) {
@@ -36,8 +36,8 @@ std::int32_t weighted_median(const std::int32_t *values, const std::int32_t *wei
     return low;
 }
 
-// Share of the pairs of views whose bits differ, at every step-th row and column; 1 is as many different pairs as there
-// can be, and where there is no pair. Views that show a pixel beyond their border take no part.
+// Number of pairs of views whose bits differ, at every step-th row and column, relative to the largest possible number;
+// 1 without a pair. Views in which a pixel lies outside take no part.
 // details (N, H, W), whose signs are the bits; offsets (K, N, 2), down and across from a reference pixel to its sample,
 // for each candidate, in pixels; out (K, ceil(H / step), ceil(W / step)).
 void pair_costs(Array<const float, 3> details, Array<const double, 3> offsets, Index step, Array<float, 3> out) {
@@ -46,7 +46,7 @@ void pair_costs(Array<const float, 3> details, Array<const double, 3> offsets, I
     for (Index k = 0; k < K; ++k)
         for (Index n = 0; n < N; ++n) farthest = std::max({farthest, std::abs(offsets(k, n, 0)), std::abs(offsets(k, n, 1))});
     const Index margin = Index(std::ceil(farthest)) + 3;
-    // by how many views see a pixel, and how many of them have a one
+    // table by the number of views that see a pixel, and of ones among them
     const auto shares = Scratch<float, 2>(N + 1, N + 1).filled(1.0f);
     for (Index seen = 2; seen <= N; ++seen)
         for (Index ones = 0; ones <= seen; ++ones) shares.array()(seen, ones) = float(double(ones * (seen - ones)) / double((seen / 2) * (seen - seen / 2)));
@@ -77,8 +77,8 @@ void pair_costs(Array<const float, 3> details, Array<const double, 3> offsets, I
     });
 }
 
-// Interpolate the costs of candidate k to all pixels, and keep what each pixel's least cost needs. Candidates come in
-// rising order from 0 on. slopes (h, w, 3) and constants (h, w): costs as a linear function of the guide's colours, at
+// Interpolate the costs of candidate k to all pixels, and update each pixel's least cost. Candidates come in rising
+// order from 0. slopes (h, w, 3) and constants (h, w): costs as a linear function of the guide's colours, at
 // every step-th row and column; guide (H, W, 3); labels (H, W), candidate of least cost so far; kept (H, W, 5), least
 // cost so far, cost of the candidate before it, of that after it, of candidate k - 1, and the sum.
 void keep_least(Index k, Array<const float, 3> slopes, Array<const float, 2> constants, Array<const float, 3> guide, Index step, Array<std::int64_t, 2> labels,
@@ -108,7 +108,7 @@ void keep_least(Index k, Array<const float, 3> slopes, Array<const float, 2> con
     });
 }
 
-// For each pixel, the value of least absolute differences to its datum and to its neighbours as they are, all (H, W).
+// For each pixel, the value of least absolute differences from its datum and its current neighbours, all (H, W).
 // Neighbours are up to radius times gap pixels away, every gap-th one; table: weight of one by the squared difference
 // of colours, an entry for each per_entry, 0 beyond. A window's weights add up to less than 2^31.
 void median_pass(Array<const std::int32_t, 2> current, Array<const std::int32_t, 2> data, Array<const std::int32_t, 2> data_weights,
@@ -125,7 +125,7 @@ void median_pass(Array<const std::int32_t, 2> current, Array<const std::int32_t,
             for (Index v = std::max(y - reach, y % gap); v < std::min(y + reach + 1, H); v += gap) {
                 for (Index u = std::max(x - reach, x % gap); u < std::min(x + reach + 1, W); u += gap) {
                     const Index entry = Index(squared_distance(guide.at(v, u), own) * scale), last = table.shape[0] - 1;
-                    // written in any case, and kept where it counts: branches would be guessed wrong
+                    // written always, and counted if it matters, since branches would be mispredicted
                     values[count] = current(v, u), weights[count] = table(std::min(entry, last));
                     count += (entry <= last) & ((v != y) | (u != x));
                 }

@@ -5,8 +5,8 @@
 namespace sepi::occ {
 namespace {
 
-// What the halves of P patches show of views sheared by a candidate, sheared (N, 3, H, W), counted from the colours of
-// the reference view (3, H, W): means (P, 2, 3), and variances (P, 2), means over the channels.
+// Colours of the halves of P patches in views sheared by a candidate, sheared (N, 3, H, W), relative to the reference
+// view (3, H, W): means (P, 2, 3), and variances (P, 2), means over the channels.
 // places (P, 3): row, column and number of the edge's orientation; halves (orientations, 2, N): views of the two halves,
 // of which none is empty.
 void moments_of_halves(Array<const float, 4> sheared, Array<const float, 3> reference, Strided<const std::int64_t, 2> places,

@@ -1,7 +1,7 @@
-// The spinning parallelogram operator: what lies on either side of a line, as histograms.
+// The spinning parallelogram operator: histograms of both sides of a line.
 //
-// An EPI is worked off along its columns. The histograms of the columns in reach are held in a ring, so that each column
-// is counted once for all the parallelograms that it lies in.
+// An EPI is processed column by column. A ring keeps the histograms of the columns in reach, so that each column is
+// counted once for all parallelograms that contain it.
 #include "kernels/arguments.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
@@ -9,7 +9,7 @@
 namespace sepi::spo {
 namespace {
 
-// The lower of the two bins that a colour counts for, those of all channels numbered through, and what counts for the upper.
+// The lower of the two bins of a colour, numbered over all channels, and the weight of the upper one.
 struct Entry {
     std::int32_t bin;
     float share;

@@ -9,7 +9,7 @@
 namespace sepi::mixture {
 namespace {
 
-// Mean absolute deviation of the other surface's disparity: as part of its distance, and the least, pixels per view step.
+// Mean absolute error about the other surface's disparity: as a share of its distance, and least, pixels per view step.
 constexpr double RIM_WIDTH = 0.2, LEAST_RIM = 0.01;
 
 // Parameters of each pixel's error, (H, W).
@@ -20,11 +20,11 @@ struct ErrorMixture {
 };
 
 constexpr int EVALUATIONS = 60;
-constexpr double FARTHEST = 1e12;   // no bound is farther away, pixels
-constexpr double PRECISION = 1e-3;  // of the bounds, relative; of the probability beyond them, too
-constexpr Index AT_ONCE = 32;       // pixels: loops over them vectorise
+constexpr double FARTHEST = 1e12;   // largest distance of a bound, pixels
+constexpr double PRECISION = 1e-3;  // relative precision of the bounds, and of the probability beyond them
+constexpr Index AT_ONCE = 32;       // pixels computed together, so that loops vectorise
 
-// A probability, and how fast it falls.
+// A probability, and its negative derivative.
 struct Share {
     double beyond, density;
 };
@@ -35,14 +35,14 @@ struct Share {
     return {x > 0 ? half : 1 - half, half / width};
 }
 
-// Errors of at most AT_ONCE pixels side by side, in one direction.
+// Errors of at most AT_ONCE pixels in one direction.
 struct PixelErrors {
     const Index number;
     const float *scale, *outlier_scale, *outlier, *rim, *above, *below;
 
-    // The narrow part of the error.
+    // Error about the map.
     double own(Index i) const { return 1.0 - outlier[i] - rim[i]; }
-    // Part of the probability of the other surface that the nearer one has: the farther away, the likelier.
+    // Share of rim's probability in this direction: the larger distance is more likely.
     double share(Index i) const { return (above[i] * above[i] + 1e-6) / (above[i] * above[i] + below[i] * below[i] + 2e-6); }
     static double width(double distance) { return RIM_WIDTH * distance + LEAST_RIM; }
 
@@ -58,8 +58,7 @@ struct PixelErrors {
     }
 
     // Distances above the map beyond which the truth lies with probability tail: Newton's method for the logarithm of the
-    // probability, nearly a line, from where the heavier of the narrow parts alone would have its bound; halving what is left
-    // where it leads astray.
+    // probability, which is nearly linear. It starts at the bound of the heavier part alone, with bisection as fallback.
     void bounds(double tail, float *out) const {
         double found[AT_ONCE], low[AT_ONCE] = {}, high[AT_ONCE];
         for (Index i = 0; i < number; ++i) {
@@ -73,7 +72,7 @@ struct PixelErrors {
             for (Index i = 0; i < number; ++i) {
                 const double x = found[i];
                 const Share here = beyond(i, x);
-                // the logarithm of the ratio to tail, where it is near 1
+                // logarithm of the ratio to tail, near 1
                 const double f = 2 * (here.beyond - tail) / (here.beyond + tail), next = x + f * here.beyond / here.density;
                 const double least = f > 0 ? x : low[i], most = f > 0 ? high[i] : x, half = most == FARTHEST ? 2 * least : 0.5 * (least + most);
                 const double better = least < next && next < most ? next : half;

@@ -1,4 +1,4 @@
-// Mean shift: climbing from points to the modes of the distribution round them.
+// Mean shift: modes of a distribution near points.
 #include <array>
 #include <cmath>
 
@@ -10,11 +10,11 @@ namespace sepi::mean_shift {
 namespace {
 
 constexpr int ITERATIONS = 5;
-// Where the search for a mode of samples ends: iterations, or an update's part of the bandwidth.
+// End of the search for a mode: number of iterations, or update relative to the bandwidth.
 constexpr int MAX_ITERATIONS = 50;
 constexpr double TOLERANCE = 1e-3;
 
-// exp of numbers up to 0; within some roundings, and next to nothing below -87.
+// exp of numbers up to 0, within a few roundings; nearly 0 below -87.
 Float8 exp_of_negative(Float8 x) {
     const Float8 n = whole(x * spread(1.44269504f));
     // the logarithm of two in two parts: products of the first with n are exact
@@ -35,7 +35,7 @@ Pixels load_pixels(Array<const float, 3> planes, Index y, Index x) {
 Float8 modes_of(Array<const float, 3> planes, Index y, Index x, Index radius) {
     Pixels where = load_pixels(planes, y + radius, x + radius);
     for (int i = 0; i < ITERATIONS; ++i) {
-        // sums of weights by how near each pixel is to where
+        // sums of weights by the distance of each pixel from the current point
         Float8 total{};
         Pixels sums{};
         for (Index v = y; v <= y + 2 * radius; ++v) {
@@ -48,15 +48,15 @@ Float8 modes_of(Array<const float, 3> planes, Index y, Index x, Index radius) {
                 for (int c = 0; c < 4; ++c) sums[c] = fma(weight, there[c], sums[c]);
             }
         }
-        // the pixel itself starts with weight one, so the total never vanishes at once
+        // the pixel itself starts with weight one, so the first total is not 0
         for (int c = 0; c < 4; ++c) where[c] = spread(1e-6f) <= total ? sums[c] / total : where[c];
     }
     return where[3];
 }
 
-// Disparity, times unit, of the mode that each pixel of the mask (H, W) belongs to, in modes (H, W); others stay.
-// planes (4, H + 2 radius, W + 2 radius + room), with a margin of what is like nothing, are three colours and disparity
-// in units of their bandwidths.
+// Disparity, times unit, of the mode of each pixel of the mask (H, W), into modes (H, W); others stay unchanged.
+// planes (4, H + 2 radius, W + 2 radius + room): three colours and disparity in units of their bandwidths, with a margin
+// of values like no others.
 void patch_modes(Array<const float, 3> planes, Array<const bool, 2> mask, Index radius, float unit, Array<float, 2> modes) {
     const Index W = mask.shape[1];
     parallel_for(0, mask.shape[0], [&](Index y) {

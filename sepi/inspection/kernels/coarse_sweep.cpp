@@ -8,15 +8,15 @@
 namespace sepi::coarse_sweep {
 namespace {
 
-constexpr Index ROWS = 16;  // that one thread holds for all candidates: they stay within a few MB
-constexpr Index LINE = 16;  // numbers in a line of the cache: planes of costs do not begin in the same of its sets
+constexpr Index ROWS = 16;  // rows of a thread for all candidates, a few MB
+constexpr Index LINE = 16;  // numbers in a cache line, so that planes of costs begin in different cache sets
 constexpr float INFINITE = std::numeric_limits<float>::infinity();
 
 void add(const float *row, Index n, float *__restrict out) {
     for (Index x = 0; x < n; ++x) out[x] += row[x];
 }
 
-// Mean difference of row y from what the views show of it at a candidate; infinite where fewer than half of them see it.
+// Mean difference of row y from its samples in the views at a candidate; infinite where fewer than half of them see it.
 // seen (W) is scratch.
 void row_costs(Array<const float, 2> reference, Array<const float, 3> views, Array<const float, 2> offsets, float candidate, float truncation, Index y,
                float *__restrict seen, float *__restrict cost) {

@@ -1,4 +1,4 @@
-// What the check of the views' order looks at.
+// Matching for the check of the views' order.
 #include <cmath>
 #include <limits>
 
@@ -9,18 +9,18 @@
 namespace sepi::view_order {
 namespace {
 
-constexpr float HALF = 0.25f;  // difference of two patches that counts one half, as part of the patch's own variation
+constexpr float HALF = 0.25f;  // difference of two patches that counts one half, as a share of the patch's own variation
 
 // Square part of a picture, which begins at (y, x).
 Array<const float, 2> patch_at(Array<const float, 2> picture, Index y, Index x, Index side) {
     return {picture.at(y, x), {side, side}, {picture.strides[0], 1}};
 }
 
-// Where a patch of the reference view begins in another, if that shows all of it.
+// Position of a patch of the reference view in another view, if the whole patch lies inside.
 std::optional<Place> patch_within(Array<const float, 2> view, Index y, Index x, float d, float down, float across, Index side) {
     const Index H = view.shape[0] - side, W = view.shape[1] - side;
     const auto place = place_within(double(y) - double(d * down), double(x) - double(d * across), H + 1, W + 1);
-    // and the row and column beyond, of which samples take
+    // and the next row and column, for interpolation
     return place && place->row < H && place->column < W ? place : std::nullopt;
 }
 
@@ -38,8 +38,8 @@ float squares_of(Array<const float, 2> patch, Array<const float, 2> view, const 
     return total;
 }
 
-// How badly points (P, 2) of the reference view (H, W), more than radius pixels from its border, match the other views
-// (V, H, W) under layouts whose baselines are offsets (L, V, 2), at disparities candidates (K).
+// Matching costs of points (P, 2) of the reference view (H, W), more than radius pixels from its border, with the other
+// views (V, H, W) under layouts with baselines offsets (L, V, 2), at disparities candidates (K).
 // cost (P, L): lowest mean over the views of r^2 / (r^2 + s^2), 0..1, where s^2 is a part of the patch's own variation;
 // 1 where no candidate keeps half of the views in sight. disparity (P, L): the candidate of the lowest.
 void layout_costs(Array<const float, 2> reference, Array<const float, 3> views, Array<const float, 3> offsets, Array<const float, 1> candidates,
@@ -51,11 +51,11 @@ void layout_costs(Array<const float, 2> reference, Array<const float, 3> views, 
         float squares = 0;
         for (Index i = 0; i < side; ++i)
             for (Index j = 0; j < side; ++j) squares += patch(i, j) * patch(i, j);
-        // never zero, so that nothing is divided by it
+        // above 0, as a divisor
         const float variation = HALF * squares + 1e-12f;
         for (Index n = 0; n < L; ++n) {
             float least = 1, best = 0;
-            // from the middle outwards: most points move little, and what matches well ends the sums of the others early
+            // from the middle outwards, since most points move little, and a good match ends the other sums early
             for (Index i = 0; i < candidates.shape[0]; ++i) {
                 const Index k = candidates.shape[0] / 2 + (i % 2 ? -(i + 1) / 2 : i / 2);
                 float total = 0;
@@ -66,7 +66,7 @@ void layout_costs(Array<const float, 2> reference, Array<const float, 3> views, 
                     const float found = squares_of(patch, views[v], *place);
                     total += found / (found + variation);
                     ++seen;
-                    // the mean stays above the lowest, whatever the views that are left say
+                    // the mean stays above the lowest for any result of the remaining views
                     if (total >= least * double(seen + V - 1 - v)) break;
                 }
                 if (2 * seen >= V && total < least * double(seen)) {
@@ -80,8 +80,8 @@ void layout_costs(Array<const float, 2> reference, Array<const float, 3> views, 
     });
 }
 
-// Mean squared difference (H, W) of each pixel's window and where it should be seen in a view, baseline (2) view steps
-// down and across; infinite where it is not asked for, and where the window leaves either picture.
+// Mean squared difference (H, W) between each pixel's window and its position in a view at baseline (2) view steps down
+// and across; infinite where not wanted, and where the window leaves either picture.
 void residuals(Array<const float, 2> reference, Array<const float, 2> view, Array<const float, 1> baseline, Array<const float, 2> disparity,
                Array<const bool, 2> asked, Index radius, Array<float, 2> out) {
     const Index H = reference.shape[0], W = reference.shape[1], side = 2 * radius + 1;

@@ -1,20 +1,20 @@
-// Base-detail decomposition: a bilateral filter whose result is taken away at once.
+// Base-detail decomposition: the difference from a bilateral filter.
 //
-// The weight exp(-q) of a difference is computed as (1 - q / 32)^32, which differs from it by 0.01 at most, ends, and is
-// made of multiplications. Each pair of pixels is weighed once, for both.
+// The weight exp(-q) of a difference is computed as (1 - q / 32)^32, which differs by at most 0.01, reaches 0, and needs
+// only multiplications. The weight of each pair of pixels is computed once for both.
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi::base_detail {
 namespace {
 
-// Rows that a thread does at a stretch: those of the windows are converted once for all of them.
+// Rows of a turn of a thread, for which rows of the windows are converted once.
 constexpr Index ROWS_AT_ONCE = 32;
 
-// Least root of a weight: its 32nd power is lost in any sum, and no subnormal number, with which processors are slow.
+// Least root of a weight: its 32nd power vanishes in any sum, and is not a slow subnormal number.
 constexpr float LEAST = 0.125f;
 
-// Weights and means that belong to a row of pixels, for dx = 0, and from there to those for the next dx.
+// Weights and means of a row of pixels for dx = 0, and stride to those for the next dx.
 struct Neighbours {
     const float *weights;
     Index next_weights;
@@ -29,9 +29,9 @@ struct Stretch {
     const Index number, width;
 
     const Index radius = nearness.shape[0] - 1, step = width + 2 * (radius + LANES);
-    // the channels and their mean; weights look at twice the radius beyond the ends
+    // the channels and their mean; weights need twice the radius beyond the ends
     const Scratch<float, 3> rows = zeros<float, 3>(4, number + 2 * radius, width + 4 * radius + LANES);
-    // weights of the pixel dx across, at dx + radius; what comes of them: weighted differences, and weights
+    // weights of the pixel dx across, at dx + radius; sums of weighted differences, and of weights
     const Scratch<float, 2> all_pairs = zeros<float, 2>(2 * radius + 1, step);
     const Scratch<float, 3> sums = zeros<float, 3>(2, number, width + LANES);
 
@@ -92,8 +92,7 @@ struct Stretch {
         }
     }
 
-    // Add weighted pixels of the window to every pixel of row y, in the order of dx: what they differ by from it, since that
-    // is rounded less than what they are.
+    // Add weighted pixels of the window to every pixel of row y, in the order of dx, as differences, which round less.
     template <class... Rows>
     void add_weighted(Index y, Index first, Index last, Rows... neighbours) {
         float *totals = sums.array().at(0, y), *weights = sums.array().at(1, y);
@@ -112,10 +111,10 @@ struct Stretch {
     }
 };
 
-// Mean of the channels without its edge-preserving mean, in detail_unit, of rows from low on of the views that are
-// present: views (T, S, H, W, 3), which unit makes span 0..1, out (T, S, n, W). Other views are left as they are.
-// The window is a disc of pixels so far down and across, whose weights are nearness (radius + 1, radius + 1); of colours they
-// fall off by 1 / (64 s^2), s being the sum of the RGB differences that is an edge.
+// Mean of the channels minus its edge-preserving mean, in detail_unit, of rows from low on of the present views:
+// views (T, S, H, W, 3), times unit in 0..1, out (T, S, n, W). Other views stay unchanged. The window is a disc with
+// weights nearness (radius + 1, radius + 1) by distance; weights by colour fall by 1 / (64 s^2), where s is the sum of
+// RGB differences at an edge.
 void detail_of_views(const Views &views, float unit, Array<const bool, 2> present, Index low, Array<const float, 2> nearness, float falloff,
                      float detail_unit, Array<std::int16_t, 4> out) {
     over_stretches(present.shape, out.shape[2], ROWS_AT_ONCE, [&](Index t, Index s, Index first, Index number) {

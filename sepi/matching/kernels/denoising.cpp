@@ -8,12 +8,12 @@ namespace {
 // Views that are written to, (T, S, H, W, C).
 using NewViews = std::variant<Array<std::uint8_t, 5>, Array<std::uint16_t, 5>, Array<float, 5>>;
 
-constexpr Index ROWS_AT_ONCE = 32;  // of a view, that a thread does at a stretch
-constexpr float SHARE = 0.640625f;  // of white noise's variance, what the binomial mean takes away
-constexpr Index REACH = 2;          // of the window over which the detail's energy is averaged
-constexpr Index SIDE = 1 + REACH;   // rows beyond a stretch that it needs
+constexpr Index ROWS_AT_ONCE = 32;  // rows of a view for a turn of a thread
+constexpr float SHARE = 0.640625f;  // share of white noise's variance in the detail
+constexpr Index REACH = 2;          // radius of the window over which the detail's energy is averaged
+constexpr Index SIDE = 1 + REACH;   // rows needed beyond a turn
 
-// Variance at a brightness, by the last line that begins below it.
+// Variance at a brightness, from the last line that begins below it.
 Float8 variance_at(Float8 level, Array<const float, 2> lines) {
     Float8 line[] = {spread(lines(0, 0)), spread(lines(0, 1)), spread(lines(0, 2)), spread(lines(0, 3))};
     for (Index n = 1; n < lines.shape[0]; ++n) {
@@ -27,8 +27,8 @@ Float8 binomial_mean(const float *before, const float *here, const float *after)
     return 0.5f * load(here) + 0.25f * (load(before) + load(after));
 }
 
-// Some rows of a view, and SIDE above and below: their mean 1 2 1 along both axes, mirrored at the sides, and the detail
-// that it takes away, of all but the first and last.
+// Some rows of a view, and SIDE above and below: their mean by 1 2 1 along both axes, mirrored at the borders, and the
+// detail, the difference from it, of all but the first and last row.
 class Stretch {
   public:
     Stretch(const Views &views, Index t, Index s, Index first, Index number, float full)
@@ -91,10 +91,10 @@ class Stretch {
     const Scratch<float, 1> energies_ = zeros<float, 1>(width_ + 2 * REACH + LANES), least_ = zeros<float, 1>(width_ + LANES);
 };
 
-// Views (T, S, H, W, C) without what noise alone explains, of those that are present, into out, of the same type. full is
-// the value of white. noise (N, 4) says from which brightness on, which rises, the noise of one channel has a variance of
-// noise[2] + (brightness - noise[0]) / noise[1] * noise[3]; the first is below all. Detail is kept as far as its energy exceeds
-// least (H, W) times that. Whole numbers are rounded and cut off at black and white.
+// Present views (T, S, H, W, C) without detail that noise alone explains, into out, of the same type. full is the value
+// of white. A row of noise (N, 4) holds from brightness noise[0] on, rising from row to row: the noise of one channel has
+// the variance noise[2] + (brightness - noise[0]) / noise[1] * noise[3]. Detail stays as far as its energy exceeds least
+// (H, W) times this. Integers are rounded and clipped at black and white.
 void denoise_views(const Views &views, Array<const bool, 2> present, float full, Array<const float, 2> noise, Array<const float, 2> least,
                    const NewViews &out) {
     const Index H = shape_of(views)[2], W = shape_of(views)[3], C = shape_of(views)[4];

@@ -1,4 +1,4 @@
-// What is seen through gaps: farther surfaces of a like colour, and how well both depths fit.
+// Surfaces seen through gaps: farther surfaces of a similar colour, and residuals at both depths.
 #include <cmath>
 #include <vector>
 
@@ -8,8 +8,8 @@
 namespace sepi::gaps {
 namespace {
 
-// Of a bilinear sample of a view (H, W, 3), from reference (3,), in units of what noise makes of it: samples between pixels
-// average noise. Products of 16 bits and a weight are exact as double.
+// Squared residual of a bilinear sample of a view (H, W, 3) from reference (3,), in units of its expectation by noise,
+// which interpolation averages. Products of 16 bits and a weight are exact in double precision.
 template <class Colour>
 auto squared_residual(Array<const Colour, 3> view, float unit, double row, double column, Array<const float, 1> reference) {
     using Number = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, float>;
@@ -27,12 +27,12 @@ auto squared_residual(Array<const Colour, 3> view, float unit, double row, doubl
     return total / (1 + (fx * fx + (1 - fx) * (1 - fx)) * (fy * fy + (1 - fy) * (1 - fy)));
 }
 
-// How many of most steps from i stay in a line of n.
+// Number of steps, up to most, from i that stay in a line of n.
 Index steps_within(Index i, Index direction, Index n, Index most) { return std::min(most, direction < 0 ? i : direction > 0 ? n - 1 - i : most); }
 
-// Disparity (H, W) of the closest farther pixel of a like colour, straight or at 45 degrees from each, its own if none;
-// of two that are as close the farther. lowest (H, W) is the least within reach pixels across and down; farther is more
-// than least_step away, and colours (H, W, 3) are alike below a squared distance2.
+// Disparity (H, W) of the closest farther pixel of a similar colour, along rows, columns and diagonals from each pixel;
+// its own if there is none; of two equally close ones the farther. lowest (H, W) is the least disparity within reach
+// pixels across and down. Farther means by more than least_step; colours (H, W, 3) are similar below distance2, squared.
 void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest, Array<const float, 3> colours, Index reach,
                    float least_step, float distance2, Array<float, 2> farther) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
@@ -57,10 +57,10 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
     });
 }
 
-// Squared residuals at two depths of the pixels of rows begin..end, in views (T, S, H, W, 3), which unit makes span 0..1, from
-// the reference view (H, W, 3) in 0..1: added to sums (3, H, W) are those at the farther depth, at the other one, and of how
-// many views they are. Asked is where nothing hides the farther depth; where both are equal nothing is compared. The residual of
-// one view counts at most so much.
+// Squared residuals at two depths of the pixels of rows begin..end, in views (T, S, H, W, 3), times unit in 0..1, from
+// the reference view (H, W, 3) in 0..1. Adds to sums (3, H, W) the residuals at the farther depth, at the other one, and
+// the number of views. asked: views in which nothing hides the farther depth. Pixels with equal depths are left out. The
+// residual of one view has an upper limit.
 void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float,
                     3> reference, const AskedViews &asked, float most, Index begin, Index end, Array<float, 3> sums) {
     const Index W = disparity.shape[1];

@@ -10,17 +10,17 @@
 namespace sepi::gauss_newton {
 namespace {
 
-// Pixels of a row that are done together: all that is known of them stays in the first cache.
+// Pixels of a row computed together, so that their data stays in the first cache.
 constexpr Index AT_ONCE = 128;
 
-// What an iteration needs of the views: the fields of sepi.matching.spline_views.SplineViews, in their order.
+// Views for an iteration: the fields of sepi.matching.spline_views.SplineViews, in their order.
 struct SplineViews {
     Array<const std::int16_t, 5> splines;    // (T, S, n + 2 SPLINE_MARGIN, W + 2 SPLINE_MARGIN, 4)
-    float unit;                              // what they are multiplied with
+    float unit;                              // factor of the splines
     Index low;                               // the row after the margin
     Array<const float, 3> reference;         // (H, W, 4)
-    Strided<const std::int64_t, 2> places;   // (N, 2), of the views that are compared, in the grid
-    Array<const float, 2> baselines;         // (N, 2), theirs, down and across
+    Strided<const std::int64_t, 2> places;   // (N, 2), grid positions of the compared views
+    Array<const float, 2> baselines;         // (N, 2), their baselines, down and across
     Array<const float, 1> scales2, shares;   // of colours and of detail
 
     bool fields(auto visit) { return visit(splines, unit, low, reference, places, baselines, scales2, shares); }
@@ -38,22 +38,22 @@ using Four = std::array<Float8, 4>;
 
 constexpr std::int32_t ONE = 1 << 15;  // the sum of the weights of coefficients, along either axis
 
-// Eight pixels of a row, what they are compared with, and where the view at hand has them.
+// Eight pixels of a row, their reference colours, and their positions in the current view.
 struct Pixels {
     Float8 x, disparity;
     Four own;
     Int8 inside;
-    std::uint32_t nearest[LANES], coefficients[LANES];  // what hides them, and the first of their coefficients
-    std::int32_t weights[6][LANES];                     // of these, in pairs: of the four rows each twice, of the columns the first two and the others
+    std::uint32_t nearest[LANES], coefficients[LANES];  // indices into the z-buffer, and of their first coefficients
+    std::int32_t weights[6][LANES];                     // of coefficients, in pairs: each of the four rows twice, the first two columns, the other two
 };
 
-// Whole weights, of sum ONE, of the four coefficients round a position, by how far it is beyond the second.
+// Integer weights, of sum ONE, of the four coefficients round a position, by its distance beyond the second.
 std::array<Int8, 4> coefficient_weights(Float8 f) {
     constexpr float ALL = ONE, THIRDS = float(2.0 / 3);
     const Float8 g = 1.0f - f;
     const Int8 before = truncated(g * g * g * (ALL / 6) + 0.5f), after = truncated(f * f * f * (ALL / 6) + 0.5f);
     const Int8 left = truncated((THIRDS - f * f * (1.0f - f * 0.5f)) * ALL + 0.5f), right = truncated((THIRDS - g * g * (1.0f - g * 0.5f)) * ALL + 0.5f);
-    // what rounding leaves belongs to the larger, so that a mirrored picture is sampled alike
+    // the larger weight gets the remainder of rounding, so that mirrored pictures give mirrored samples
     const Int8 rest = ONE - before - left - right - after, nearer = left >= right;
     return {before, left + (rest & nearer), right + (rest & ~nearer), after};
 }
@@ -66,7 +66,7 @@ Four transposed_halves(const Four &rows) {
     return {low(a, b), high(a, b), low(c, d), high(c, d)};
 }
 
-// What is known of one of the views, number n of them; pictures (H, W).
+// View number n; pictures (H, W).
 struct View {
     const SplineViews &views;
     const Seeing &seeing;
@@ -80,15 +80,15 @@ struct View {
     // from the one before the picture on
     const std::int16_t *const coefficients = views.splines.at(t, s, SPLINE_MARGIN - 1, SPLINE_MARGIN - 1);
 
-    // Find pixels of a row.
+    // Compute the positions of a row's pixels.
     void find(Index row, Pixels &pixels) const {
         const Float8 up = pixels.disparity * down, back = pixels.disparity * across;
         Float8 y = float(row) - up, x = pixels.x - back;
         pixels.inside = (y >= 0.0f) & (y <= bottom) & (x >= 0.0f) & (x <= right);
-        // the nearest position, halves alike from either side
+        // nearest position, with halves rounded symmetrically
         const Int8 position = (std::int32_t(row - low) - rounded(up)) * std::int32_t(width) + truncated(pixels.x) - rounded(back);
         store(pixels.nearest, pixels.inside ? position : Int8{});
-        // of what is outside, a corner is looked at
+        // pixels outside read a corner
         y = pixels.inside ? y : spread(float(low));
         x = pixels.inside ? x : Float8{};
         const Int8 top = truncated(y), left = truncated(x);
@@ -96,12 +96,12 @@ struct View {
         const auto rows = coefficient_weights(y - __builtin_convertvector(top, Float8)), columns = coefficient_weights(x - __builtin_convertvector(left, Float8));
         for (Index n = 0; n < 4; ++n) store(pixels.weights[n], rows[n] | rows[n] << 16);
         for (Index n = 0; n < 2; ++n) store(pixels.weights[4 + n], columns[2 * n] | columns[2 * n + 1] << 16);
-        // what sampling asks for comes while others are found
+        // prefetch data for sampling
         __builtin_prefetch(nearest + pixels.nearest[0]);
         for (Index n = 0; n < 4; ++n) __builtin_prefetch(coefficients + pixels.coefficients[0] + n * pitch);
     }
 
-    // Sample the four channels of pixels that are found. 1 where the view sees them; where it does not, they are anything.
+    // Sample the four channels of located pixels. Returns 1 where the view sees them; other samples have any value.
     Float8 sample(const Pixels &pixels, Four &channels) const {
         float found[LANES];
         for (int i = 0; i < LANES; ++i) found[i] = nearest[pixels.nearest[i]];
@@ -143,11 +143,11 @@ Four load_channels(Array<const float, 3> image, Index y, Index x, Index count) {
     return {load(channels[0]), load(channels[1]), load(channels[2]), load(channels[3])};
 }
 
-// Of the colours.
+// Derivative weights of the colours.
 Float8 dot(const Four &a, const Four &b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// Of each eight pixels of the rows first..last: begin them, add what each view that sees one of them shows, and write what
-// comes of it, at their row, column and number.
+// For each eight pixels of the rows first..last: begin their sums, add the samples of each view that sees one of them, and
+// write the result, at their row, column and number.
 template <class Sums, class Begin, class Add, class Write>
 void over_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index first, Index last, Begin begin,
                 Add add, Write write) {
@@ -180,7 +180,7 @@ void over_views(const SplineViews &views, const Seeing &seeing, Array<const floa
     });
 }
 
-// Mean of the views that see each pixel, those unlike the reference view counting less, into out (H, W, 4).
+// Mean of the views that see each pixel, with less weight for views unlike the reference view, into out (H, W, 4).
 void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index begin, Index end, Array<float,
                    3> out) {
     struct Mean : Pixels {
@@ -209,12 +209,12 @@ void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const f
         });
 }
 
-// Sums of each pixel, into out (2 or 14, H, W): gradient and curvature, whose ratio is the update towards less cost. And what
-// else the views say, if it is asked: the same by the views to the left, to the right, above and below alone, misfit,
-// agreement, detail's agreement and number of views. mean (H, W, 4) is that of the views, down and across its derivatives.
+// Sums of each pixel, into out (2 or 14, H, W): gradient and curvature, whose ratio is the update towards less cost. If
+// wanted, also the same over the views to the left, to the right, above and below only, misfit, agreement, agreement of
+// the detail, and number of views. mean (H, W, 4) is the views' mean, down and across its derivatives.
 void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Array<const float, 3> mean,
                         Array<const float, 3> down, Array<const float, 3> across, Index begin, Index end, Array<float, 3> out) {
-    // slope and curvature, of colours and of detail; and what else is asked
+    // slope and curvature, of colours and of detail; and further sums
     struct Equations : Pixels {
         Four down, across;  // derivatives of what pixels are compared with
         Four sums;

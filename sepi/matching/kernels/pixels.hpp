@@ -1,4 +1,4 @@
-// Views as pictures have them, and what kernels do alike with their rows.
+// Views of any picture type, and operations on their rows that kernels share.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,7 @@
 
 namespace sepi {
 
-// Views (T, S, H, W, C), of any of the types that pictures have.
+// Views (T, S, H, W, C) of any picture type.
 using Views = std::variant<Strided<const std::uint8_t, 5>, Strided<const std::uint16_t, 5>, Strided<const float, 5>>;
 
 // Coefficients of a spline beyond each side of a view.
@@ -21,8 +21,8 @@ inline const Index *shape_of(const Views &views) {
     return std::visit([](const auto &some) { return some.shape; }, views);
 }
 
-// Views that are asked whether something hides a pixel of the reference view: asked (T, S), how far they are from it
-// (T, S, 2), and their z-buffers (T, S, n, W), rows from low on. An occluder is nearer by more than margin.
+// Views for the occlusion of reference pixels: mask asked (T, S), baselines (T, S, 2), and z-buffers (T, S, n, W), rows
+// from low on. An occluder is nearer by more than margin.
 struct AskedViews {
     Array<const bool, 2> asked;
     Strided<const double, 3> baselines;
@@ -41,7 +41,7 @@ struct AskedViews {
     }
 };
 
-// Calls body(t, s, first, number) for stretches of at most so many of the n rows of each view of a grid.
+// Calls body(t, s, first, number) for groups of the n rows of each view of a grid.
 template <class Body>
 void over_stretches(const Index (&grid)[2], Index n, Index rows, const Body &body) {
     const Index S = grid[1], pieces = (n + rows - 1) / rows;
@@ -51,8 +51,8 @@ void over_stretches(const Index (&grid)[2], Index n, Index rows, const Body &bod
     });
 }
 
-// Rows from first on of a view (H, W, C), which goes on mirrored: each channel by itself into out (C or more, n, W or more),
-// as what scale makes of numbers and of vectors of float.
+// Rows from first on of a view (H, W, C), mirrored at its ends: channel by channel into out (C or more, n, W or more), as
+// scale converts numbers and vectors.
 template <class Colour, class Number, class Scale = std::identity>
 void load_rows(Array<const Colour, 3> view, Index first, Array<Number, 3> out, Scale scale = {}) {
     const Index W = view.shape[1], C = std::min(view.shape[2], out.shape[0]);
@@ -110,14 +110,14 @@ void window_weights(Array<const float, 3> guide, Index y, Index begin, Index end
     }
 }
 
-// Where the parabola through three costs side by side is least, from the middle one; 0 if it bends by no more than so much.
+// Minimum of the parabola through three adjacent costs, from the middle one; 0 for a curvature up to a limit.
 template <class Number>
 double vertex(const Number *middle, double least) {
     const double bend = middle[-1] - 2 * double(middle[0]) + middle[1];
     return bend > least ? 0.5f * (middle[-1] - middle[1]) / bend : 0;
 }
 
-// Have a line of n go on mirrored at its ends, by so many numbers.
+// Mirror a line of n at its ends.
 inline void mirror_ends(float *line, Index n, Index beyond) {
     for (Index x = 1; x <= beyond; ++x) {
         line[-x] = line[mirrored(-x, n)];
@@ -125,9 +125,8 @@ inline void mirror_ends(float *line, Index n, Index beyond) {
     }
 }
 
-// Sums of n lines of products, into out: add(total, k, x) adds number k of eight of them. Several vectors at a time: each waits
-// for its last product, and the others need not; where how many there are is known beforehand, one loop becomes of all.
-// Lines have LANES numbers behind them.
+// Sums of n lines of products, into out: add(total, k, x) adds number k of eight of them. Several vectors at a time hide
+// the latency of additions; a known number of vectors lets the compiler unroll the loop. Lines go on for LANES numbers.
 template <class Number, class Add>
 void sum_products(Index n, Number products, float *out, Add add) {
     const auto block = [&]<int SIZE>(Index x, std::integral_constant<int, SIZE>) {

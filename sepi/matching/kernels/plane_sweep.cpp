@@ -1,12 +1,11 @@
 // The plane sweep: photo-consistency, its aggregation over windows, and the best candidate.
 //
-// One (candidate, view) has one sub-pixel weight for the whole picture. Candidates next to each other mostly have their
-// samples between the same four pixels; what lies between these is a polynomial of the disparity, and so is the squared
-// difference: eight pixels' coefficients stay in registers while the candidates are gone through.
+// A (candidate, view) has one sub-pixel weight for the whole picture. Neighbouring candidates mostly have their samples
+// between the same four pixels. A sample there is a polynomial of the disparity, and so is the squared difference: the
+// coefficients of eight pixels stay in registers during the loop over candidates.
 //
-// No cost volume is ever held: a thread keeps the cost rows of one aggregation window, and the minimum is taken as soon
-// as a pixel is aggregated. Each pixel is summed by one thread in a fixed order: results do not depend on the number of
-// threads.
+// There is no cost volume: a thread keeps the cost rows of one aggregation window, and takes the minimum as soon as a
+// pixel is aggregated. One thread sums each pixel in a fixed order, so results do not depend on the number of threads.
 #include <cmath>
 #include <cstring>
 #include <vector>
@@ -18,11 +17,11 @@
 namespace sepi::plane_sweep {
 namespace {
 
-// Columns of a row whose costs are found, and aggregated, together.
+// Columns of a row whose costs are computed and aggregated together.
 constexpr Index BLOCK = 32;
 
 constexpr Index BLOCK_ROW = BLOCK + LANES;  // the last vector reaches beyond a block
-constexpr Index AT_ONCE = 64;               // costs of a pixel, of all groups and candidates, that are aggregated at once
+constexpr Index AT_ONCE = 64;               // costs of a pixel, over groups and candidates, that are aggregated together
 
 // Columns begin..end of row y.
 struct Run {
@@ -34,8 +33,8 @@ struct Tile {
     Index top, bottom, begin, end;
 };
 
-// Fractional pixels from the pixel above and to the left to the sample at the origin, and by how many pixels the sample
-// moves as the disparity rises by one.
+// Fractional pixels from the pixel above and to the left to the sample at the origin, and shift of the sample in pixels
+// per unit of disparity.
 struct Motion {
     float fy, fx, sy, sx;
 };
@@ -44,8 +43,8 @@ struct Motion {
 struct SquaredDifferences {
     Float8 of[5]{};
 
-    // Add how sample and reference pixel differ in one channel. Upper left neighbours begin at upper, lower left ones at
-    // lower.
+    // Add the squared difference of sample and reference pixel in one channel. Upper left neighbours begin at upper, lower
+    // left ones at lower.
     template <class Colour>
     void add(const Colour *upper, const Colour *lower, const Colour *reference, Motion at) {
         const Float8 left = load(upper), lower_left = load(lower);
@@ -62,12 +61,12 @@ struct SquaredDifferences {
         of[4] = fma(quadratic, quadratic, of[4]);
     }
 
-    // Have them be 0 but for the first pixels.
+    // Set all but the first pixels to 0.
     void keep_first(Index number) {
         for (Float8 &each : of) each = first_lanes(each, number, 0);
     }
 
-    // Rounding makes none negative.
+    // Squared differences, not below 0 by rounding.
     Float8 at(Float8 distance) const {
         Float8 sum = of[4];
         for (int power = 3; power >= 0; --power) sum = fma(distance, sum, of[power]);
@@ -96,7 +95,7 @@ struct ComparedView {
         };
         for (Index here = 0, next; here < K; here = next) {
             for (next = here + 1; next < K && as_before(next);) ++next;
-            // a disparity of 0, which can only be at an end, is one: nothing is rounded there
+            // disparity 0, which lies at an end of a segment, becomes its origin, and so is exact
             const Index origin = disparities[here] >= 0 ? here : next - 1;
             for (Index n = here; n < next; ++n) distances[n] = disparities[n] - disparities[origin];
             segments.push_back({here, next, down[here], across[here], {fy[origin], fx[origin], candidates.sy(r), candidates.sx(c)}});
@@ -124,7 +123,7 @@ struct ComparedViews {
     }
 };
 
-// Of tiles of at most so many columns; maps (3, N, H, W) are of the best disparity, its cost, and the mean cost.
+// Sweep of tiles with a largest number of columns; maps (3, N, H, W): best disparity, its cost, and mean cost.
 struct TileSweep {
     const ViewStack &views;
     const ComparedViews &compared;
@@ -137,12 +136,12 @@ struct TileSweep {
     Tile tile{};
 
     const Index H = mask.shape[0], W = mask.shape[1];
-    // where a view may show less than the picture, all pixels are as those near its border
+    // with missing pixels, all pixels are handled like those near the border
     const Index border = views.shown.shape[2] > 0 ? H + W : Index(std::ceil(candidates.reach)) + window.radius + 1;
     const Index padded = (candidates.disparities.shape[0] + LANES - 1) / LANES * LANES, size = 2 * window.radius + 1;
     // with the columns of the windows at both ends
     const Index columns = width + 2 * window.radius + LANES, parts = (Index(compared.groups.size()) * padded + AT_ONCE - 1) / AT_ONCE;
-    // rows of a window: row r at r % size, column x - radius of the tile at x; what is outside the picture is a number
+    // rows of a window: row r at r % size, column x - radius of the tile at x; finite outside the picture
     const Scratch<float, 4> cost_ring = zeros<float, 4>(size, parts, columns, AT_ONCE);
     const Scratch<float, 4> count_ring = zeros<float, 4>(size, parts, columns, AT_ONCE);
     const Scratch<float, 2> block_costs{padded, BLOCK_ROW}, block_counts{padded, BLOCK_ROW};
@@ -165,7 +164,7 @@ struct TileSweep {
         }
     }
 
-    // Whether the mask has a pixel of the tile in a run, or so near to it.
+    // Whether the mask has a pixel of the tile in a run, or within a distance of it.
     bool wanted(Run run, Index reach) const {
         const Index begin = std::max(tile.begin, run.begin - reach), end = std::min(tile.end, run.end + reach);
         for (Index y = std::max(tile.top, run.y - reach); y < std::min(tile.bottom, run.y + reach + 1); ++y)
@@ -173,13 +172,13 @@ struct TileSweep {
         return false;
     }
 
-    // Whether every view sees what is within so many pixels of a pixel, at every candidate.
+    // Whether every view sees all pixels within a distance of a pixel, at every candidate.
     bool all_seen(Index y, Index x, Index reach) const {
         const Index margin = border + reach;
         return margin <= y && y < H - margin && margin <= x && x < W - margin;
     }
 
-    // Costs of a run where they are needed, and near the border the number of views that see it.
+    // Costs of a run where needed, and near the border the number of views that see its pixels.
     void fill_run(Run run) {
         const Index radius = window.radius;
         while (run.begin < run.end && !wanted({run.y, run.begin, std::min(run.end, run.begin + LANES)}, radius)) run.begin += LANES;
@@ -263,7 +262,7 @@ struct TileSweep {
         for (const auto &[begin, end, down, left, motion] : view.segments) {
             const auto [top, below] = upper_row(run.y, down, motion.fy, H);
             if (top < 0 || top > H - 2) continue;
-            // columns of the run whose samples are shown; on the last column nothing beyond it has a weight
+            // columns of the run whose samples lie inside; on the last column, the next one has weight 0
             const bool all = shown.shape[0] == 0;
             const Index low = all ? 0 : std::max(shown(top, 0), shown(top + 1, 0));
             const Index high = all ? W : std::min(shown(top, 1), shown(top + 1, 1));
@@ -273,7 +272,7 @@ struct TileSweep {
                 SquaredDifferences squares;
                 for (Index c = 0; c < 3; ++c)
                     squares.add(colours.at(c, top, x + left), colours.at(c, top + 1, x + left), reference.at(c, run.y, x), at);
-                // differences of 0 add nothing to what others have added
+                // differences of 0 add nothing
                 if (last - x < LANES) squares.keep_first(last - x);
                 return squares;
             };
@@ -288,7 +287,7 @@ struct TileSweep {
                     for (Index n = begin; n < end; ++n, cost += BLOCK_ROW) add(squares, spread(view.distances[n]), cost);
                     break;
                 }
-                // the next eight as well: what one waits for is time for the other
+                // sixteen pixels at a time, to hide the latency of each
                 const auto next = squares_of(x + LANES);
                 for (Index n = begin; n < end; ++n, cost += BLOCK_ROW) {
                     const Float8 distance = spread(view.distances[n]);
@@ -309,7 +308,7 @@ struct TileSweep {
         const Index K = disparities.shape[0];
         const Subset &subset = compared.subsets[n];
         const Array<float, 1> costs = pixel_costs.array();
-        // what noise takes of the costs: moments of the subset, times weights of the pixel
+        // correction of the costs for noise: moments of the subset, times weights of the pixel
         const float *first = expected.moments.at(0, n), *second = expected.moments.at(1, n);
         const Float8 first_weight = spread(expected.weights(0, y, x)), second_weight = spread(expected.weights(1, y, x));
         constexpr float MOST = 1e9f;
@@ -332,7 +331,7 @@ struct TileSweep {
         Index best = 0;
         while (best < K - LANES && !any(load(costs.at(best)) == spread(lowest))) best += LANES;
         while (best < K - 1 && costs(best) != lowest) ++best;
-        // a perfect match needs no parabola, and the ends of the range allow none
+        // no parabola for a perfect match, or at the ends of the range
         const double offset = lowest != 0 && 0 < best && best < K - 1 ? vertex(costs.at(best), 0) : 0;
         const float sampling = (disparities(K - 1) - disparities(0)) / float(K - 1);
         return {float(disparities(best) + offset * sampling), lowest, sum_of(sum) / float(K)};

@@ -1,18 +1,18 @@
-// Semi-global smoothing of a cost volume, after averaging over pixels of one's own colour. Both volumes are whole numbers of
-// 16 bits: pixel after pixel its candidates, side by side, as many as fill vectors.
+// Semi-global smoothing of a cost volume, after averaging over pixels of similar colour. Both volumes are 16-bit integers:
+// the candidates of a pixel are contiguous, padded to whole vectors, and pixel follows pixel.
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi::semi_global {
 namespace {
 
-// Paths from row to row that a thread follows together: their costs lie side by side, and fit in its cache.
+// Paths from row to row that a thread follows together, with contiguous costs that fit in its cache.
 constexpr Index PATHS_AT_ONCE = 32;
 
-constexpr float ONE = 65535;           // a cost of 1, once averaged
+constexpr float ONE = 65535;           // an averaged cost of 1
 constexpr Index AT_ONCE = 2 * LANES;   // candidates
 constexpr Index ACROSS = 8 * LANES;    // columns of a row that are averaged together
-constexpr std::uint16_t MOST = 0x7FFC;  // cost of a path, in steps of its own; a quarter of eight of them fits in 16 bits
+constexpr std::uint16_t MOST = 0x7FFC;  // largest cost of a path, in its own steps; a quarter of eight of them fits in 16 bits
 
 // Where in a volume the costs of each pixel's candidates are: the fields of sepi.matching.semi_global.Places, in their order.
 struct Places {
@@ -25,7 +25,7 @@ struct Places {
     bool has_all(Index y, Index x) const { return beyond(y, x) - first(y, x) == count; }
 };
 
-// What costs are smoothed with, into out.
+// Smoothing of costs along paths, into out.
 struct Smoothing {
     Array<const std::uint16_t, 1> cost;
     const Places &places;
@@ -35,7 +35,7 @@ struct Smoothing {
 
     const Index K = places.count, H = guide.shape[1], W = guide.shape[2];
 
-    // A step of a path is so many of the averaged costs', as a power of 2: the penalty and a cost together are less than MOST.
+    // Steps of the averaged costs per step of a path, as a power of 2, so that penalty and cost together stay below MOST.
     const int shift = [this] {
         int bits = 1;
         while (bits < 8 && (1 + std::max(1.5 * small, large)) * ONE / double(1 << bits) > 0x8000) ++bits;
@@ -44,15 +44,14 @@ struct Smoothing {
 
     std::uint16_t in_steps(double penalty) const { return std::uint16_t(std::min<double>(MOST, penalty * (ONE / double(1 << shift)) + 0.5)); }
 
-    // One pixel further along a path, from (y - dy, x - dx): path[1:-1] = cost + best - least, which is added to out; the
-    // least of it. The best of: before of the same candidate, of one beside it plus small, and the least of all plus what is
-    // left of large where colours change. before and path have an unreachable candidate at either end; those that
-    // a pixel has not are not reached, either.
+    // Advance a path from (y - dy, x - dx): path[1:-1] = cost + best - least, which is added to out; returns its least.
+    // best is the least of: before at the same candidate, at an adjacent one plus small, and the least of all plus large,
+    // reduced where colours change. Candidates that a pixel does not have, and those at either end, are unreachable.
     std::uint16_t next_pixel(Index y, Index x, Index dy, Index dx, std::uint16_t *before, std::uint16_t least, std::uint16_t *path) const {
         const Index row = y - dy, column = x - dx;
         double penalty = 0;
         if (row < 0 || row >= H || column < 0 || column >= W) {
-            // before the first pixel all candidates cost nothing: its costs are its own
+            // before the first pixel, all candidates cost 0
             std::fill_n(before + 1, K, 0);
             least = 0;
         } else {
@@ -86,7 +85,7 @@ struct Smoothing {
     }
 
     // Paths from row to row in the rows begin..end: those that began in columns from first on.
-    // One that leaves the picture at a side goes on, as a new one, at the other: all have a pixel in each row.
+    // A path that leaves the picture at one side continues as a new one at the other, so that all have a pixel per row.
     // paths (2, n, K' + 2) are their costs in the row before and here, in turn, least (n) the least of the row before.
     void along_lines(Array<std::uint16_t, 3> paths, std::uint16_t *least, Index first, Index begin, Index end, Index dy, Index dx) const {
         for (Index i = begin; i < end; ++i) {
@@ -124,11 +123,11 @@ void aggregate(Array<const float, 3> cost, Index top, Array<const float, 3> guid
         const Scratch<float, 2> weights(size * size, W + LANES);
         const auto exponent = [width = 2 * double(variance)](float apart2) { return -double(apart2) / width; };
         window_weights(guide, y, 0, W, radius, weights.array(), exponent);
-        // what lies beyond the picture weighs nothing: it may be other rows, but for those with no memory beside them
+        // weights beyond the picture are 0, so other rows may be read there, within the memory
         const auto at_ends = zeros<float, 2>(size, W + 2 * radius + LANES);
         const Scratch<const float *, 1> places_of_row(size * size);
         const float *first = cost.data, *last = cost.at(K - 1, cost.shape[1]);
-        // a few candidates at a time: each pixel's are written together
+        // a few candidates at a time, so that those of a pixel are written together
         const Scratch<float, 2> total(LANES, W + LANES);
         for (Index few = 0; few < places.count; few += LANES) {
             const auto has = [&](Index x) { return places.first(y, x) <= few && few < places.beyond(y, x); };
@@ -181,7 +180,7 @@ void semi_global(Array<const std::uint16_t, 1> cost, Array<const float, 3> guide
                 smoothing.along_row(y);
             });
             for (const Index dx : {0, 1, -1}) {
-                // paths of one direction do not meet
+                // paths of one direction have no common pixels
                 parallel_for(0, pieces, [&](Index piece) {
                     const Index number = (dx + 1) * pieces + piece;
                     smoothing.along_lines(paths.array()[number], least.array().at(number), piece * PATHS_AT_ONCE, begin, end, dy, dx);

@@ -8,7 +8,7 @@
 namespace sepi::sheared_views {
 namespace {
 
-// Where the samples of a line lie: whole pixels on, and the weights of the pixels at -1, 0, 1 and 2 from there.
+// Samples of a line: offset in whole pixels, and weights of the pixels at -1, 0, 1 and 2 from there.
 struct Shift {
     Index whole;
     std::array<float, 4> weights;
@@ -22,12 +22,12 @@ struct Shift {
 };
 
 // out[n, c, y, x] = views[n, c, y + offsets[n, 0], x + offsets[n, 1]]; views and out (N, C, H, W), offsets (N, 2).
-// Samples between pixels by cubic convolution, or bilinear; a view goes on as it ends.
+// Samples between pixels by cubic convolution, or bilinear; views repeat their border.
 void shear(Array<const float, 4> views, Strided<const double, 2> offsets, bool cubic, Array<float, 4> out) {
     const Index C = views.shape[1], H = views.shape[2], W = views.shape[3];
     parallel_for(0, views.shape[0], [&](Index n) {
         const Shift down(offsets(n, 0), cubic), across(offsets(n, 1), cubic);
-        // of a row, the pixels that samples look at: one before the first, and two behind the last
+        // pixels of a row that samples use: one before the first, and two after the last
         const Index first = std::clamp<Index>(1 - across.whole, 0, W + 3), last = std::clamp<Index>(W + 1 - across.whole, first, W + 3);
         const Scratch<float, 1> between(W), around(W + 3);
         float *__restrict row = between.array().data, *__restrict pixel = around.array().data;

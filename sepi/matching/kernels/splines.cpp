@@ -9,13 +9,13 @@
 namespace sepi::splines {
 namespace {
 
-// How far the convolution of the views' coefficients reaches; beyond it is a tenth of what rounding to int16 does.
+// Reach of the convolution for the views' coefficients; the rest is a tenth of the rounding to int16.
 constexpr Index SPLINE_REACH = 8;
 
-// How far the convolution reaches where nothing is rounded: beyond it is less than 1e-6.
+// Reach of the convolution without rounding; the rest is below 1e-6.
 constexpr Index FULL_REACH = 12;
 
-// Rows of a view that a thread does at a stretch.
+// Rows of a view for a turn of a thread.
 constexpr Index ROWS_AT_ONCE = 64;
 
 constexpr auto FILTER = [] {
@@ -59,9 +59,9 @@ void spline_coefficients(Strided<const float, 3> image, Array<float, 3> out) {
 // Coefficients of views' colours (T, S, H, W, 3) and detail (T, S, n or 0, W), rounded, into
 // out (T, S, n + 2 SPLINE_MARGIN, W + 2 SPLINE_MARGIN, 4), mirrored in the margins.
 //
-// Colours and detail are multiplied with their units first. Rows of detail begin at detail_low, and reach SPLINE_REACH
-// farther than those that are wanted, or to the picture's end; low is the row after the first SPLINE_MARGIN ones of out.
-// of_colours and of_detail (T, S) have the views whose colours, and whose detail, are wanted; what out has of others stays.
+// Colours and detail are multiplied by their units first. Rows of detail begin at detail_low, and reach SPLINE_REACH
+// beyond those wanted, or to the picture's end; low is the row after the first SPLINE_MARGIN ones of out. of_colours and
+// of_detail (T, S) are masks of the views whose colours, and whose detail, are wanted; others stay unchanged in out.
 void view_splines(const Views &views, float colour_unit, Array<const std::int16_t, 4> detail, float detail_unit, Index detail_low,
                   Array<const bool, 2> of_colours, Array<const bool, 2> of_detail, Index low, Array<std::int16_t, 5> out) {
     const Index H = shape_of(views)[2], width = out.shape[3], W = width - 2 * SPLINE_MARGIN;

@@ -1,28 +1,28 @@
-// Sums over windows that hold one surface.
+// Sums over windows of one surface.
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi::surface_windows {
 namespace {
 
-// Rows that a thread does at a stretch.
+// Rows of a turn of a thread.
 constexpr Index ROWS_AT_ONCE = 32;
 
-// How far two things are alike, 1 up to half a width from each other, 0 from one and a half on.
+// Likeness of two values: 1 up to half a width, 0 from one and a half widths.
 Float8 alike(Float8 apart, float width) { return smaller(larger(1.5f - apart / width, Float8{}), spread(1)); }
 
-// Sums of gradient and curvature (H, W) over those pixels of a window of 2 radius + 1 that are of the surface of its
+// Sums of gradient and curvature (H, W) over those pixels of a window of 2 radius + 1 that belong to the surface of its
 // middle, into sums (2, H, W).
 //
-// Differences of disparity (H, W) over width, and of colours (3, H, W) over colour_width, make a pixel count less and
-// less, from half of it on; one of the same disparity counts least whatever its colour. Colours (3, 0, 0) are not asked.
+// The weight of a pixel falls with its differences of disparity (H, W), relative to width, and of colours (3, H, W),
+// relative to colour_width. Colours (3, 0, 0) do not count.
 void sums_of_surface(Array<const float, 2> gradient, Array<const float, 2> curvature, Array<const float, 2> disparity, Array<const float,
                      3> colours, Index radius, float width, float colour_width, float least, Array<float, 3> sums) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const Array<const float, 2> pictures[] = {gradient, curvature, disparity, colours[0], colours[1], colours[2]};
     const auto add = [&](auto number, Index begin, Index rows) {
         const Index top = std::max<Index>(0, begin - radius), bottom = std::min(H, begin + rows + radius);
-        // what lies beyond the picture has no gradient and no curvature, and adds nothing
+        // gradient and curvature are 0 beyond the picture
         const Scratch<float, 3> padded(number.value, bottom - top, W + 2 * radius + LANES);
         for (Index n = 0; n < number; ++n)
             for (Index row = top; row < bottom; ++row)

@@ -20,7 +20,7 @@ struct ViewStack {
     bool fields(auto visit) { return visit(colours, t0, s0, groups, subsets, scale2, shown); }
 };
 
-// Candidate disparities, and where the samples of a reference pixel lie in each view.
+// Candidate disparities, and the positions of a reference pixel's samples in each view.
 struct Candidates {
     Array<const float, 1> disparities;        // (K,)
     Array<const std::int64_t, 2> row, column;  // (T, S)
@@ -34,7 +34,7 @@ struct Candidates {
     bool fields(auto visit) { return visit(disparities, row, column, down, fy, across, fx, sy, sx, reach); }
 };
 
-// Aggregation window: 2 radius + 1 pixels wide, its weights narrow in colour.
+// Aggregation window, 2 radius + 1 pixels wide, with weights by colour.
 struct Window {
     Array<const float, 3> guide;  // (3, H, W)
     Index radius;
@@ -43,7 +43,7 @@ struct Window {
     bool fields(auto visit) { return visit(guide, radius, variance); }
 };
 
-// What noise makes of costs.
+// Expected costs of noise.
 struct ExpectedCosts {
     Array<const float, 3> moments;   // (2, N, K')
     Array<const float, 3> weights;   // (2, H, W)
@@ -52,9 +52,9 @@ struct ExpectedCosts {
     bool fields(auto visit) { return visit(moments, weights, anywhere); }
 };
 
-// Row above the samples of a row, and how far below it they are.
+// Row above the samples of a row, and their distance below it.
 inline std::pair<Index, float> upper_row(Index y, Index down, float fy, Index height) {
-    // the last row has none below: seen from the one above
+    // the last row has none below, so the row above it is used
     if (y + down == height - 1 && fy == 0) return {height - 2, 1.0f};
     return {y + down, fy};
 }

@@ -1,4 +1,4 @@
-// Noise of the views: blocks of the reference view against blocks of others, at whole pixels.
+// Noise of the views: differences of blocks of the reference view from blocks of others at whole pixels.
 #include <limits>
 
 #include "kernels/arguments.hpp"
@@ -16,10 +16,10 @@ float in_order(Float8 lanes) {
     return sum;
 }
 
-// Where block i of n begins along an axis of so many pixels: they lie side by side from both ends.
+// Start of block i of n along an axis; blocks lie side by side from both ends.
 Index begin_of(Index i, Index n, Index size) { return 2 * i < n ? i * BLOCK : size - (n - i) * BLOCK; }
 
-// Energy of the differences between a block of one channel and another, without their mean.
+// Energy of the differences between two blocks of a channel, without their mean.
 float energy_of(const float *own, const float *other, Index next_row) {
     Float8 squares{}, sums{};
     for (Index k = 0; k < BLOCK; ++k) {
@@ -31,8 +31,8 @@ float energy_of(const float *own, const float *other, Index next_row) {
     return in_order(squares) - sum * sum / float(BLOCK * BLOCK);
 }
 
-// Least mean squared difference, in squared units of the colours, of each block of view (t0, s0) from what other views
-// have at some whole pixels from it; infinite where no other view holds the block. Grey counts as three equal channels.
+// Least mean squared difference, in squared units of the colours, of each block of view (t0, s0) from blocks of other
+// views moved by whole pixels; infinite if no other view holds the block. Grey counts as three equal channels.
 // moves (N, 4): row and column of a view in the grid, pixels down and across; least (H / BLOCK, W / BLOCK).
 void least_differences(const Views &views, Index t0, Index s0, Array<const std::int64_t, 2> moves, Array<float, 2> least) {
     const Index H = shape_of(views)[2], W = shape_of(views)[3], C = shape_of(views)[4];
@@ -54,7 +54,7 @@ void least_differences(const Views &views, Index t0, Index s0, Array<const std::
                 found[j] = std::min(found[j], float(3 / C) * energy);
             }
         }
-        // less one degree of freedom: the mean, which exposure may change from view to view
+        // one degree of freedom less, for the mean, which exposure may change from view to view
         for (Index j = 0; j < least.shape[1]; ++j) found[j] /= float(3 * (BLOCK * BLOCK - 1));
     });
 }

@@ -30,33 +30,33 @@ struct BaseDetail {
     }
 };
 
-// In which views a pixel is seen, and in which it is looked for at which candidates.
+// Which views see a pixel, and which candidates each view compares.
 struct Visibility {
-    Array<const float, 4> nearest;  // (T, S, n, W) or (T, S, n, 0), and LANES numbers behind it; rows as those of the detail
+    Array<const float, 4> nearest;  // (T, S, n, W) or (T, S, n, 0), then LANES numbers; rows of the detail
     float occlusion_margin, occluded_view_weight;
     Array<const bool, 2> searched;        // (T, S): the views that compare all candidates; others compare the likely ones
-    Array<const std::int32_t, 3> likely;  // (2, H or 0, W): the first of these, and the last
+    Array<const std::int32_t, 3> likely;  // (2, H or 0, W): first and last likely candidate
 
     bool fields(auto visit) { return visit(nearest, occlusion_margin, occluded_view_weight, searched, likely); }
 };
 
-using Columns = std::vector<std::pair<Index, Index>>;  // stretches of a row: first column, and what follows the last
+using Columns = std::vector<std::pair<Index, Index>>;  // intervals of a row: first column, and the one after the last
 
-constexpr float ROUNDING = 1.0f / 512;  // how far a position is from the same in single precision, at most, pixels
-constexpr float LEAST_MARGIN = 1e-6f;   // by which an occluder must be nearer
-constexpr float COLOUR_STEPS = 20000;   // from black to white, of colours as whole numbers of 16 bits
-constexpr std::int64_t ONE = 1 << 14;   // the sum of a sample's weights, which are whole numbers of 16 bits
+constexpr float ROUNDING = 1.0f / 512;  // largest rounding error of a position in single precision, pixels
+constexpr float LEAST_MARGIN = 1e-6f;   // least margin of an occluder
+constexpr float COLOUR_STEPS = 20000;   // steps from black to white of colours as 16-bit integers
+constexpr std::int64_t ONE = 1 << 14;   // sum of a sample's weights, which are 16-bit integers
 
-// What is nearest in a view: a pixel hides the positions beside which it falls, two along either axis, or the one that it falls
-// on. It is kept by where these squares of positions begin, outside, too; what falls on a position, by itself.
+// z-buffer of a view: a pixel covers the positions around the point where it falls, two along either axis, or a single
+// one along an axis on which it falls exactly. Squares are stored by their first position, also outside the view.
 struct NearestInView {
     const double down, across;
-    const Array<float, 2> nearest;  // its rows are those that are drawn
+    const Array<float, 2> nearest;  // rows are set only if drawn
     const Index H = nearest.shape[0], W = nearest.shape[1];
     const Scratch<float, 2> squares = Scratch<float, 2>(H + 2, W + 1).filled(EMPTY);
     std::vector<bool> drawn = std::vector<bool>(H);
 
-    // Add pixel x of a row y of the reference view, and where it is the first or last what goes on beyond it.
+    // Add pixel x of row y of the reference view, and for the first or last pixel its continuation beyond the border.
     void add(const float *row, Index y, Index x, bool all_before, bool all_beyond) {
         const double i = double(y) - row[x] * down, j = double(x) - row[x] * across;
         const Index top = Index(std::floor(i)), left = Index(std::floor(j));
@@ -72,12 +72,12 @@ struct NearestInView {
         }
     }
 
-    // Add a row of the reference view, eight pixels at a time; those of a smooth surface lie side by side in the view, too.
+    // Add a row of the reference view, eight pixels at a time, which on a smooth surface stay adjacent in the view.
     void add_row(const float *row, Index y) {
         constexpr Int8 RISING{0, 1, 2, 3, 4, 5, 6, 7};
         for (Index begin = 0; begin < W; begin += LANES) {
             bool exactly = begin + LANES > W;
-            // of how far the first of them moves, whole pixels, and whether the rest is none in any
+            // whole pixels of the first one's shift, and whether any pixel falls exactly on a position
             const auto moved = [&](double step) {
                 const Float8 by = step == 0 ? Float8{} : load(row + begin) * float(-step);
                 const Int8 whole_pixels = rounded(step == 0 ? by : by - 0.5f);
@@ -122,7 +122,7 @@ struct NearestInView {
     }
 };
 
-// What a row of the reference view is compared with, and what comes of it.
+// Comparison of a row of the reference view with the views.
 struct VisibleRow {
     const BaseDetail &views;
     const Visibility &visibility;
@@ -131,11 +131,11 @@ struct VisibleRow {
     const Array<float, 3> cost;
 
     const Index K = cost.shape[0], H = views.guide.shape[0], W = cost.shape[2], width = W + LANES;
-    // in steps of the whole numbers; the detail counts as three equal channels
+    // in steps of the integers; the detail counts as three equal channels
     const double colour_steps = double(COLOUR_STEPS) * ONE, detail_steps = ONE / double(views.detail_unit);
     const float colour_scale2 = float(scales2(0) * (colour_steps * colour_steps));
     const float detail_scale2 = float(scales2(1) * (detail_steps * detail_steps) / 3);
-    // of the rows of the view; where there is no detail it is 0, and fits
+    // rows of the view; missing detail is 0, and matches
     const Scratch<std::int32_t, 3> view_pairs = zeros<std::int32_t, 3>(height(), 4, width);
     const Scratch<float, 2> own = zeros<float, 2>(6, width);  // colours, detail, and the first and the last likely candidate
     const Scratch<float, 3> sums = zeros<float, 3>(K, 2, width);  // of the costs, and of their weights
@@ -165,7 +165,7 @@ struct VisibleRow {
         }
     }
 
-    // Of each candidate, stretches of row y with all pixels in which it is likely.
+    // Intervals of row y, for each candidate, that contain all pixels for which it is likely.
     std::vector<Columns> likely_columns(Index y) const {
         std::vector<Columns> columns(K);
         for (Index begin = 0; begin < W && visibility.likely.shape[1] > 0; begin += LANES) {
@@ -207,14 +207,14 @@ struct VisibleRow {
             const auto [top, fy] = upper_row(y, candidates.down(r, k), candidates.fy(r, k), H);
             const Index left = candidates.across(c, k);
             const float fx = candidates.fx(c, k);
-            // on the last column itself nothing beyond it is read with any weight
+            // on the last column, the next one has weight 0
             const Index within = std::max<Index>(0, -left), beyond = std::min(W, fx == 0 ? W - left : W - 1 - left);
             if (top < 0 || top > H - 2) continue;
-            // of neighbours, pairs of whole numbers of 16 bits: pixel and right neighbour, above and below
+            // weights as pairs of 16-bit integers: pixel and right neighbour, above and below
             const auto below = std::int64_t(double(fy) * ONE + 0.5), right = std::int64_t((ONE - below) * double(fx) + 0.5);
             const auto lower_right = std::int64_t(below * double(fx) + 0.5);
             const Int8 upper = pair_of(ONE - below - right, right), lower = pair_of(below - lower_right, lower_right);
-            // a surface hides more and more, from half a margin nearer to one and a half: it is not known better
+            // occlusion grows from half a margin to one and a half, since disparities are uncertain
             const Float8 limit = spread(candidates.disparities(k) + 1.5f * margin), number = spread(float(k));
             const Index lower_row = top - views.low + is_nearer_next(candidates.down(r, k), fy);
             for (const auto &[begin, end] : columns[k]) {
@@ -231,7 +231,7 @@ struct VisibleRow {
                         before += LANES;
                     }
                     if (!searched) seen = ((load(reference + 4 * pitch) <= number) & (load(reference + 5 * pitch) >= number)) ? seen : Float8{};
-                    // pixels beyond the last add nothing to what others have added
+                    // pixels beyond the last add 0
                     if (rest < LANES) seen = first_lanes(seen, rest, 0);
                     const auto residual = [&](Index channel) {
                         Int8 above, under;
@@ -242,7 +242,7 @@ struct VisibleRow {
                     };
                     const Float8 red = residual(0), green = residual(1), blue = residual(2), detail = residual(3);
                     const Float8 colours2 = fma(blue, blue, fma(green, green, red * red)), detail2 = detail * detail;
-                    // z / (z + scale) of either, by one division
+                    // z / (z + scale) of colours and detail, with one division
                     const Float8 of_colours = colours2 + scale2[0], of_detail = detail2 + scale2[1];
                     const Float8 both = fma(share[0] * colours2, of_detail, share[1] * detail2 * of_colours);
                     store(sum, fma(seen, both / (of_colours * of_detail), load(sum)));
@@ -252,7 +252,7 @@ struct VisibleRow {
         }
     }
 
-    // How many rows of a view are looked at, at most.
+    // Largest number of rows of a view that are needed.
     Index height() const {
         Index moved = 0;
         for (Index r = 0; r < candidates.down.shape[0]; ++r)
@@ -270,7 +270,7 @@ void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, St
     over_stretches(present.shape, 1, 1, [&, least = double(*least), most = double(*most)](Index t, Index s, Index, Index) {
         if (!present(t, s)) return;
         const double v = baselines(t, s, 0), u = baselines(t, s, 1);
-        // rows farther away do not get here; beyond the picture goes on what is at its border
+        // only rows that can reach these; the border continues beyond the picture
         const Index first = Index(std::floor(low - 1 + std::min(least * v, most * v))), last = Index(std::ceil(high + std::max(least * v, most * v))) + 1;
         NearestInView view{v, u, out[t][s]};
         for (Index y = first; y < last; ++y) view.add_row(disparity.at(clamped(y, H)), y - low);
@@ -278,8 +278,7 @@ void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, St
     });
 }
 
-// Pixels that something nearer occludes in one of the views that could see them, of rows begin..end of the map: those of
-// out (H, W) that it sets.
+// Set pixels of out (H, W), in rows begin..end, that something nearer occludes in at least one view.
 void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &views, Index begin, Index end, Array<bool, 2> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for(begin, end, [&](Index y) {
@@ -293,9 +292,9 @@ void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &vie
     });
 }
 
-// Cost of every candidate for rows begin..end, into cost (K, end - begin, W), over the views in which nothing nearer occludes the
-// pixel: 0..1; 1 where no view is left. scales2 (2,) and shares (2,) are the square of the robust scale, and the share in
-// the cost, of colours and of detail.
+// Cost of every candidate for rows begin..end, into cost (K, end - begin, W), over the views in which nothing nearer
+// occludes the pixel: 0..1; 1 without views. scales2 (2,) and shares (2,): squared robust scales, and shares in the cost,
+// of colours and of detail.
 void sweep_visible_rows(const BaseDetail &views, const Visibility &visibility, Array<const float, 1> scales2, Array<const float, 1> shares,
                         const Candidates &candidates, Index begin, Index end, Array<float, 3> cost) {
     parallel_for(begin, end, [&](Index y) { VisibleRow{views, visibility, scales2, shares, candidates, cost}.sweep(y, y - begin); });

@@ -1,5 +1,5 @@
-// Planes of superpixels, and of the borders of regions. labels (H W) say whose a pixel is, design (H W, 3) is each plane
-// parameter's value there.
+// Planes of superpixels, and of the borders of regions. labels (H W): superpixel of each pixel; design (H W, 3):
+// coefficient of each plane parameter there.
 #include <cmath>
 
 #include "kernels/arguments.hpp"
@@ -17,13 +17,13 @@ void add_normal_equations(Array<const std::int64_t, 1> labels, Array<const doubl
         double *matrix = left.at(labels(i)), *side = right.at(labels(i));
         for (Index p = 0; p < 3; ++p) {
             side[p] += own[p] * w * d;
-            // rounded alike on both sides of the diagonal
+            // exactly symmetric
             for (Index q = 0; q < 3; ++q) matrix[3 * p + q] += own[std::min(p, q)] * w * own[std::max(p, q)];
         }
     }
 }
 
-// Disparity of every pixel by the plane of its superpixel, out (H W); planes (N, 3).
+// Disparity of every pixel on its superpixel's plane, out (H W); planes (N, 3).
 void values_of_planes(Array<const std::int64_t, 1> labels, Array<const double, 2> design, Array<const double, 2> planes, Array<float,
                       1> out) {
     parallel_for_blocks(0, labels.shape[0], 4096, [&](Index i) {
@@ -32,7 +32,7 @@ void values_of_planes(Array<const std::int64_t, 1> labels, Array<const double, 2
     });
 }
 
-// How many pixels agree with each of planes (P, 3), less behind_penalty for each that lies behind it, out (P);
+// Number of inliers of each of planes (P, 3), minus behind_penalty for each pixel behind it, out (P);
 // positions (3, N) are 1, x and y of pixels, values (N) their disparities.
 void support_of(Array<const double, 2> positions, Array<const double, 1> values, Array<const double, 2> planes, double tolerance,
                 double behind_penalty, Array<double, 1> out) {
@@ -41,7 +41,7 @@ void support_of(Array<const double, 2> positions, Array<const double, 1> values,
         const double a = planes(p, 0), b = planes(p, 1), c = planes(p, 2);
         Index agreeing = 0, behind = 0;
         for (Index i = 0; i < values.shape[0]; ++i) {
-            // as residuals of single planes are rounded
+            // with the rounding of a single plane's residuals
             const double residual = value[i] - (a + b * x[i] + c * y[i]);
             agreeing += std::abs(residual) < tolerance;
             behind += residual < -tolerance;

@@ -1,9 +1,9 @@
 // Second-order smoothing: its matrix, as a stencil, and the hats of its preconditioner.
 //
-// Pictures have a margin of MARGIN pixels of zeros on each side, so that no loop has to look where it is; hats have
-// none. Node i of the finest lies at SPACING i - 0.5 pixels; a coarser level has every other node, and each of its hats
-// is one of the finer level and half of each of its neighbours. Sums are those of rows, taken one after the other, to
-// the same bits on any number of threads. Number is float or double.
+// Pictures have a margin of MARGIN pixels of zeros on each side, so that loops need no border cases; hats have none.
+// Node i of the finest level lies at SPACING i - 0.5 pixels. A coarser level has every other node; each of its hats is
+// one of the finer level plus half of each neighbour. Sums add rows in order, so that all numbers of threads give the
+// same bits. Number is float or double.
 #include <cmath>
 
 #include "kernels/arguments.hpp"
@@ -12,13 +12,13 @@
 namespace sepi::second_order {
 namespace {
 
-constexpr Index MARGIN = 2;   // how far second differences reach, pixels
-constexpr Index SPACING = 2;  // pixels from node to node of the finest hats
+constexpr Index MARGIN = 2;   // reach of second differences, pixels
+constexpr Index SPACING = 2;  // distance of nodes of the finest hats, pixels
 
-// The finest hats at the pixels beside a node and at the next ones.
+// Heights of the finest hats at the pixels beside a node, and at the next ones.
 constexpr float NEAR = 0.75f, FAR = 0.25f;
 
-// Entries of the stencil: rows and columns from a pixel to the other that they belong to.
+// Entries of the stencil: rows and columns from one pixel to the other.
 constexpr Index ENTRIES[7][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 0}, {2, 0}, {1, 1}, {1, -1}};
 
 // Add values, times a factor, to a row.
@@ -27,7 +27,7 @@ void add(Number *__restrict row, Number factor, const Number *values, Index n) {
     for (Index x = 0; x < n; ++x) row[x] += factor * values[x];
 }
 
-// Inner product of two rows, in an order that vectorises: the same one on all processors.
+// Inner product of two rows, in an order that vectorises and is the same on all processors.
 template <class Number>
 Number dot(const Number *a, const Number *b, Index n) {
     constexpr Index PARTS = 128 / sizeof(Number), FEWER = PARTS / 4;
@@ -43,7 +43,7 @@ Number dot(const Number *a, const Number *b, Index n) {
     return sums[0];
 }
 
-// Sum over rows of what each adds, one after the other, whichever thread made them.
+// Sum over rows, added in order, whichever thread computed them.
 template <class Number>
 double in_order(const Scratch<Number, 1> &rows) {
     double total = 0;
@@ -51,7 +51,7 @@ double in_order(const Scratch<Number, 1> &rows) {
     return total;
 }
 
-// Weights of second differences in one direction; corners (n, 2) and factors (n) say what pixels make a difference.
+// Weights of second differences in one direction; corners (n, 2) and factors (n) are the pixels of a difference.
 void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const double, 2> colour,
                             Array<const std::int64_t, 2> corners, Array<const double, 1> factors, double threshold, double variance,
                             Array<double, 2> out) {
@@ -67,7 +67,7 @@ void weights_of_differences(Array<const float, 2> disparity, Array<const float, 
     });
 }
 
-// out becomes the matrix times a direction; returns the inner product of both.
+// Computes the matrix times a direction, into out; returns the inner product of both.
 template <class Number>
 double bend(Array<const Number, 3> stencil, Array<const Number, 2> direction, Array<Number, 2> out) {
     const Index H = direction.shape[0] - 2 * MARGIN, W = direction.shape[1] - 2 * MARGIN;
@@ -77,7 +77,7 @@ double bend(Array<const Number, 3> stencil, Array<const Number, 2> direction, Ar
         Number *__restrict target = out.at(y, MARGIN);
         for (Index x = 0; x < W; ++x) target[x] = own[x] * here[x];
         for (Index k = 1; k < 7; ++k) {
-            // one entry and its mirror image; few arrays at a time, so that the loop vectorises
+            // one entry and its transpose; few arrays at a time, so that the loop vectorises
             const auto [dy, dx] = ENTRIES[k];
             const Number *forth = stencil.at(k, y, MARGIN), *there = direction.at(y + dy, MARGIN + dx);
             const Number *back = stencil.at(k, y - dy, MARGIN - dx), *before = direction.at(y - dy, MARGIN - dx);
@@ -88,8 +88,8 @@ double bend(Array<const Number, 3> stencil, Array<const Number, 2> direction, Ar
     return in_order(along);
 }
 
-// Add a direction, so many times, to a solution, and take what the matrix makes of it, bent, from the residual; returns
-// the squared norm of the residual.
+// Add a multiple of a direction to the solution, and subtract that of bent, the matrix times it, from the residual;
+// returns the squared norm of the residual.
 template <class Number>
 double step(Number length, Array<const Number, 2> direction, Array<const Number, 2> bent, Array<Number, 2> solution, Array<Number,
             2> residual) {
@@ -112,7 +112,7 @@ template <class Number>
 void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = out.shape[1];
     constexpr Number SHARES[] = {FAR, NEAR, NEAR, FAR};
-    // with zeros round the picture, as wide as the hats reach
+    // with a margin of zeros as wide as the hats' reach
     parallel_for(0, out.shape[0], [&](Index i) {
         const auto lines = zeros<Number, 1>(2 * w + 2);
         Number *line = lines.array().data;
@@ -123,7 +123,7 @@ void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
     });
 }
 
-// out becomes inverse * vector, plus the finest hats; returns the inner product of vector and out.
+// Computes inverse * vector plus the finest hats, into out; returns the inner product of vector and out.
 template <class Number>
 double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2> vector, Array<const Number, 2> fine, Array<Number,
                            2> out) {
@@ -147,10 +147,10 @@ double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2
     return in_order(along);
 }
 
-// What the matrix has on its diagonal as hats spacing pixels apart see it, out (h, w).
+// Diagonal of the matrix in hats with this spacing, out (h, w).
 void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<double, 2> out) {
     const Index H = stencil.shape[1] - 2 * MARGIN, W = stencil.shape[2] - 2 * MARGIN, w = out.shape[1], reach = 2 * spacing;
-    // a hat at its own pixels, and zeros, to where entries lead that leave it
+    // heights of a hat at its pixels, with zeros for entries that leave it
     const auto hats = zeros<double, 1>(reach + 2 * MARGIN);
     double *hat = hats.array().data + MARGIN;
     for (Index p = 0; p < reach; ++p) hat[p] = 1 - std::abs(double(p) + 0.5 - double(spacing)) / double(spacing);
@@ -167,7 +167,7 @@ void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<doubl
                 if (0 <= y && y < H && share > 0) add(line + spacing, share, stencil.at(k, y + MARGIN, MARGIN), W);
             }
             for (Index p = 0; p < reach; ++p) {
-                // each entry as seen from either of its pixels
+                // each entry from either of its pixels
                 const double share = (k == 0 ? 1.0 : 2.0) * hat[p] * hat[p + dx];
                 if (share > 0)
                     for (Index j = 0; j < w; ++j) target[j] += share * line[spacing * j + p];

@@ -1,5 +1,5 @@
-// What the views of a scene see of each other's points, by the exact disparity, and the light that they share. Maps of all
-// views are (N, H, W), those of one view (H, W); baselines (N, 2), down and across, are those from that view.
+// Points of a view in the other views, by the exact disparity: occlusion, and shared light. Maps of all views are
+// (N, H, W), those of one view (H, W); baselines (N, 2), down and across, are from that view.
 #include <cmath>
 
 #include "kernels/arguments.hpp"
@@ -9,8 +9,8 @@
 namespace sepi::reprojection {
 namespace {
 
-// Calls body(other, x, place) where another view shows the point of a pixel of row y. View by view: pixels beside each
-// other lie beside each other in all of them.
+// Calls body(other, x, place) where another view contains the point of a pixel of row y. View by view, since adjacent
+// pixels stay adjacent in memory.
 template <class Body>
 void for_landings(Array<const float, 3> disparities, Array<const double, 2> baselines, Index view, Index y, const Body &body) {
     const Index H = disparities.shape[1], W = disparities.shape[2];
@@ -23,8 +23,8 @@ void for_landings(Array<const float, 3> disparities, Array<const double, 2> base
     }
 }
 
-// Whether some view that has the point in its picture does not see it, and whether some other view sees it. Where all
-// pixels of another view about the place where a point lands are nearer, it is hidden.
+// Whether a view with the point in its picture does not see it, and whether another view sees it. A point is hidden if
+// all pixels around its position in another view are nearer.
 void seen_elsewhere(Array<const float, 3> disparities, Array<const double, 2> baselines, Index view, double same, Array<bool, 2> hidden, Array<bool, 2> seen) {
     const Index W = disparities.shape[2];
     parallel_for(0, disparities.shape[1], [&](Index y) {
@@ -38,13 +38,13 @@ void seen_elsewhere(Array<const float, 3> disparities, Array<const double, 2> ba
     });
 }
 
-// Mean light (H, W, 3) of all views that show the surface whole, for whole pixels of one view; its own elsewhere; and the
-// variance of that mean, of all colours' sum. light (N, H, W, 3); surface is which thing pixels show whole, -1 for none.
+// Mean light (H, W, 3) over all views with a whole pixel of the surface, for whole pixels of one view; its own elsewhere;
+// and variance of the mean's sum over colours. light (N, H, W, 3); surface: thing of a whole pixel, -1 for none.
 void gathered_light(Array<const float, 4> light, Array<const float, 3> disparities, Array<const std::int16_t, 3> surface, Array<const double, 2> baselines,
                     Index view, double bend, Array<float, 3> mean, Array<float, 2> variance) {
     const Index W = disparities.shape[2];
     parallel_for(0, disparities.shape[1], [&](Index y) {
-        // of each pixel of the row: sums of the colours, of the squares of what those sum to, and of the views that count
+        // for each pixel of the row: sums of the colours, squared sums of colours, and number of views
         const auto sums = zeros<double, 2>(W, 5);
         const auto add = [&](Index x, const auto &colour) {
             double *of_pixel = sums.array().at(x);
@@ -67,7 +67,7 @@ void gathered_light(Array<const float, 4> light, Array<const float, 3> dispariti
         });
         for (Index x = 0; x < W; ++x) {
             const double *total = sums.array().at(x), number = total[4];
-            // equal ones may differ by rounding
+            // not below 0 by rounding
             const double between = std::max(total[3] / number - squared((total[0] + total[1] + total[2]) / number), 0.0);
             variance(y, x) = number > 1 ? float(between / (number - 1)) : 0.0f;
             for (Index c = 0; c < 3; ++c) mean(y, x, c) = float(total[c] / number);

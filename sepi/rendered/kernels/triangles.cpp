@@ -1,4 +1,4 @@
-// Which triangles the rays of a view's pixels meet first.
+// First triangles on the rays of a view's pixels.
 #include <array>
 #include <cmath>
 #include <limits>
@@ -11,13 +11,13 @@
 namespace sepi::triangles {
 namespace {
 
-// Rows of rays that a thread looks at together.
+// Rows of rays of a turn of a thread.
 constexpr Index BAND = 32;
 
-// Pixels: more than rounding moves a corner.
+// Margin for the rounding of corners, pixels.
 constexpr double SLACK = 1e-4;
 
-// Triangles that a thread looks at together.
+// Triangles of a turn of a thread.
 constexpr Index AT_ONCE = 64;
 
 using Vector = std::array<double, 3>;  // right, down, away
@@ -29,7 +29,7 @@ struct Pixels {
     Index first = 0, last = -1;
 };
 
-// A triangle as the camera sees it, and the pixels at which it may be met.
+// A triangle in the camera's axes, and the pixels that may meet it.
 struct Triangle {
     std::array<Vector, 3> corners;
     Pixels rows, columns;
@@ -37,7 +37,7 @@ struct Triangle {
     void find_pixels(double near, const double *frame, Index size) {
         const auto [nearest, farthest] = std::minmax({corners[0][2], corners[1][2], corners[2][2]});
         if (farthest < near) return;
-        // the pixels whose middles lie between the corners along an axis; all where a side goes behind the camera
+        // pixels whose middles lie between the corners along an axis; all if a side goes behind the camera
         const auto middles = [&](Index axis, double middle) -> Pixels {
             if (nearest < near) return {0, size - 1};
             const auto [least, most] = std::minmax({corners[0][axis] / corners[0][2], corners[1][axis] / corners[1][2], corners[2][axis] / corners[2][2]});
@@ -47,12 +47,12 @@ struct Triangle {
         rows = middles(1, frame[1]), columns = middles(0, frame[2]);
     }
 
-    // Where it is nearer than what is there, number n at the rays of the rows first..first + rows of depth.
+    // Draw triangle n where it is nearer than earlier ones, at the rays of the rows first..first + rows of depth.
     void meet(Index n, double near, const double *frame, const double *across, Index first, Array<double, 2> depth, Array<std::int32_t, 2> out) const {
         const Index top = std::max(rows.first, first), bottom = std::min(rows.last, first + depth.shape[0] - 1);
         if (top > bottom) return;
         const auto &[a, b, c] = corners;
-        // of each side the normal of the plane through it and the camera
+        // normal of the plane through each side and the camera
         const Vector sides[] = {cross(b, c), cross(c, a), cross(a, b)};
         const double volume = a[0] * sides[0][0] + a[1] * sides[0][1] + a[2] * sides[0][2];
         for (Index row = top; row <= bottom; ++row) {
@@ -71,10 +71,10 @@ struct Triangle {
     }
 };
 
-// Which of the triangles (M, 3, 3) the ray through the middle of each pixel meets first beyond near, into
-// out (size, size), of zeros; the first triangle is nobody's. origin is where the camera is, rotation carries its
-// directions (right, down, away) into the world, frame is its focal length in pixels and the row and column of its axis.
-// No ray slips through where triangles meet in a side: both compute the same number for it.
+// First of the triangles (M, 3, 3) beyond near on the ray through the middle of each pixel, into out (size, size), of
+// zeros; triangle 0 means none. origin is the camera's position, rotation is from its axes (right, down, away) to the
+// world, frame is its focal length in pixels and the row and column of its axis. No ray passes between triangles with a
+// common side, since both compute the same number for it.
 void first_met(Array<const double, 3> corners, Array<const double, 1> origin, Array<const double, 2> rotation, Array<const double, 1> frame, double near,
                Array<std::int32_t, 2> out) {
     const Index count = corners.shape[0], size = out.shape[0];

@@ -1,4 +1,4 @@
-// Exact rendering of the built-in scenes: planar surfaces, and what rays meet of them.
+// Exact rendering of the built-in scenes: planar surfaces, and their intersections with rays.
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -10,10 +10,10 @@
 namespace sepi::rendering {
 namespace {
 
-// Texels that follow those of each row of a texture, as it goes on periodically: as many as a sample reaches.
+// Texels after each row of a texture, its periodic continuation for a sample's reach.
 constexpr Index BEYOND = 3;
 
-// Surfaces, as they are in a view: the fields of sepi.scenes.rendering.Drawing, in their order.
+// Surfaces in a view: the fields of sepi.scenes.rendering.Drawing, in their order.
 struct Drawing {
     Array<const double, 2> edges;                    // (E, 4): x0, y0, x1, y1
     Array<const std::int64_t, 1> first_edge;         // (P + 1)
@@ -24,15 +24,15 @@ struct Drawing {
     bool fields(auto visit) { return visit(edges, first_edge, planes, texels, first_texel, side); }
 };
 
-// A surface hides a point only if it is nearer by more than rounding: points on the edge between two faces.
+// Margin by which an occluder must be nearer, for the rounding at edges between two faces.
 constexpr double TOLERANCE = 1e-9;
 
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
 
-// Rays that a thread looks at together.
+// Rays of a turn of a thread.
 constexpr Index RAYS_AT_ONCE = 256;
 
-// Whether an edge crosses a row, and where; of an outline as many do as close it.
+// Whether an edge crosses a row, and where; an outline crosses it an even number of times.
 bool crosses(const double *edge, double y) { return (edge[1] <= y) != (edge[3] <= y); }
 
 double crossing(const double *edge, double y) { return edge[0] + (y - edge[1]) * (edge[2] - edge[0]) / (edge[3] - edge[1]); }
@@ -95,7 +95,7 @@ struct Spline {
 // Two numbers, four times each.
 Float8 halves(float low, float high) { return __builtin_shufflevector(spread(low), spread(high), 0, 1, 2, 3, 12, 13, 14, 15); }
 
-// A sample of a surface's texture, which goes on periodically, is added to a vector: colours are the sum of both halves.
+// Add a sample of a surface's periodic texture to a vector; its colours are the sum of both halves.
 Float8 add_sample(const Drawing &drawing, Index p, double x, double y, Float8 total) {
     const Spline across(x), down(y);
     const Index side = drawing.side(p), column = ((across.first % side) + side) % side;
@@ -142,8 +142,8 @@ void shade(const Drawing &drawing, double v, double u, Index samples, Array<floa
     });
 }
 
-// Mark the pixels (H, W) whose point is hidden in the view of baseline (v, u), as which surfaces, and boxes (P, 4) round
-// them, are given.
+// Mark the pixels (H, W) whose point is hidden in the view of baseline (v, u), given the view's surfaces and boxes (P, 4)
+// round them.
 void hide(const Drawing &drawing, Array<const double, 2> boxes, Array<const double, 2> disparity, double v, double u, Array<bool, 2> hidden) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for_pixels(H, W, [&](Index row, Index column) {
@@ -156,9 +156,9 @@ void hide(const Drawing &drawing, Array<const double, 2> boxes, Array<const doub
     });
 }
 
-// What rays (N, 3) from origin (3) meet first: depths (N) in lengths of the ray, infinite for nothing, and colours (N, 3) of
-// the textures there, black for nothing. Surface p lies where normals (P, 3) times a point are 1; edges and boxes are in
-// pixels of the view from the world's origin, whose (focal length, x, y) are pinhole.
+// First intersections of rays (N, 3) from origin (3): depths (N) in lengths of the ray, infinite for none, and colours
+// (N, 3) of the textures there, black for none. Surface p is the plane on which normals (P, 3) times a point are 1; edges
+// and boxes are in pixels of the view from the world's origin, whose (focal length, x, y) are pinhole.
 void cast(const Drawing &drawing, Array<const double, 2> boxes, Array<const double, 2> normals, Array<const double, 1> origin, Array<const double, 2> rays,
           Array<const double, 1> pinhole, Array<double, 1> depth, Array<double, 2> colours) {
     const auto product = [](const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };

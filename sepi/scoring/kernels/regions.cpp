@@ -8,14 +8,14 @@
 namespace sepi::regions {
 namespace {
 
-constexpr double HALF_PIXEL = 0.501;  // and a little more so that rounding of float32 disparities decides no tie
-constexpr double STRETCH = 2;         // neighbours that land up to this many pixels apart in a view are still one surface
+constexpr double HALF_PIXEL = 0.501;  // slightly more than a half, so that rounding of float32 disparities decides no tie
+constexpr double STRETCH = 2;         // largest distance in a view of neighbouring pixels of one surface, pixels
 
 // Whether the view of baseline (v, u) does not see the pixel (y, x).
 bool hidden_in(Array<const double, 2> ground_truth, Index y, Index x, double v, double u, double nearest) {
     const Index H = ground_truth.shape[0], W = ground_truth.shape[1];
     const double own = ground_truth(y, x);
-    // not of unknown disparities, either
+    // also for unknown disparities
     if (!place_within(double(y) - own * v, double(x) - own * u, H, W)) return false;
     const double steps_per_disparity = std::max(std::abs(v), std::abs(u));
     double before = 0;
@@ -24,7 +24,7 @@ bool hidden_in(Array<const double, 2> ground_truth, Index y, Index x, double v, 
         const auto row = Index(std::floor(double(y) + double(step) * v / steps_per_disparity + 0.5));
         const auto column = Index(std::floor(double(x) + double(step) * u / steps_per_disparity + 0.5));
         if (row < 0 || row >= H || column < 0 || column >= W) return false;
-        // pixels by which the surface here lands beyond the pixel looked at
+        // pixels by which the surface here lands beyond this pixel
         const double beyond = (ground_truth(row, column) - own) * steps_per_disparity - double(step);
         const bool crossed = step > 1 && before * beyond < 0 && std::abs(before - beyond) <= STRETCH;
         if (std::abs(beyond) <= HALF_PIXEL || crossed) return true;
