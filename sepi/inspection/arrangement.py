@@ -37,13 +37,13 @@ _WORST = 3
 _DISTANCES = ((2, 1), (2, 2), (2, 4), (6, 1))
 # The rows of views may run up or down; the sign of the disparity does not matter
 _ORDERS = ("as-given", "flip-rows")
-# What tells: the next arrangement's matching cost over the best's, and from where on no other distance is looked at;
-# the most that views have which fit together
+# Decision: least ratio and difference of the next arrangement's matching cost to the best's; ratio from which on no
+# other distance is tried; largest cost of views that fit together
 _CLEAR_RATIO = 1.15
 _LEAST_DIFFERENCE = 0.01
 _PLAIN_RATIO = 1.5
 _MOST_COST = 0.65
-# positions from one to the next by the golden ratio lie evenly, and in step with no row
+# steps by the golden ratio spread positions evenly, and out of step with rows
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
@@ -53,7 +53,7 @@ class Arrangement(NamedTuple):
     Attributes
     ----------
     name : str
-        For people: ``"3x3 row by row"``.
+        Name for users: ``"3x3 row by row"``.
     positions : ndarray, shape (N, 2), int64
         Row and column of each view of the sequence.
     """
@@ -69,14 +69,14 @@ class Arrangement(NamedTuple):
 
 
 def arrange(light_field: LightField, options: ReadOptions) -> LightField:
-    """Put views that stand in one row, in the order of their numbers, into the grid in which they fit together.
+    """The light field with its numbered views in the grid in which they fit together.
 
     Parameters
     ----------
     light_field : LightField
-        Of a single row of views.
+        A single row of views in the order of their numbers.
     options : ReadOptions
-        ``central``, ``order``, ``exclude`` by position and ``view`` are those in the grid.
+        ``central``, ``order``, ``exclude`` by position and ``view`` refer to the grid.
 
     Returns
     -------
@@ -86,12 +86,12 @@ def arrange(light_field: LightField, options: ReadOptions) -> LightField:
     Warns
     -----
     SepiWarning
-        If the views do not tell, and as many would fill a square, which is taken.
+        If the arrangement is unclear, and a square is assumed.
 
     Raises
     ------
     SepiError
-        If the views fit together in no arrangement, or do not tell, or the options do not fit the grid.
+        If the views fit together in no arrangement, it is unclear, or the options do not fit the grid.
     """
     source, count = light_field.source or light_field.name, light_field.grid[1]
     tried = list(arrangements(count))
@@ -135,7 +135,7 @@ def arrangements(count: int) -> Iterator[Arrangement]:
             back = grid.copy()
             back[grid[:, 0] % 2 == 1, 1] = columns - 1 - back[grid[:, 0] % 2 == 1, 1]
             yield Arrangement(f"{rows}x{columns} row by row, back and forth", back)
-            # of a grid of as many rows as columns this is the turned one, of others the turned one of the other
+            # the transpose of the arrangement row by row in a grid of COLUMNSxROWS
             yield Arrangement(f"{columns}x{rows} column by column", grid[:, ::-1])
             yield Arrangement(f"{columns}x{rows} column by column, back and forth", back[:, ::-1])
     line = np.stack([np.zeros(count, np.int64), np.arange(count)], axis=1)
@@ -146,7 +146,7 @@ def arrangements(count: int) -> Iterator[Arrangement]:
 
 
 def _crosses(count: int) -> Iterator[Arrangement]:
-    """Crosses of a row and a column of equal length; that which comes first is whole, the other without the middle."""
+    """Crosses of a row and a column of equal length; the first one is whole, the other lacks the middle."""
     if count % 4 != 1 or count < 5:
         return
     half = count // 4
@@ -173,7 +173,7 @@ def _discs(count: int) -> Iterator[Arrangement]:
 
 
 def _as_in_the_grid(name: str, positions: Positions) -> Iterator[Arrangement]:
-    """One view after the other as in the whole grid."""
+    """Positions row by row, and column by column."""
     ordered = positions[np.lexsort((positions[:, 1], positions[:, 0]))]
     yield Arrangement(f"{name} row by row", ordered)
     yield Arrangement(f"{name} column by column", ordered[:, ::-1])
@@ -216,7 +216,7 @@ def _cost(views: Views, present: npt.NDArray[np.bool_], positions: Positions, re
 
 
 def _neighbours(positions: Positions, present: npt.NDArray[np.bool_], place: int, reach: int) -> list[int]:
-    """Views of the sequence about one, those along the axes and diagonals first; some of those there are."""
+    """Some neighbours of a view, as places in the sequence; those along the axes and diagonals first."""
     steps = abs(positions - positions[place])
     far = steps.max(axis=1)
     near = np.flatnonzero(present & (far <= reach) & (far > (reach - 1) // 2))
@@ -225,17 +225,17 @@ def _neighbours(positions: Positions, present: npt.NDArray[np.bool_], place: int
 
 
 def _baseline(views: Views, place: int) -> Baseline:
-    """From the view in the middle to one of the sequence."""
+    """Baseline from the middle view to a view of the sequence."""
     return 0, place - views.middle[1]
 
 
 def _placed(light_field: LightField, way: Arrangement, options: ReadOptions, note: str) -> LightField:
-    """The light field in the grid of an arrangement, turned and cut as the options have it."""
+    """The light field in the grid of an arrangement, with order and selection of the options."""
     rows, columns = way.grid
     sequence = np.full((rows, columns), -1)
     sequence[tuple(way.positions.T)] = np.arange(len(way.positions))
     numbers = arrange_numbers(light_field.source or light_field.name, way.grid, options)
-    # number in the grid to number in the sequence; -1 where there is no view, or it was left out
+    # number in the grid to number in the sequence; -1 for missing and excluded views
     order = np.where(numbers >= 0, sequence.ravel()[numbers], -1)
     present = (order >= 0) & light_field.present[0][order]
     files = None if light_field.files is None else np.where(present, light_field.files[0][order], "")

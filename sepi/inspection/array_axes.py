@@ -14,11 +14,11 @@ import numpy.typing as npt
 from sepi.inspection.view_layouts import MOVEMENT, Views, matched
 from sepi.lightfield import LightField
 
-# sequences of pictures that are looked at, reductions by which movement is searched, and its spacing
+# number of sequences of pictures, reductions for the search of movement, and its spacing
 _SEQUENCES = 8
 _REDUCTIONS = (1, 2, 4)
 _SPACING = 0.3
-# matching cost in place over the least that movement gives: at most of colours, at least of views
+# ratio of the matching cost in place to the least with movement: largest for colours, least for views
 _COLOURS = 1.2
 _VIEWS = 1.4
 _COLOUR_COUNTS = (3, 4)
@@ -37,7 +37,7 @@ def fitting_axes(readings: Mapping[str, LightField]) -> str | None:
 
 
 def _is_consistent(light_field: LightField) -> bool:
-    """Whether colours stay where they are, and the views of a row or column that is as short do not."""
+    """Whether colours show no parallax, and views of an equally short row or column do."""
     views = light_field.views
     T, S, H, W, C = views.shape
     if C > 1 and not _parallax(np.moveaxis(views, 4, 2).reshape(-1, C, H, W)) <= _COLOURS:
@@ -48,7 +48,7 @@ def _is_consistent(light_field: LightField) -> bool:
 
 
 def _parallax(pictures: npt.NDArray[np.generic]) -> float:
-    """How much better pictures match as a row or column of views than in place; NaN where that is undecided.
+    """Ratio of the matching cost of pictures in place to that as a row or column of views; NaN if undecided.
 
     ``pictures`` are (K, M, H, W), K sequences of M.
     """

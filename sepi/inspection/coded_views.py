@@ -12,7 +12,7 @@ from sepi.lightfield import LightField
 
 _BLOCK = 8
 _FEWEST_BLOCKS = 6
-# by how much neighbours differ more across a border than at the other seven places: as a part of that, and in standard
+# least excess of differences across block borders over those at the other seven places: relative, and in standard
 # deviations
 _MORE, _ERRORS = 0.12, 6.0
 
@@ -23,7 +23,7 @@ def coded_views(light_field: LightField) -> str | None:
     Parameters
     ----------
     light_field : LightField
-        Its reference view is looked at.
+        Its reference view is checked.
     """
     grey = light_field.reference_view.mean(axis=2)
     for axis in (0, 1):

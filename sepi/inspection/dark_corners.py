@@ -11,7 +11,7 @@ import numpy as np
 
 from sepi.lightfield import BoolMap, FloatMap
 
-# What is black, as part of the brightest there is; how much of a picture a lens leaves black: more is background
+# Brightness of black, as a share of the brightest; largest share of a picture that a lens leaves black
 _BLACK = 0.05
 _MOST_BLACK = 0.35
 
@@ -25,12 +25,12 @@ def dark_corners(reference_view: FloatMap, shape: tuple[int, ...], reach: int) -
     shape : tuple of int
         Height and width of the result; the picture is reduced to them.
     reach : int
-        How far filters reach, pixels of the result.
+        Reach of filters, pixels of the result.
 
     Returns
     -------
     ndarray, bool
-        Of ``shape``; all False where more is black than a lens leaves, since then it is the scene's background.
+        Mask of this shape; all False if more is black than a lens leaves, since then it is the scene's background.
     """
     brightness = np.max(cv2.split(reference_view), axis=0)
     black = brightness < _BLACK * np.quantile(brightness, 0.99)

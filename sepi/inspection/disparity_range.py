@@ -1,4 +1,4 @@
-"""Find the disparity range of a scene from its views alone.
+"""Disparity range of a scene, estimated from its views alone.
 
 A coarse plane sweep of the nearest views over all possible disparities locates the scene. A second sweep, around there
 only, with views as far away as possible, measures its range. Only trusted disparities count: those of surfaces, that
@@ -24,14 +24,14 @@ from sepi.inspection.coarse_sweep import agreeing, coarse_sweep
 from sepi.inspection.dark_corners import dark_corners
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float, require_light_field
 
-# Search: pixels per view step to each side, and at most this part of a view
+# Search: pixels per view step to each side, and at most this share of a view
 _WIDEST = 128.0
 _WIDEST_PART = 0.75
-# movement in the farthest view when the range is measured: pixels at most, also as part of the shorter side; sampling
+# largest movement in the farthest view for the measurement, in pixels and as a share of the shorter side; sampling
 _MOST_MOVEMENT = 24.0
 _MOST_MOVEMENT_PART = 0.25
 _SAMPLING = 0.5
-# views when there is no cross of them
+# number of views if there is no cross of them
 _MOST_VIEWS = 16
 # views much darker than the reference view are skipped
 _LEAST_BRIGHTNESS = 0.3
@@ -48,11 +48,11 @@ _MEDIAN = 5
 # largest difference that counts, full range = 1
 _TRUNCATION = 0.1
 
-# Trust: lowest cost as part of the lowest outside its valley. A limit on the cost itself would add nothing here, and
-# would have to know the noise.
+# Trust: largest ratio of the lowest cost to the lowest outside its valley. A limit on the cost itself adds nothing, and
+# would depend on the noise.
 _MOST_AMBIGUITY = 0.8
-# mean minus lowest cost. Below the first (the picture's brightest = 1) it is rounding. Below the second (full range =
-# 1), where JPEG left blocks, it is block edges, which match those of any other block
+# least mean minus lowest cost: smaller differences are rounding (the picture's brightest = 1), or in views with JPEG's
+# blocks, edges of blocks that match any other block's (full range = 1)
 _FLAT = 1e-3
 _FLAT_BLOCKS = 3e-3
 # side of these blocks; least ratio of differences across their edges to those inside; differences above the last, full
@@ -60,23 +60,23 @@ _FLAT_BLOCKS = 3e-3
 _BLOCK = 8
 _BLOCKINESS = 1.9
 _FAINT = 4 / 255
-# pixels of a window of so many, itself included, that agree within a candidate step
+# window, and least number of its pixels that agree within a candidate step
 _SUPPORT_WINDOW = 5
 _LEAST_SUPPORT = 13
-# pixels of a patch, each counted by how clear its match is: as part of the picture, and at least
+# least size of a patch, with pixels weighted by the clearness of their match: share of the picture, and pixels
 _PATCH = 3e-4
 _FEWEST_PIXELS = 25
-# with at most so many views, matches are verified in reverse
+# largest number of views for which matches are verified in reverse
 _FEW_VIEWS = 2
 
-# Range: part of the pixels that is left out on either side, and the margin, as part of the span
+# Range: share of the pixels that is left out on either side, and margin as a share of the span
 _OUTLIERS = 0.001
 _MARGIN = 0.06
-# quantile of movement that limits how far away views may be
+# quantile of movement that limits the distance of views
 _USUAL = 0.95
 
-# Range that misses the scene: mean above which there is texture, full range = 1; lowest cost of an unmatched pixel, as
-# part of that mean; side of unmatched patches, pixels; their share of the textured pixels
+# Range that misses the scene: least mean with texture, full range = 1; least cost of an unmatched pixel relative to
+# that mean; side of unmatched patches, pixels; their largest share of the textured pixels
 _TEXTURE = 0.003
 _MISFIT = 0.9
 _HOLE = 5
@@ -93,7 +93,7 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     Parameters
     ----------
     light_field : LightField
-        Its own range, ground truth and masks are not looked at.
+        Its own range, ground truth and masks are not used.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def estimate_range(light_field: LightField) -> DisparityRange:
 
     Examples
     --------
-    Before matching is done stage by stage; :func:`sepi.estimate_depth` does it by itself where no range is known.
+    Needed to call stages one by one; :func:`sepi.estimate_depth` estimates an unknown range itself.
 
     >>> import numpy as np
     >>> from sepi.inspection.disparity_range import estimate_range
@@ -128,15 +128,15 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     nearest = coarse.nearest
     widest = min(_WIDEST, _WIDEST_PART * max(light_field.shape) / nearest)
     low, high, usual = coarse.ends(nearest, -widest, widest, 1.0)
-    # the search is sure to about a candidate
+    # the search is accurate to about a candidate
     slack = coarse.factor / nearest
     if coarse.reach(usual) > nearest:
-        # more views, which few things match by chance
+        # more views, with fewer matches by chance
         low, high, usual = coarse.ends(coarse.reach(usual), low - slack, high + slack, _SAMPLING)
     reach = fine.reach(usual)
     low, high, _ = fine.ends(reach, low - slack, high + slack, _SAMPLING)
     margin = max(_MARGIN * (high - low), fine.factor * _SAMPLING / 10 / reach)
-    # two decimals more than the margin's first: numbers that can be read and typed
+    # two more digits than the margin's first one, for readable numbers
     digits = max(2, 1 - math.floor(math.log10(margin)))
     scale = 10**digits
     return DisparityRange(
@@ -149,12 +149,12 @@ def estimate_range(light_field: LightField) -> DisparityRange:
 def settle_range(light_field: LightField, given: tuple[float, float] | None = None) -> LightField:
     """The light field with a disparity range: the given one, else its own, else one estimated from the views.
 
-    Warns (:class:`sepi.errors.SepiWarning`) where a part of the scene is not in it.
+    Warns (:class:`sepi.errors.SepiWarning`) if a part of the scene lies outside.
 
     Raises
     ------
     SepiError
-        If the given range is none, or nothing is known and the views do not tell, or a disparity of the range would
+        If the given range is invalid, the range is unknown and cannot be estimated, or a disparity of the range would
         move every pixel out of the neighbouring view.
     """
     if given is not None:
@@ -180,10 +180,10 @@ def settle_range(light_field: LightField, given: tuple[float, float] | None = No
 
 
 def unmatched(light_field: LightField) -> float:
-    """Part of the textured pixels that match nowhere in the light field's disparity range, 0..1.
+    """Share of the textured pixels that match nowhere in the light field's disparity range, 0..1.
 
-    Only those count that the other views show over the whole range. What nearer things hide is up to 0.05 of them, in
-    tiny or very distant views 0.07.
+    Only pixels that the other views show over the whole range count. Occlusion alone gives up to 0.05, in tiny or very
+    distant views 0.07.
 
     Raises
     ------
@@ -194,22 +194,22 @@ def unmatched(light_field: LightField) -> float:
     views = _Views(light_field, _MOST_SEARCHED)
     reach = views.reach(max(-known.minimum, known.maximum))
     positions = views.positions(reach, [reach])
-    # the lowest cost is none at an end of the candidates
+    # a lowest cost at an end of the candidates is no match
     step = _SAMPLING * views.factor / reach
     candidates = views.candidates(reach, known.minimum - step, known.maximum + step, _SAMPLING)
-    # what hides a pixel from the views on one side does not from those on the other
+    # a pixel hidden from the views on one side is seen on the other
     before = {place for place in positions if sum(place) < sum(light_field.reference_position)}
     sides = filter(None, (sorted(before), sorted({*positions} - before)))
     cost = np.minimum.reduce([views.sweep(side, candidates, truncation=math.inf)[0] for side in sides])
     texture = cv2.blur(abs(views.reference), (2 * _RADIUS + 1, 2 * _RADIUS + 1))
-    # the mean of filtered noise is a quarter of its deviation
+    # the mean absolute value of filtered noise is a quarter of its standard deviation
     textured = views.seen & (texture > max(_TEXTURE, noise_of_reference_view(light_field) / views.factor))
     y, x = np.ceil(abs(views.offsets(positions)).max(axis=0) * abs(candidates).max()).astype(int) + _RADIUS
     counted = textured[y:-y, x:-x]
     if not counted.any():
         return 0.0
     alone = (counted & ~(cost < _MISFIT * texture)[y:-y, x:-x]).astype(np.uint8)
-    # not the narrow bands beside edges that hide them from some views
+    # without the narrow bands beside edges that are hidden from some views
     patches = cv2.morphologyEx(alone, cv2.MORPH_OPEN, np.ones((_HOLE, _HOLE), np.uint8))
     return float(patches.sum() / counted.sum())
 
@@ -237,7 +237,7 @@ class _Views:
         return int(max(self.nearest, min(self._farthest, movement / max(disparity, 1e-3))))
 
     def positions(self, reach: int, distances: Sequence[int]) -> _Positions:
-        """Grid positions in the row and the column of the reference view; any others where those are not there."""
+        """Grid positions in the row and the column of the reference view; any others without those."""
         t0, s0 = self._own
         present = [
             (int(t), int(s))
@@ -250,7 +250,7 @@ class _Views:
         return self._bright([(t, s) for t, s in cross if max(abs(t - t0), abs(s - s0)) in distances] or cross)
 
     def candidates(self, reach: int, low: float, high: float, sampling: float) -> FloatMap:
-        """Disparities between two, ``sampling`` pixels apart in views ``reach`` steps away."""
+        """Disparities from low to high, ``sampling`` pixels apart in views ``reach`` steps away."""
         sampling /= reach
         numbers = np.arange(math.floor(low / self.factor / sampling), math.ceil(high / self.factor / sampling) + 1)
         return (numbers * sampling).astype(np.float32)
@@ -269,18 +269,18 @@ class _Views:
         return coarse_sweep(self._view(own or self._own), views, offsets, candidates, truncation, _RADIUS)
 
     def ends(self, reach: int, low: float, high: float, sampling: float) -> tuple[float, float, float]:
-        """Lowest and highest disparity that can be trusted, by views at most ``reach`` away, and how far most move."""
+        """Lowest and highest trusted disparity, from views at most ``reach`` away, and movement of most pixels."""
         positions = self.positions(reach, [max(1, round(reach * n / 4)) for n in range(1, 5)])
         candidates = self.candidates(reach, low, high, sampling)
         lowest, second, mean, disparity = self.sweep(positions, candidates)
-        # neighbours agree within a pixel of the most distant view, however finely it is searched
+        # neighbours agree within a pixel of the farthest view, for any sampling
         tolerance = max(sampling, 1) / reach
         trusted = _trusted(lowest, second, mean, disparity, tolerance, self._flat) & self.seen
         if len(positions) <= _FEW_VIEWS:
             trusted &= self._matches_back(positions, candidates, disparity, tolerance)
         # against noise, which would stretch the range
         smooth = np.asarray(cv2.medianBlur(disparity, _MEDIAN), np.float32)
-        # of few views a match that is hardly clear counts less
+        # with few views, an unclear match counts less
         unclear = np.divide(lowest, second, out=np.ones_like(lowest), where=trusted)
         pixels, patches = _patches(trusted, np.minimum(1, len(positions) * (1 - unclear)) ** 2, smooth, tolerance)
         if pixels.size < _FEWEST_PIXELS:
@@ -289,7 +289,7 @@ class _Views:
                 "views; give a range (MIN MAX, pixels per view step)"
             )
         low, high = np.quantile(pixels, [_OUTLIERS, 1 - _OUTLIERS])
-        # small surfaces far before or behind the others are not outliers
+        # small surfaces far in front of or behind the others are not outliers
         found = min(low, patches.min()), max(high, patches.max()), np.quantile(abs(pixels), _USUAL)
         low, high, usual = (self.factor * float(value) for value in found)
         return low, high, usual
@@ -297,7 +297,7 @@ class _Views:
     def _matches_back(
         self, positions: _Positions, candidates: FloatMap, disparity: FloatMap, tolerance: float
     ) -> BoolMap:
-        """Whether the first of the other views, matched with all others, has the same disparity there, shape (H, W)."""
+        """Whether the first other view, matched with all others, has the same disparity there; shape (H, W)."""
         first, *others = positions
         back = self.sweep([self._own, *others], candidates, first)[-1]
         down, across = self.offsets([first])[0]
@@ -306,7 +306,7 @@ class _Views:
         return np.asarray(abs(there - disparity) < tolerance)
 
     def _bright(self, positions: _Positions) -> _Positions:
-        """Those that are not much darker than the reference view; all, if that leaves too few."""
+        """Positions of views that are not much darker than the reference view; all if these are too few."""
         views = self.light_field.rgb_views
         limit = _LEAST_BRIGHTNESS * float(views[self._own].mean())
         bright = [position for position in positions if float(views[position].mean()) >= limit]
@@ -316,7 +316,7 @@ class _Views:
         if position not in self._prepared:
             colours = as_unit_float(self.light_field.rgb_views[position])
             view = np.asarray(np.mean(cv2.split(colours), axis=0), np.float32)
-            # as bright as the reference: lenses darken the views towards the edge of the grid
+            # as bright as the reference view, since lenses darken views at the border of the grid
             mean = float(view.mean())
             if position != self._own and mean > 0:
                 view *= np.float32(self._brightness / mean)
@@ -325,7 +325,7 @@ class _Views:
 
 
 def _prepared(grey: FloatMap, factor: int) -> FloatMap:
-    """Reduced, high-pass filtered picture, (H, W) float32, of a grey one."""
+    """Reduced, high-pass filtered grey picture, (H, W) float32."""
     if factor > 1:
         size = (max(1, grey.shape[1] // factor), max(1, grey.shape[0] // factor))
         grey = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), np.float32)
@@ -349,17 +349,15 @@ def _has_blocks(view: FloatMap) -> bool:
 def _trusted(
     lowest: FloatMap, second: FloatMap, mean: FloatMap, disparity: FloatMap, tolerance: float, flat: float
 ) -> BoolMap:
-    """Pixels whose best candidate is clear, and has enough of the like about it, shape (H, W)."""
+    """Pixels whose best candidate is clear, and enough of whose neighbours agree; shape (H, W)."""
     clear = (lowest < _MOST_AMBIGUITY * second) & (mean - lowest > flat)
     return clear & (agreeing(disparity, clear, _SUPPORT_WINDOW, tolerance) >= _LEAST_SUPPORT)
 
 
 def _patches(trusted: BoolMap, weight: FloatMap, disparity: FloatMap, tolerance: float) -> tuple[FloatMap, FloatMap]:
-    """Disparities of trusted pixels in patches that are large enough, neighbours whose disparities are close to each
-    other's, and the median of each patch.
-    """
+    """Disparities of trusted pixels in large patches of neighbours with close disparities, and each patch's median."""
     H, W = trusted.shape
-    # a pixel between any two neighbours says whether they are joined
+    # a pixel between two neighbours tells whether they are joined
     joined = np.zeros((2 * H - 1, 2 * W - 1), np.uint8)
     joined[::2, ::2] = trusted
     joined[::2, 1::2] = trusted[:, 1:] & trusted[:, :-1] & (abs(np.diff(disparity, axis=1)) < tolerance)

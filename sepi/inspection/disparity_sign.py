@@ -32,8 +32,8 @@ _FARTHEST = 24
 # order of the views: occluded strips are narrow
 _MOST_MOVEMENT = 16
 _MOST_PIXELS = 1_200_000
-# Matching: half width of the window, pixels; largest difference of one view, and what flat areas differ by, the
-# picture's deviation = 1; lowest cost as part of the lowest outside its valley
+# Matching: half width of the window, pixels; largest difference of one view, and difference in flat areas, the
+# picture's deviation = 1; largest ratio of the lowest cost to the lowest outside its valley
 _SWEEP_RADIUS = 2
 _TRUNCATION = 1.5
 _FLAT = 0.02
@@ -43,12 +43,12 @@ _NOISE_FLOOR = 0.05
 # look like two
 _SURFACE_WINDOW = 7
 _LEAST_SUPPORT = 0.6
-# What rounding to 8 bits adds to the square of a difference, full range = 1; most of it, the picture's variance = 1:
-# in pictures of a few grey levels, rounding looks like surfaces
+# Squared difference by rounding to 8 bits, full range = 1; its largest value, the picture's variance = 1, since in
+# pictures of a few grey levels rounding looks like surfaces
 _ROUNDING = 1 / (6 * 255**2)
 _MOST_ROUNDING = 0.02
-# Residuals: half width of the window, pixels; least that is taken for noise, the picture's variance = 1 (interpolation
-# leaves as much); most of a pixel that is seen; as a multiple of the noise, least of one that is hidden
+# Residuals: half width of the window, pixels; least noise, the picture's variance = 1 (as by interpolation); largest
+# residual of a pixel that is seen; least of one that is hidden, as a multiple of the noise
 _WINDOW_RADIUS = 2
 _LEAST_NOISE = 3e-3
 _SEEN = 0.3
@@ -56,7 +56,7 @@ _HIDDEN = 4.0
 # Two surfaces count as two where they are this far apart in a view, pixels; they meet in it within this distance
 _LEAST_SHIFT = 1.5
 _MEETING = 0.75
-# Logarithm of the ratio of residuals: that one pair counts at most; the least that tells anything
+# Logarithm of the ratio of residuals: largest value of a pair; least value that counts
 _MOST_EVIDENCE = 2.0
 _LEAST_EVIDENCE = 1.0
 # Number of the farthest views on each side that are tested for occlusion
@@ -75,11 +75,11 @@ class Evidence(NamedTuple):
     Attributes
     ----------
     mean : float
-        From -2 to 2: above 0 where the surface of the greater disparity is in front, as it should be.
+        From -2 to 2: above 0 if the surface of larger disparity is in front, as it should be.
     errors : float
         Absolute value of the mean, in standard errors.
     regions, agreeing : int
-        How many regions have evidence, and how many of them agree with the mean.
+        Number of regions with evidence, and of those that agree with the mean.
     """
 
     mean: float
@@ -89,21 +89,21 @@ class Evidence(NamedTuple):
 
 
 class Look(Enum):
-    """How closely the views are looked at; the closer, the longer it takes."""
+    """Thoroughness of the check, which takes time."""
 
     GLANCE = 1
-    """Bands of rows in the views beside the reference: enough where many things hide others."""
+    """Bands of rows in the views beside the reference view; enough for scenes with much occlusion."""
     AXES = 2
-    """The views of the middle row and column, which hide least of each other."""
+    """The views of the middle row and column."""
     MANY_VIEWS = 3
-    """Also views off them, which see more where there is noise or little texture."""
+    """Also other views, for noise or little texture."""
 
 
 def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views: Views) -> Evidence:
-    """Whether the surface of the greater disparity is the one in front.
+    """Evidence that the surface of larger disparity is in front.
 
-    ``views`` are those of the trial, whose best layout is taken for right; the sign is that of the layout's first
-    order. There is no evidence where there are no views on opposite sides, or hardly any contrast.
+    ``views`` are those of the trial, whose best layout is assumed; the sign is that of the layout's first order. There
+    is no evidence without views on opposite sides, or with hardly any contrast.
     """
     views = views.again(light_field, _MOST_PIXELS)
     order = next(iter(trial.best))
@@ -111,7 +111,7 @@ def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views:
     reach, directions = _directions(views, largest)
     rows = np.ones(views.shape[0], bool)
     if look is Look.GLANCE:
-        # what moves along rows does not leave its band
+        # points move along rows and stay in their band
         directions = [d for d in directions if not baselines_under(order, views.in_steps(_at(d, reach)))[:, 0].any()]
         rows = np.arange(views.shape[0]) // _BAND_ROWS % _BANDS == _BANDS // 2
     # in units of the picture's own contrast
@@ -152,9 +152,9 @@ def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views:
 
 
 def _residual(reference: FloatMap, view: FloatMap, baseline: FloatMap, disparity: FloatMap, asked: BoolMap) -> FloatMap:
-    """Mean squared difference, shape (H, W) float32, of each pixel's window and where it should be seen in a view.
+    """Mean squared difference between each pixel's window and its position in a view; shape (H, W), float32.
 
-    ``baseline`` leads down and across to the view, in view steps. Infinite where it is not asked for, and where the
+    ``baseline`` leads down and across to the view, in view steps. Infinite outside the mask ``asked``, and where the
     window leaves either picture.
     """
     out = np.empty_like(reference)
@@ -175,7 +175,7 @@ def _add_pairs(
 ) -> None:
     """Add the evidence of pixel pairs that meet in a view, and their number, to the sums of each region.
 
-    ``residual`` is that of the view, ``opposite`` the mean of those on the other side, where both pixels are seen.
+    ``residual`` is that of the view, ``opposite`` the mean over the views on the other side, which see both pixels.
     """
     usable = surface & (opposite <= _SEEN) & np.isfinite(residual)
     rise = np.zeros(disparity.shape, np.float32)
@@ -206,7 +206,7 @@ def add_pairs(
     height, width = disparity.shape
     suspect = usable & (residual > hidden)
     y, x = np.nonzero(suspect)
-    # few pixels are hidden: each is paired with what may hide it, and what it may hide
+    # few pixels are hidden: each is paired with possible occluders, and with pixels that it may occlude
     for distance, towards in itertools.product(range(2, farthest + 1), (1, -1)):
         i, j = y + towards * distance * direction[0], x + towards * distance * direction[1]
         inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
@@ -216,7 +216,7 @@ def add_pairs(
         meet = usable[other] & (np.abs(shift - distance) <= _MEETING) & (shift >= _LEAST_SHIFT)
         meet &= np.maximum(rise[here], rise[there]) > _LEAST_EVIDENCE
         if towards == -1:
-            # the pair was found from its other pixel
+            # its other pixel gives the same pair
             meet &= ~suspect[other]
         regions = here[0][meet] // side, here[1][meet] // side
         np.add.at(total, regions, np.clip(rise[here] - rise[there], -_MOST_EVIDENCE, _MOST_EVIDENCE)[meet])
@@ -224,14 +224,14 @@ def add_pairs(
 
 
 def _summary(total: npt.NDArray[np.float64], count: npt.NDArray[np.float64]) -> Evidence:
-    """Mean over the regions, each weighed by its pairs, and how sure it is."""
+    """Mean over the regions, weighted by their pairs, with its error."""
     heard = count >= _PAIRS
     regions = int(heard.sum())
     if regions < 2:
         return Evidence(0.0, 0.0, regions, 0)
     values, weights = total[heard] / count[heard], count[heard]
     mean = float((weights * values).sum() / weights.sum())
-    # regions that all say the same are not without error
+    # equal values in all regions do not mean that there is no error
     deviation = max(float(np.sqrt((weights**2 * (values - mean) ** 2).sum() / (weights**2).sum())), 0.1)
     error = deviation * float(np.sqrt((weights**2).sum()) / weights.sum())
     return Evidence(mean, abs(mean) / error, regions, int((values * mean > 0).sum()))
@@ -248,9 +248,9 @@ def _regions(shape: tuple[int, ...]) -> tuple[int, int]:
 
 
 def _directions(views: Views, largest: float) -> tuple[int, list[Baseline]]:
-    """Distance, and directions in which there are views at it and at half of it, on both sides.
+    """Distance of the views to use, and directions with views at it and at half of it, on both sides.
 
-    The most distant at which nothing moves by more than is searched: the strips that are hidden are widest there.
+    It is the largest distance at which all movement stays within the search, since hidden strips are widest there.
     """
     axes = [(n * t, n * s) for t, s in _DIRECTIONS for n in range(1, _FARTHEST + 1)]
     present = set(views.worth_matching([baseline for baseline in views.baselines if baseline in axes]))
@@ -273,7 +273,7 @@ def _at(direction: Baseline, reach: int) -> list[Baseline]:
 
 
 def _beside(views: Views, direction: Baseline, reach: int) -> list[Baseline]:
-    """Baselines to the views on one side that are off its axis, at 45 degrees to each of those on it."""
+    """Baselines to the views on one side off its axis, at 45 degrees to those on it."""
     t, s = direction
     distances = [abs(down + across) for down, across in _at(direction, reach)]
     corners = [(n * (t + k * s), n * (s + k * t)) for n in distances for k in (-1, 1)]
@@ -284,7 +284,7 @@ def _beside(views: Views, direction: Baseline, reach: int) -> list[Baseline]:
 def _disparity(
     reference: FloatMap, sides: list[tuple[FloatMap, FloatMap]], candidates: FloatMap
 ) -> tuple[FloatMap, BoolMap]:
-    """Disparity of each pixel, and where it is trusted, by the side from which the pixel is seen best.
+    """Disparity of each pixel from the side with the better match, and mask of trusted ones.
 
     A pixel that is hidden on one side still shows its disparity on the other.
     """
@@ -295,7 +295,7 @@ def _disparity(
     chosen = np.stack([sweep[0] for sweep in sweeps]).argmin(axis=0)
     lowest, second, mean, disparity = (np.choose(chosen, [sweep[n] for sweep in sweeps]) for n in range(4))
     with np.errstate(invalid="ignore"):
-        # what noise adds to every cost says nothing
+        # without the constant that noise adds to all costs
         floor = np.quantile(lowest[np.isfinite(lowest)], _NOISE_FLOOR) if np.isfinite(lowest).any() else 0
         trusted = (lowest - floor < _MOST_AMBIGUITY * (second - floor)) & (mean - lowest > _FLAT)
     spacing = candidates[1] - candidates[0]
@@ -306,6 +306,6 @@ def _disparity(
 def _typical(parts: list[FloatMap]) -> float:
     """Median of the finite values; 0 if there are none."""
     values = np.concatenate(parts)
-    # every seventh is enough
+    # every seventh value is enough
     values = values[np.isfinite(values)][::7]
     return float(np.median(values)) if values.size else 0.0

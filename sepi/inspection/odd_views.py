@@ -1,7 +1,7 @@
-"""Finds views that do not belong: of another scene, turned over, black, or copied from another place.
+"""Finds odd views: of another scene, rotated, black, or copied from another place.
 
-Small pictures of neighbouring views are alike after a small shift, in any grid. So views form groups; where one group
-holds most views, the others do not belong.
+Small pictures of neighbouring views are alike after a small shift, in any grid. So views form groups; if one group has
+most views, the others are odd.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ Places = npt.NDArray[np.int64]
 
 # Pixels of the small pictures, at most
 _MOST_PIXELS = 5_200
-# Movement searched to each side, as part of the shorter side; number of other views, spread over the grid, that a view
-# unlike its neighbours is compared with
+# Movement searched to each side, as a share of the shorter side; number of other views, spread over the grid, for the
+# comparison of a view unlike its neighbours
 _MOVEMENT = 1 / 8
 _OTHERS = 32
-# Views are alike if their correlation is at least this part of the one that half of the views reach with another. If
-# that one is below the least, no view is judged: noise or wide steps hide the likeness.
+# Views are alike if their correlation is at least this share of the median of all views' best correlations. If that is
+# below the least, no view is judged, since noise or wide steps hide the likeness.
 _ALIKE = 0.4
 _LEAST = 0.18
 
@@ -59,7 +59,7 @@ def odd_views(light_field: LightField) -> list[str]:
 
 
 def _flags(light_field: LightField, places: Places) -> str:
-    """Flags that leave views out: by file name, or by position where views have no files of their own."""
+    """Flags that leave out views: by file name, or by position if views have no files of their own."""
     files = light_field.files
     at = sorted(places.tolist())
     names = [f"{t},{s}" if files is None else shlex.quote(one_line(str(files[t, s]))) for t, s in at]
@@ -67,7 +67,7 @@ def _flags(light_field: LightField, places: Places) -> str:
 
 
 def _misfits(places: Places, small: list[FloatMap]) -> list[int]:
-    """Views that are like none of most of the others; none where these are too little like each other."""
+    """Views outside the largest group of similar views; none if views are too different."""
     index = {(t, s): at for at, (t, s) in enumerate(places.tolist())}
     pairs = [(at, index.get(next_to, at)) for (t, s), at in index.items() for next_to in ((t, s + 1), (t + 1, s))]
     found = [(at, other, _correlation(small[at], small[other])) for at, other in pairs if at != other]
@@ -82,7 +82,7 @@ def _misfits(places: Places, small: list[FloatMap]) -> list[int]:
                 group[group == group[other]] = group[at]
         return np.flatnonzero(group != np.bincount(group).argmax())
 
-    # in a wrong order neighbours are not
+    # in a wrong order, neighbours in the grid are not neighbours
     usual = np.setdiff1d(np.arange(len(places)), odd())
     others = product(odd().tolist(), usual[:: 1 + usual.size // _OTHERS].tolist())
     found += [(at, other, _correlation(small[at], small[other])) for at, other in others]
@@ -93,7 +93,7 @@ def _correlation(first: FloatMap, second: FloatMap) -> float:
     """Highest correlation, -1 to 1, of one picture with the other's middle, over small movements."""
     edge = max(1, round(_MOVEMENT * min(first.shape)))
     middle = second[edge:-edge, edge:-edge]
-    # what has no contrast is alike to all for OpenCV
+    # OpenCV finds pictures without contrast alike to all
     if not (middle.size and np.ptp(middle) and np.ptp(first)):
         return 0.0
     return float(cv2.matchTemplate(first, middle, cv2.TM_CCOEFF_NORMED).max())

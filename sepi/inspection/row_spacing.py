@@ -31,7 +31,7 @@ from sepi.lightfield import LightField
 # Spacings tried, and how many between one and its double
 _MOST = 4.0
 _PER_OCTAVE = 4
-# Points that are enough to tell spacings apart, and to measure the one found
+# Number of points to distinguish spacings, and to measure the one found
 _POINTS_TO_TELL, _POINTS_TO_CHOOSE = 80, 150
 # Layouts up to the sign
 _ORDERS = ("as-given", "flip-rows", "transpose", "transpose-flip-rows")
@@ -65,7 +65,7 @@ def settle_row_spacing(light_field: LightField, views: Views | None = None) -> L
 
 
 class _Trial(NamedTuple):
-    """What the views at one distance say."""
+    """Best spacing from the views at one distance."""
 
     spacing: float
     order: str
@@ -75,18 +75,18 @@ class _Trial(NamedTuple):
 
 
 def estimate_row_spacing(views: Views) -> float | None:
-    """Distance of rows in view steps, where another than that of the columns fits clearly better.
+    """Distance of rows in view steps, if another than that of columns fits clearly better.
 
     Parameters
     ----------
     views : Views
-        The distance that they have is not looked at.
+        Their own row spacing is not used.
 
     Returns
     -------
     float or None
-        In the order in which the light field was read. None where rows are as far apart as columns, where there is
-        only one of either, or where the views do not tell.
+        For the order in which the light field was read. None if rows are as far apart as columns, there is only one
+        row or column, or the spacing is unclear.
     """
     for reach, factor in search_distances(views):
         trial = _tried(views, reach, factor)
@@ -100,7 +100,7 @@ def estimate_row_spacing(views: Views) -> float | None:
 
 
 def _tried(views: Views, reach: int, factor: int) -> _Trial | None:
-    """The spacing that fits best; None where views at this distance do not tell.
+    """The best spacing from views at this distance; None if unclear.
 
     It is clear if it fits clearly better than equal spacing in any layout.
     """

@@ -18,14 +18,14 @@ from sepi.io.readers.options import AS_GIVEN, ORDERS
 from sepi.lightfield import LightField, require_light_field
 from sepi.validation import require_known
 
-# What the sign needs: regions of the picture where one surface is seen to hide another, the mean of what they say
-# (-2 to 2), and how many standard errors that is; and what it takes to say that near and far are exchanged
+# Least evidence for the sign: regions of the picture with occlusion, their mean (-2 to 2), and that in standard errors;
+# and the same to find near and far exchanged
 _FEWEST_REGIONS = 5
 _LEAST_EVIDENCE, _LEAST_ERRORS = 0.75, 3.5
 _PLAIN_EVIDENCE, _PLAIN_ERRORS = 0.85, 3.75
 
 SIGN_OPEN = "near and far cannot be told apart here"
-"""How a note begins that depth may be inside out."""
+"""Beginning of the note that depth may be inside out."""
 
 _FAULTS = {
     "flip-rows": "the rows of views run the other way",
@@ -37,13 +37,13 @@ _FAULTS = {
     "transpose-flip-both": "rows and columns of views are exchanged, and both run the other way",
 }
 
-# no two orders of it are equal
+# a grid in which all orders differ
 _GRID = np.arange(6).reshape(2, 3)
 
 
 @dataclass(frozen=True)
 class OrderCheck:
-    """How well each order of the views fits: the result of :func:`check_order`.
+    """Result of :func:`check_order`: matching cost of each order, and the best one.
 
     Attributes
     ----------
@@ -52,14 +52,14 @@ class OrderCheck:
     best : str
         Order of the lowest matching cost; of equal ones the given order, then the first.
     clear : bool
-        Whether the views fit clearly better in this order than in others, but for exchanging near and far.
+        Whether this order, or the one with near and far exchanged, fits clearly better than the others.
     sign_clear : bool
         Whether occlusion tells near from far.
     read_in : str
         Order in which the light field was read.
     regions, agreeing : int
-        Regions of the picture where one surface is seen to hide another, and those that agree on the sign. No region
-        where camera positions in the names of files tell the sign.
+        Number of regions of the picture with occlusion, and of those that agree on the sign; 0 if camera positions in
+        file names tell the sign.
     fits_none : bool
         Whether the views match badly in every order although they show texture.
 
@@ -122,7 +122,7 @@ class OrderCheck:
         Returns
         -------
         str or None
-            None unless another order is clearly better, or the views fit together in none.
+            None, unless another order fits clearly better, or the views fit together in none.
         """
         if self.fits_none:
             return (
@@ -140,17 +140,16 @@ class OrderCheck:
 
 
 def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views | None = None) -> OrderCheck:
-    """Find out in which order the views fit together.
+    """Check in which order the views fit together.
 
     Parameters
     ----------
     light_field : LightField
-        Its disparity range, ground truth and reference view are not looked at.
+        Its disparity range, ground truth and reference view are not used.
     read_in : str
-        Order in which it was read, one of :data:`sepi.io.readers.options.ORDERS`; the orders of the result are to take
-        its place.
+        Order in which it was read, one of :data:`sepi.io.readers.options.ORDERS`; the result's orders replace it.
     views : Views, optional
-        Its views, where they were looked at before.
+        Its views, if prepared before.
 
     Returns
     -------
@@ -158,7 +157,7 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views |
 
     Examples
     --------
-    A light field whose rows of views were stored the other way round:
+    A light field with its rows of views in reverse:
 
     >>> from sepi import LightField
     >>> from sepi.inspection.view_order import check_order
@@ -180,30 +179,30 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views |
     costs = dict(trial.costs)
     sign_clear, evidence = False, Evidence(0.0, 0.0, 0, 0)
     if trial.clear:
-        # near and far as they are, if the order is right but for them: to doubt that takes more
+        # the sign of the given order, if that may be right: rejecting it needs more evidence
         kept = next((sign for order, sign in trial.best.items() if order == AS_GIVEN), None)
         evidence, sign_clear = _evidence_of_sign(light_field, trial, kept, views)
         if sign_clear:
-            # at most half way to the next layout: the wrong sign is still the better layout
+            # less than half way to the next layout, since even the wrong sign fits better than another layout
             for order, sign in trial.best.items():
                 costs[order] += trial.gap / 2 * (0.5 - sign * evidence.mean / 4)
         elif any(light_field.directions):
             evidence = Evidence(0.0, 0.0, 0, 0)
             for order in trial.best:
-                # whether coordinates grow or fall from column to column then, or nothing is known
+                # direction of coordinates from column to column in this order; 0: unknown
                 right = int(baselines_under(order, np.eye(2))[:, 1] @ light_field.directions)
                 sign_clear = right != 0
                 costs[order] += trial.gap / 4 * (1 - right)
-    # from changes of the light field available to orders that take the place of the given one
+    # from changes of this light field to orders that replace the given one
     fits = {order: costs[change_of_order(read_in, order)] for order in ORDERS}
     best = min(ORDERS, key=lambda order: (fits[order], order != read_in))
     return OrderCheck(fits, best, trial.clear, sign_clear, read_in, evidence.regions, evidence.agreeing, fits_none)
 
 
 def _evidence_of_sign(light_field: LightField, trial: Trial, kept: int | None, views: Views) -> tuple[Evidence, bool]:
-    """Evidence of occlusion, and whether it is clear; ``kept`` is the sign of the given order, where that may be right.
+    """Evidence of occlusion, and whether it is clear; ``kept`` is the sign of the given order, if that may be right.
 
-    A quick check suffices to accept the order. To reject it takes a closer check that no still closer one contradicts.
+    A quick check is enough to accept the order. Rejecting it needs a closer check that the closest does not contradict.
     """
     doubt: Evidence | None = None
     for look in Look if kept is not None else (Look.AXES, Look.MANY_VIEWS):
@@ -223,12 +222,12 @@ def _is_clear(evidence: Evidence, plainly: bool) -> bool:
 
 
 def change_of_order(read_in: str, target: str) -> str:
-    """The order that takes a grid read in order ``read_in`` to what reading it in order ``target`` gives."""
+    """The order that changes a grid read in order ``read_in`` to one read in order ``target``."""
     turned = ORDERS[target](_GRID)
     return next(order for order in ORDERS if np.array_equal(ORDERS[order](ORDERS[read_in](_GRID)), turned))
 
 
 def turned_by_half(order: str) -> str:
     """The order that differs from another by half a turn, which exchanges near and far."""
-    # reading in the one and turning is reading in the other
+    # reading in one order and rotating equals reading in the other
     return next(other for other in ORDERS if change_of_order(order, other) == "flip-both")
