@@ -1,4 +1,4 @@
-"""Maps a rectified view's results back to the picture that its camera took, rotation and distortion included."""
+"""A rectified view's results at the pixels of the picture that its camera took, with rotation and distortion."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ def as_taken(
     Parameters
     ----------
     disparity : ndarray, shape (H, W), float32
-        Of the rectified view, pixels per view step.
+        Disparity of the rectified view, pixels per view step.
     camera : Camera
-        Of the light field.
+        Camera of the light field.
     rig : Rig
         With any rectified view at its origin.
     position : (int, int)
-        The view's, in the grid.
+        Position of the view in the grid.
     from_centre : (float, float)
         Baseline (down, across) from the grid's centre view to the view, in view steps.
 
     Returns
     -------
     disparity : ndarray, shape (height, width of the picture), float32
-        As the rectified view has it there, interpolated within a surface; NaN where the rectified view shows nothing.
+        That of the rectified view there, interpolated within a surface; NaN where the rectified view has no pixels.
     depth : ndarray, of the same shape, float32
         Along the camera's optical axis, units of the world; infinite at and beyond infinity.
     """
@@ -46,7 +46,7 @@ def as_taken(
     lens = view.shot.lens
     own, rays = _rays(view, rig)
     found = _sampled(disparity, _places(disparity.shape, camera, view, rays, from_centre))
-    # both from the camera itself: along the common way that rectified views look, then along its own
+    # depth from the camera itself: along the viewing direction of rectified views, then along its own
     along = camera.depth(found).astype(np.float64) - _ahead(view, rig)
     depth = np.where(np.isfinite(found), along * own[:, 2] / rays[:, 2], np.nan)
     shape = lens.height, lens.width
@@ -65,8 +65,7 @@ def sigma_as_taken(
     Returns
     -------
     ndarray, shape (height, width of the picture), float32
-        That of the nearest pixel of the rectified view, since a mean of two would describe neither; NaN where the
-        rectified view shows nothing.
+        That of the nearest pixel of the rectified view, not interpolated; NaN where the rectified view has no pixels.
     """
     view = rig.views[position]
     _, rays = _rays(view, rig)
@@ -86,7 +85,7 @@ def _rays(view: Rectified, rig: Rig) -> tuple[Floats, Floats]:
 def _places(
     shape: tuple[int, ...], camera: Camera, view: Rectified, rays: Floats, from_centre: tuple[float, float]
 ) -> Floats:
-    """Places ``(x, y)`` in a rectified view of ``shape`` that rays go through, (N, 2); NaN for what lies behind."""
+    """Positions ``(x, y)`` of rays in a rectified view of ``shape``, (N, 2); NaN for rays backwards."""
     with np.errstate(divide="ignore", invalid="ignore"):
         flat = np.where(rays[:, 2:] > 0, rays[:, :2] / rays[:, 2:], np.nan)
     return _principal(shape, camera, from_centre) + camera.focal_px * view.zoom * flat
@@ -101,12 +100,12 @@ def _principal(shape: tuple[int, ...], camera: Camera, from_centre: tuple[float,
 
 
 def _ahead(view: Rectified, rig: Rig) -> float:
-    """How far before the plane of the views a camera stood."""
+    """Distance of a camera in front of the plane of the views."""
     return float((view.shot.centre - rig.origin) @ rig.rotation[2])
 
 
 def _sampled(values: FloatMap, at: Floats) -> FloatMap:
-    """Values at places ``(x, y)``, (N, 2): linear within a surface, else those of the nearest pixel; NaN outside."""
+    """Values at positions ``(x, y)``, (N, 2): linear within a surface, else of the nearest pixel; NaN outside."""
     height, width = values.shape
     inside, within = _inside(values.shape, at)
     left, top = np.floor(within).astype(int).T
@@ -120,14 +119,14 @@ def _sampled(values: FloatMap, at: Floats) -> FloatMap:
 
 
 def _inside(shape: tuple[int, ...], at: Floats) -> tuple[npt.NDArray[np.bool_], Floats]:
-    """Which places ``(x, y)``, (N, 2), lie in a picture, and the places between the middles of its outer pixels."""
+    """Mask of positions ``(x, y)``, (N, 2), inside a picture, and positions moved to within its outer pixels' middles."""
     height, width = shape
-    # what is nearest to a pixel of the border is that pixel's
+    # positions beyond the middle of a border pixel belong to it
     with np.errstate(invalid="ignore"):
         inside = np.asarray(((at > -0.5) & (at < np.array([width, height]) - 0.5)).all(axis=1))
     return inside, np.clip(np.where(inside[:, None], at, 0), 0, (width - 1, height - 1))
 
 
 def _nearest(values: FloatMap, within: Floats) -> FloatMap:
-    """Values of the pixels nearest to places in the picture, (N,)."""
+    """Values of the pixels nearest to positions in the picture, (N,)."""
     return np.asarray(values[tuple(np.rint(within).astype(int).T[::-1])])

@@ -1,9 +1,9 @@
-"""Structure from motion by pycolmap: makes a COLMAP model for :func:`sepi.read_cameras` of pictures without poses.
+"""Structure from motion by pycolmap: a COLMAP model for :func:`sepi.read_cameras` from pictures without poses.
 
-Sweeps that make light fields are narrow: they lack the wide ray angles and the constraints on focal length that
-structure from motion usually needs. So matches a pixel off are rejected, and a ray angle of one pixel suffices for a
-point. Lenses stay as in the files, or at usual values, until all pictures are placed. Then they are refined, and kept
-so where the points come clearly closer.
+Sweeps for light fields are narrow: they lack the wide ray angles and the constraints on focal length that structure
+from motion usually needs. So matches a pixel off are rejected, and a ray angle of one pixel is enough for a point.
+Lenses stay as in the files, or at usual values, until all pictures are placed. Then they are refined, and the refined
+lens is kept if the points lie clearly closer.
 """
 
 from __future__ import annotations
@@ -35,44 +35,44 @@ from sepi.validation import require_known
 CAMERAS = ("one", "each")
 """Whether one camera took all pictures, or each has a camera of its own."""
 
-# longer side, pixels, of what features are found in
+# longer side of pictures for features, pixels
 _SIDE = 2000
-# pictures of which all pairs are matched; beyond, steps in the order of their names
+# largest number of pictures of which all pairs are matched; beyond, steps in the order of their names
 _ALL_PAIRS = 60
 _STEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
-# least ray angles of the first two pictures, degrees; COLMAP lowers each by itself. The next is tried if less than this
-# share of the pictures is placed
+# least ray angles of the first two pictures, degrees; COLMAP lowers each by itself. The next one is tried if less than
+# this share of the pictures is placed
 _FIRST_ANGLES, _ENOUGH = (4.0, 1.0), 0.9
-# pairs of pictures that are tried as the first at each
+# number of pairs of pictures that are tried as the first two, for each angle
 _FIRST_PAIRS = 40
-# matches that the first two pictures need, and a picture that is placed
+# least number of matches of the first two pictures, and of a placed picture
 _FIRST_MATCHES, _PLACED_MATCHES = 40, 20
-# least angle between the rays of a point, pixels; but never more than COLMAP's own, degrees
+# least angle between the rays of a point, pixels, and COLMAP's own as its largest value, degrees
 _POINT_ANGLE, _MOST_ANGLE = 1.0, 1.5
 # the refined lens is kept if points lie closer by this share
 _CLEARLY = 0.1
-# part of the progress when pictures are matched, and placed
+# progress after matching, and after placing
 _FOUND, _MATCHED = 0.4, 0.7
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """A model that was made.
+    """Result of a calibration.
 
     Attributes
     ----------
     folder : Path
-        Where it is.
+        Folder of the model.
     placed : tuple of str
         Names of the pictures whose cameras are known.
     left_out : tuple of str
-        Those of the others.
+        Names of the others.
     error : float
         Mean reprojection error of the points, pixels.
     notes : tuple of str
-        Notes that :func:`sepi.read_cameras` will give on the cameras: how flat they stand, and what it leaves out.
+        Notes of :func:`sepi.read_cameras` on the cameras: distances from a plane, and pictures left out.
     unusable : str or None
-        Why they make no light field; None where they do.
+        Reason why the cameras do not suit a light field; None if they do.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def calibrate(
     Parameters
     ----------
     folder : str or Path
-        Pictures, and nothing in folders below it.
+        Folder of pictures; folders below it are ignored.
     output : str or Path
         Folder to make; an empty one may exist.
     lens : str
@@ -114,11 +114,11 @@ def calibrate(
     cameras : str
         One of :data:`CAMERAS`.
     force : bool
-        Go on whatever a quick look at a few pictures says.
+        Go on even if a check of a few pictures fails.
     threads : int, optional
-        One per core unless given.
+        Default: one per core.
     progress : callable
-        Told the fraction that is done.
+        Called with the fraction done.
 
     Returns
     -------
@@ -127,8 +127,8 @@ def calibrate(
     Raises
     ------
     SepiError
-        If pycolmap (extra ``sepi[colmap]``) is not installed, the pictures are no sweep of one scene, or the output is
-        there already.
+        If pycolmap (extra ``sepi[colmap]``) is not installed, the pictures are not a sweep of one scene, or the output
+        exists already.
 
     Examples
     --------
@@ -174,7 +174,7 @@ def calibrate(
         sparse = temporary / "sparse" / "0"
         sparse.mkdir(parents=True)
         model.write_text(str(sparse))
-        # where to look for the pictures
+        # tells COLMAP's readers the folder of the pictures
         beside = os.path.relpath(folder.resolve(), Path(os.path.realpath(output)))
         (temporary / PROJECT).write_text(f"image_path = {beside}\n", "utf-8")
         shutil.rmtree(work)
@@ -191,7 +191,7 @@ def calibrate(
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """Pictures of a folder, in the order of their names, numbers by their values.
+    """Pictures of a folder in the order of their names, with numbers in order of value.
 
     Raises
     ------
@@ -216,14 +216,14 @@ def _parts(name: str) -> list[str]:
 
 
 def pairs_of(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Pairs of pictures to match: all of a few; of many each with those some steps on, nearer ones more closely."""
+    """Pairs of pictures to match: all pairs of a few; of many, each with some later ones, near ones more densely."""
     if len(names) <= _ALL_PAIRS:
         return list(combinations(names, 2))
     return [(names[n], names[n + step]) for n in range(len(names)) for step in _STEPS if n + step < len(names)]
 
 
 def _placed(pycolmap: Any, folder: Path, database: Path, camera: Any, count: int, progress: Progress) -> Any:
-    """The model of most pictures that is found, with lenses as they are in the database."""
+    """The model with most pictures, with the lenses of the database."""
     best: Any = None
     for attempt, angle in enumerate(_FIRST_ANGLES):
         model = _mapped(pycolmap, folder, database, camera, angle, count, progress)
@@ -243,11 +243,11 @@ def _placed(pycolmap: Any, folder: Path, database: Path, camera: Any, count: int
 def _mapped(
     pycolmap: Any, folder: Path, database: Path, camera: Any, angle: float, count: int, progress: Progress
 ) -> Any:
-    """The largest model whose first two pictures see points by at least an angle, degrees; None where there is none."""
+    """The largest model whose first two pictures see points at a least angle in degrees; None without one."""
     size = tolerance(camera.width, camera.height)
     least = min(_MOST_ANGLE, float(np.degrees(_POINT_ANGLE * size / camera.mean_focal_length())))
     options = pycolmap.IncrementalPipelineOptions()
-    # with one thread sums are the same each time
+    # on one thread, sums are the same in each run
     options.random_seed, options.num_threads = SEED, 1
     options.multiple_models, options.min_model_size = False, 2
     options.min_num_matches, options.init_num_trials = _PLACED_MATCHES, _FIRST_PAIRS
@@ -277,7 +277,7 @@ def _mapped(
 
 
 def _with_free_lens(pycolmap: Any, model: Any) -> Any:
-    """The model with focal length and distortion as its points tell them; itself where they tell nothing clearly."""
+    """The model with focal length and distortion refined by its points; itself if they are not clearly better."""
     freed = pycolmap.Reconstruction(model)
     options = pycolmap.BundleAdjustmentOptions()
     options.print_summary = False
@@ -294,7 +294,7 @@ def _with_free_lens(pycolmap: Any, model: Any) -> Any:
 
 
 def _checked(output: Path) -> tuple[tuple[str, ...], str | None]:
-    """What is said of the cameras when they are read, and why they cannot be."""
+    """Notes on the cameras as :func:`sepi.read_cameras` gives them, and its error if any."""
     try:
         return rectification_of(read_model(output)).notes, None
     except SepiError as error:

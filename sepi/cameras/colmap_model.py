@@ -15,7 +15,7 @@ from sepi.errors import SepiError
 from sepi.io.files import naming, reading
 from sepi.rig import FISHEYE, PINHOLE, Lens, Shot
 
-# model to lens, and the places of its parameters: fx, fy, cx, cy, then OpenCV's coefficients; -1: zero
+# model to lens, and indices of its parameters: fx, fy, cx, cy, then OpenCV's coefficients; -1: zero
 _MODELS: dict[str, tuple[str, tuple[int, int, int, int], tuple[int, ...]]] = {
     "SIMPLE_PINHOLE": (PINHOLE, (0, 0, 1, 2), ()),
     "PINHOLE": (PINHOLE, (0, 1, 2, 3), ()),
@@ -32,19 +32,18 @@ LENS_MODELS = tuple(_MODELS)
 
 
 def read_colmap(path: Path, pictures: Pictures) -> CameraModel:
-    """Read the cameras of a COLMAP model.
+    """The cameras of a COLMAP model.
 
     Raises
     ------
     SepiError
-        If pycolmap is not installed, the model is damaged or empty, a lens is of another kind, or a picture is not
-        there.
+        If pycolmap is not installed, the model is damaged or empty, a lens is of another kind, or a picture is missing.
     """
     pycolmap = require_pycolmap(str(path))
     with reading(path, "COLMAP model"):
         try:
             model = pycolmap.Reconstruction(str(path))
-            # names that are no text are errors, too
+            # names that are not text are errors, too
             images = sorted((image for image in model.images.values() if image.has_pose), key=lambda image: image.name)
         except (ValueError, RuntimeError, IndexError, KeyError) as error:
             raise SepiError(f"not a COLMAP model, or damaged ({str(error).splitlines()[0][:120]})") from error
@@ -61,19 +60,19 @@ def read_colmap(path: Path, pictures: Pictures) -> CameraModel:
 
 
 def require_pycolmap(where: str) -> Any:
-    """pycolmap, or an error that says how to get it."""
-    # loaded before OpenCV it makes that write PNG by other copies of its libraries, and crash
+    """The module pycolmap, or an error that tells how to install it."""
+    # if loaded before OpenCV, it makes OpenCV crash when writing PNG
     import cv2  # noqa: F401
 
     try:
         import pycolmap
     except ImportError as error:
         raise SepiError(f"{where}: reading a COLMAP model needs pycolmap: pip install 'sepi[colmap]'") from error
-    # it ends the program by itself where that is to end, and unfinished files stay
+    # its signal handlers would end the program, and leave unfinished files
     before = signal.getsignal(signal.SIGTERM)
     if before is not None and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, before)
-    # it tells everything it does on the standard error
+    # it logs everything to standard error
     pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL  # type: ignore[assignment]
     return pycolmap
 
@@ -84,7 +83,7 @@ def _shot(pictures: Pictures, file: Path, image: Any, camera: Any) -> Shot:
         raise SepiError(f"camera model {word}; expected one of {', '.join(_MODELS)}")
     kind, (fx, fy, cx, cy), places = _MODELS[word]
     values = [float(value) for value in camera.params]
-    # from the corner of the picture to the middle of its first pixel
+    # COLMAP counts from the picture's corner, a lens from the middle of the first pixel
     principal = values[cx] - 0.5, values[cy] - 0.5
     size, distortion = (camera.width, camera.height), tuple(values[place] for place in places)
     lens = pictures.fitted(file, Lens(*size, (values[fx], values[fy]), principal, kind, distortion), size)

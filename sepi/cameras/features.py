@@ -24,17 +24,17 @@ from sepi.lightfield import FloatMap, as_unit_float
 from sepi.stage import Progress
 
 SEED = 0
-"""Of everything that COLMAP draws."""
+"""Seed of COLMAP's random numbers."""
 
-# error of a match that is none of a fault, pixels: in pictures of up to so many pixels a side, and in proportion beyond
+# largest error of a right match, pixels, up to this side of pictures; in proportion beyond
 _MATCH_ERROR, _SIDE = 1.0, 1000
-# pairs that are matched between two looks at the progress
+# number of pairs that are matched between two updates of the progress
 _AT_ONCE = 64
 
 
 @dataclass(frozen=True)
 class Finding:
-    """How features are found.
+    """Options of the search for features.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Finding:
         Whether every picture has a camera of its own.
     threads : int
     side : int
-        Longer side, pixels, of what is looked at.
+        Longer side of pictures for features, pixels.
     """
 
     lens: str
@@ -55,7 +55,7 @@ class Finding:
 
 @contextmanager
 def colmap(folder: Path) -> Iterator[None]:
-    """Turn what COLMAP stumbles over into one error."""
+    """Turn COLMAP's errors into one :class:`SepiError`."""
     try:
         yield
     except (RuntimeError, ValueError) as error:
@@ -64,7 +64,7 @@ def colmap(folder: Path) -> Iterator[None]:
 
 
 def tolerance(width: int, height: int) -> float:
-    """Pixels by which a match may miss in pictures of this size."""
+    """Largest error of a match in pictures of this size, pixels."""
     return _MATCH_ERROR * max(1.0, max(width, height) / _SIDE)
 
 
@@ -76,7 +76,7 @@ def write_features(
     Returns
     -------
     list of int
-        Number of features of each.
+        Number of features of each picture.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def _write_camera(pycolmap: Any, file: Any, path: Path, lens: str) -> tuple[int,
     options = pycolmap.ImageReaderOptions()
     options.camera_model = lens
     with reading(path, "picture that COLMAP can read"):
-        # its focal length is that of the file's EXIF where it tells one
+        # its focal length is from EXIF if there is one
         known = pycolmap.infer_camera_from_image(str(path), options)
     known.camera_id = file.write_camera(known)
     rig = pycolmap.Rig()
@@ -141,7 +141,7 @@ def _write_camera(pycolmap: Any, file: Any, path: Path, lens: str) -> tuple[int,
 def match(
     pycolmap: Any, database: Path, pairs: Sequence[tuple[str, str]], size: float, threads: int, progress: Progress
 ) -> None:
-    """Match pairs of pictures, by their names, and verify which matches one motion explains.
+    """Match pairs of pictures (by name), and keep the matches that one motion explains.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def match(
     database : Path
     pairs : sequence of (str, str)
     size : float
-        Pixels by which a match may miss.
+        Largest error of a match, pixels.
     threads : int
     progress : callable
     """

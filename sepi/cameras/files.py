@@ -1,4 +1,4 @@
-"""Files of calibrated cameras: which kind a path is of, and reading it."""
+"""Files of calibrated cameras: recognition of their kind, and reading."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ TABLES = ("cameras.csv", "cameras.yaml", "cameras.yml")
 """Names of tables in a folder."""
 
 TRANSFORMS = tuple(f"transforms{part}.json" for part in ("", "_train", "_val", "_test"))
-"""Names of files of nerfstudio and NeRF in a folder: the first that is there has the cameras."""
+"""Names of files of nerfstudio and NeRF in a folder; the first existing one has the cameras."""
 
 TABLE_SUFFIXES = tuple(Path(name).suffix for name in TABLES)
 
-# where COLMAP and others put a model below a folder
+# folders of a model below a folder, by COLMAP and others
 _INSIDE = (".", "sparse/0", "sparse", "colmap/sparse/0", "0")
 _FILES = ("cameras", "images", "points3D")
 MODEL_FILES = (*_FILES, "rigs", "frames")
-"""What the files of a model are called, whatever their ending; the last two are those of newer versions alone."""
+"""Names of a model's files without their ending; only newer versions have the last two."""
 
 
 def cameras_in(path: Path) -> Path | None:
-    """The file or folder that says of cameras at ``path``; None where there is none. Quick, and never raises."""
+    """The file or folder of cameras at ``path``; None without one. Quick, and never raises."""
     try:
         if path.is_dir():
             for name in (*TABLES, *TRANSFORMS):
@@ -35,14 +35,14 @@ def cameras_in(path: Path) -> Path | None:
             return model_in(path)
         if path.is_file() and (path.suffix.lower() in TABLE_SUFFIXES or path.name.startswith("transforms")):
             return path if path.suffix.lower() in (*TABLE_SUFFIXES, ".json") else None
-        # a file of a COLMAP model, as others name it
+        # a file of a COLMAP model
         return model_in(path.parent) if path.is_file() and path.stem in ("cameras", "images") else None
     except OSError:
         return None
 
 
 def model_in(folder: Path) -> Path | None:
-    """The folder of a COLMAP model in a folder, where there is one."""
+    """The folder of a COLMAP model in a folder, if there is one."""
     for inside in _INSIDE:
         place = folder / inside
         if any(all((place / f"{name}{end}").is_file() for name in _FILES) for end in (".bin", ".txt")):
@@ -51,12 +51,12 @@ def model_in(folder: Path) -> Path | None:
 
 
 def described_by(found: Path) -> tuple[Path, ...]:
-    """The files that say of the cameras which :func:`cameras_in` found."""
+    """The files of the cameras that :func:`cameras_in` found."""
     return tuple(sorted(path for path in found.iterdir() if path.stem in MODEL_FILES)) if found.is_dir() else (found,)
 
 
 def read_model(path: Path, images: str | None = None, crop_of: Part | None = None) -> CameraModel:
-    """Read calibrated cameras of any known format.
+    """Calibrated cameras of any known format.
 
     Parameters
     ----------
@@ -65,14 +65,14 @@ def read_model(path: Path, images: str | None = None, crop_of: Part | None = Non
     images : str, optional
         Folder of the pictures.
     crop_of : (int, int, int, int), optional
-        What the pictures are parts of, as :func:`sepi.camera.camera_from` takes it.
+        Whole picture for crops, as in :func:`sepi.camera.camera_from`.
 
     Raises
     ------
     SepiError
         If there are none, the file is damaged, or pictures are missing.
     """
-    # asked of every path that is read: what reads one kind is imported when it is there
+    # called for every path, so readers are imported when needed
     from sepi.cameras.pictures import Pictures
     from sepi.errors import SepiError
 

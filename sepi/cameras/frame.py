@@ -1,6 +1,6 @@
-"""The picture that rectified views share: one pinhole, and the rectangle of pixels that the reference view fills.
+"""The frame of rectified views: one pinhole, and the rectangle of pixels that the reference view fills.
 
-Nothing is made up where another camera shows nothing: such pixels are marked as missing.
+Pixels of the frame that another camera does not show are marked as missing.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from sepi.errors import SepiError
 from sepi.lightfield import MIN_SIZE
 from sepi.rig import Floats
 
-# sample places along the longer side for the visibility check that precedes single pixels
+# samples along the longer side for a first check, before single pixels
 _LATTICE = 80
-# what a sample may lie outside a picture, pixels: rounding
+# largest distance of a sample outside a picture by rounding, pixels
 _OUTSIDE = 1e-3
-# a view that shows less of the frame is left out
+# least share of the frame that a view must show
 _LEAST_SHOWN = 0.1
-# a picture that grows by more in rectification is of no camera; very wide fisheyes grow by a few times
+# largest growth of a picture by rectification; very wide fisheyes grow by a few times
 _MOST_LARGER = 16.0
-# least part of the reference picture's sides that is worth a light field
+# least share of the reference picture's sides in the frame
 _LEAST_PART = 0.1
 
 
@@ -39,7 +39,7 @@ class Frame:
     principal : (float, float)
         Principal point ``(x, y)`` of the reference view in the frame.
     offset : float
-        How far that of a view lies to the right for each view step to the right, pixels: the views' shear.
+        Shift of a view's principal point to the right for each view step to the right, pixels: the views' shear.
     shape : (int, int)
         Height and width.
     """
@@ -57,7 +57,7 @@ class Frame:
 
 
 class Seeing:
-    """Where the pixels of rectified views lie in the pictures that were taken."""
+    """Positions of rectified views' pixels in the original pictures."""
 
     def __init__(self, model: CameraModel, plane: Plane, zoom: Floats) -> None:
         self.model, self.plane, self.zoom = model, plane, zoom
@@ -66,12 +66,12 @@ class Seeing:
         self.offset = self._offset()
 
     def rays(self, view: int, pixels: Floats) -> Floats:
-        """Rays (N, 3) in the axes of the plane of pixels ``(x, y)``, counted as the reference's own picture counts."""
+        """Rays (N, 3), in the axes of the plane, of pixels ``(x, y)`` in the reference's original picture."""
         shifted = pixels - self.principal - self.offset * self.plane.baselines[view, ::-1]
         return np.column_stack([shifted / (self.focal * self.zoom[view]), np.ones(len(pixels))])
 
     def pixels(self, view: int, pixels: Floats) -> Floats:
-        """Where the view's own picture shows them, ``(x, y)``, (N, 2); NaN where it does not."""
+        """Positions ``(x, y)`` of these pixels in the view's original picture, (N, 2); NaN outside."""
         shot = self.model.shots[view]
         seen = shot.lens.project(self.rays(view, pixels) @ (shot.rotation @ self.plane.rotation.T).T)
         size = np.array([shot.lens.width, shot.lens.height])
@@ -80,17 +80,17 @@ class Seeing:
         return np.where(np.asarray(inside)[:, None], np.clip(seen, 0, size - 1), np.nan)
 
     def has(self, view: int, pixels: Floats) -> npt.NDArray[np.bool_]:
-        """Which of the pixels a view has."""
+        """Mask of the pixels that a view shows."""
         return np.isfinite(self.pixels(view, pixels)[:, 0])
 
     def _from_picture(self, view: int, pixels: Floats) -> Floats:
-        """Pixels ``(x, y)`` from the principal point, without shear, of those of the view's own picture."""
+        """Pixels ``(x, y)`` from the principal point, without shear, of pixels in the view's original picture."""
         shot = self.model.shots[view]
         rays = shot.lens.rays(pixels) @ (shot.rotation @ self.plane.rotation.T)
         return self.focal * rays[:, :2] / np.maximum(rays[:, 2:], 1e-3)
 
     def _offset(self) -> float:
-        """The shear that keeps the middles of the pictures together, by least squares."""
+        """The shear that aligns the middles of the pictures, by least squares."""
         middles = []
         for n, shot in enumerate(self.model.shots):
             middle = np.array([[(shot.lens.width - 1) / 2, (shot.lens.height - 1) / 2]])
@@ -100,19 +100,19 @@ class Seeing:
         return -float((apart * np.array(middles)).sum() / (apart**2).sum())
 
     def bounds(self) -> tuple[Floats, Floats]:
-        """Least and greatest pixel ``(x, y)`` that the reference's own picture reaches."""
+        """Least and largest pixel ``(x, y)`` of the reference's original picture."""
         reached = self._from_picture(self.plane.reference, self.model.shots[self.plane.reference].lens.border())
         reached = reached + self.principal
         return np.ceil(reached.min(axis=0) - _OUTSIDE), np.floor(reached.max(axis=0) + _OUTSIDE)
 
 
 def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
-    """The frame of the reference view, the largest that it fills, and the views that show enough of it.
+    """The largest frame that the reference view fills, and the views that show enough of it.
 
     Raises
     ------
     SepiError
-        If hardly anything is left.
+        If hardly anything of the frame is left.
     """
     low, high = seeing.bounds()
     number, own = len(seeing.model.shots), seeing.plane.reference
@@ -149,7 +149,7 @@ def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
 
 
 def largest_rectangle(inside: npt.NDArray[np.bool_]) -> tuple[int, int, int, int] | None:
-    """First and last row, first and last column of the largest rectangle that is true throughout; None: none is."""
+    """First and last row, first and last column of the largest rectangle of true values; None without any."""
     best, area = None, 0
     heights = np.zeros(inside.shape[1] + 1, int)
     for row, line in enumerate(inside):
@@ -166,7 +166,7 @@ def largest_rectangle(inside: npt.NDArray[np.bool_]) -> tuple[int, int, int, int
 
 
 def _grown(seeing: Seeing, box: tuple[float, float, float, float], stride: float) -> tuple[float, float, float, float]:
-    """A box ``(top, bottom, left, right)`` with every pixel more at its sides that the reference has, and none less."""
+    """A box ``(top, bottom, left, right)`` grown or shrunk at its sides to the pixels that the reference view has."""
 
     def line(side: int, now: list[float]) -> Floats:
         at = now[side]
@@ -180,7 +180,7 @@ def _grown(seeing: Seeing, box: tuple[float, float, float, float], stride: float
         return bool(seeing.has(seeing.plane.reference, line(side, now)).all())
 
     now, outward = list(box), (-1, 1, -1, 1)
-    # a side that bulges between the lattice's places
+    # for a side that bulges between the samples
     for _ in range(int(2 * stride) + 2):
         short = [side for side in range(4) if not seen(side, now)]
         if not short:

@@ -1,4 +1,4 @@
-"""A grid for cameras that stand anywhere: views have rows and columns, whatever their exact places."""
+"""Rows and columns of a grid for cameras at any positions."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy.typing as npt
 
 from sepi.rig import Floats
 
-# part of a grid's places that must be taken
+# least share of a grid's places with a camera
 _FULL = 0.55
-# farthest that rows may be apart, in view steps, and how finely distances are tried
+# largest row spacing in view steps, and sampling of the spacings tried
 _SPACINGS = np.geomspace(0.25, 4.0, 161)
-# mean distance of cameras from the places of a grid, as part of its steps: random places have 0.25
+# largest mean distance of cameras from a grid's places, relative to its steps; random positions have 0.25
 _NEAR = 0.19
 _NO_WORSE = 0.02
 
@@ -19,7 +19,7 @@ _NO_WORSE = 0.02
 def grid_of(baselines: Floats) -> npt.NDArray[np.int64]:
     """Row and column (N, 2) of each view, counted from 0, given the baselines ``(down, across)`` in view steps.
 
-    The regular grid that the cameras stand about, or one row in the order of their places where they stand about none.
+    The regular grid near which the cameras stand; without one, a single row in the order of their positions.
     """
     row, column = (_numbers(baselines[:, axis]) for axis in (0, 1))
     best: npt.NDArray[np.int64] | None = None
@@ -31,7 +31,7 @@ def grid_of(baselines: Floats) -> npt.NDArray[np.int64]:
             best = None
     if best is not None:
         return best
-    # along the longer side, or the way that the cameras went
+    # along the longer axis, or the cameras' path
     order = np.lexsort((baselines[:, 0], baselines[:, 1]))
     if np.ptp(baselines[:, 0]) > np.ptp(baselines[:, 1]):
         order = np.lexsort((baselines[:, 1], baselines[:, 0]))
@@ -41,7 +41,7 @@ def grid_of(baselines: Floats) -> npt.NDArray[np.int64]:
 
 
 def _numbers(along: Floats) -> npt.NDArray[np.int64] | None:
-    """The step at which each camera stands along an axis, the least being 0; None where there are no steps."""
+    """Number of each camera's step along an axis, from 0; None without regular steps."""
     if np.ptp(along) < _SPACINGS[0]:
         return np.zeros(len(along), np.int64)
     angle = 2 * np.pi * along / _SPACINGS[:, None]

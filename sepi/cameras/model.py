@@ -1,4 +1,4 @@
-"""What files of calibrated cameras hold, and what they must not hold."""
+"""Model of calibrated cameras from files, and checks that they suit a light field."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from sepi.rig import Floats, Shot
 
 UNITS_OF_MODEL = "units of the model"
 
-# what counts as one place, as part of the distance of the farthest cameras
+# largest distance of cameras at one place, relative to that of the farthest cameras
 _SAME_PLACE = 1e-6
-# degrees between the ways that two cameras of one light field may look
+# largest angle between viewing directions of two cameras, degrees
 _MOST_TURNED = 60.0
-# part of the model's points that must lie before the cameras
+# least share of the model's points in front of the cameras
 _BEFORE = 0.5
 
 
 @dataclass(frozen=True)
 class CameraModel:
-    """Calibrated cameras, and where their pictures are.
+    """Calibrated cameras, and their pictures.
 
     Attributes
     ----------
     path : Path
-        What was read, for messages.
+        File or folder of the model, for messages.
     shots : tuple of Shot
     pictures : tuple of Path
-        The picture of each.
+        Picture of each shot.
     points : ndarray, shape (N, 3), float64
-        Points of the scene in the world; none in most files.
+        Points of the scene in the world; most files have none.
     units : str
-        What the world's lengths are.
+        Unit of the world.
     masks : tuple of Path or None
-        Pictures that are black where those are not to be used, None for all of a picture; empty: there is none.
+        Pictures that are black where a picture is not to be used, None for a picture without one; empty: no masks.
     notes : tuple of str
-        What was assumed.
+        Assumptions that were made.
     """
 
     path: Path
@@ -57,21 +57,21 @@ class CameraModel:
 
     @property
     def centres(self) -> Floats:
-        """Where the cameras stand, (N, 3)."""
+        """Positions of the cameras, (N, 3)."""
         return np.array([shot.centre for shot in self.shots])
 
     @property
     def axes(self) -> Floats:
-        """The ways that they look, (N, 3)."""
+        """Viewing directions of the cameras, (N, 3)."""
         return np.array([shot.rotation[2] for shot in self.shots])
 
     def without(self, names: tuple[str, ...]) -> CameraModel:
-        """The model without some of its pictures, by the names of their files with or without folders."""
+        """The model without these pictures, named with or without folders."""
         left_out = {n for name in names for n in self.named(name)}
         return self.of([n for n in range(len(self.shots)) if n not in left_out])
 
     def named(self, name: str) -> list[int]:
-        """Numbers of the pictures whose file has a name, with or without folders; an error where there is none."""
+        """Numbers of the pictures with this file name, with or without folders; an error without any."""
         found = [n for n, shot in enumerate(self.shots) if name in (shot.name, Path(shot.name).name)]
         if not found:
             some = ", ".join(shot.name for shot in self.shots[:3])
@@ -79,12 +79,12 @@ class CameraModel:
         return found
 
     def of(self, kept: list[int]) -> CameraModel:
-        """The model with these cameras alone."""
+        """The model with only these cameras."""
         shots, pictures = tuple(self.shots[n] for n in kept), tuple(self.pictures[n] for n in kept)
         return replace(self, shots=shots, pictures=pictures, masks=tuple(self.masks[n] for n in kept if self.masks))
 
     def require_sound(self) -> None:
-        """Raise for cameras that make no light field, whatever they show.
+        """Raise for cameras whose poses do not suit a light field.
 
         Raises
         ------

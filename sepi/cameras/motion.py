@@ -1,7 +1,7 @@
-"""Quick check of a few small pictures, before hours are spent, whether pictures without poses can make a light field.
+"""Quick check of a few small pictures whether pictures without poses suit a light field, before a long calibration.
 
-The result is an estimate, since the focal length is a guess where the files do not give it. So only pictures far
-outside what :mod:`sepi.cameras.rectification` accepts are refused here.
+The result is an estimate, since the focal length may be a guess. So this check refuses only pictures far outside what
+:mod:`sepi.cameras.rectification` accepts.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from sepi.errors import SepiError
 from sepi.rig import Floats
 from sepi.stage import no_progress
 
-# how many pictures are looked at, spread over all of them, and the longer side of each, pixels
+# number of pictures that are checked, spread over all of them, and the longer side of each, pixels
 _LOOKED_AT, _LOOK = 6, 640
-# features below which a picture shows next to nothing; matches below which two show different things
+# least number of features of a picture with texture, and of matches of two pictures of one scene
 _FEATURES, _MATCHES = 40, 20
-# quantile of the matches, some of them false, that measures parallax; parallax in pixels, in the reduced pictures,
-# below which there is none, and from which its direction is reliable
+# quantile of the matches (some are false) that measures parallax; least parallax, in pixels of the reduced pictures,
+# and that from which its direction is reliable
 _MOST, _NARROW, _FIRM = 0.85, 0.8, 1.5
-# degrees: between the motion and the way the cameras look; between the ways that two of them look
+# angles in degrees: least between motion and viewing direction; largest between two viewing directions
 _AHEAD, _TURNED = 30.0, 60.0
 
 
 @dataclass(frozen=True)
 class Step:
-    """How the camera got from one picture to another.
+    """Motion of the camera between two pictures.
 
     Attributes
     ----------
@@ -42,9 +42,9 @@ class Step:
     parallax : float
         Parallax between near and far points, pixels.
     ahead : float or None
-        Degrees from the way that the first looks to where the second stands; None where that is not known.
+        Degrees from the first camera's viewing direction to the second camera's position; None if unknown.
     turned : float
-        Degrees between the ways that they look.
+        Degrees between the viewing directions.
     """
 
     names: tuple[str, str]
@@ -54,15 +54,15 @@ class Step:
 
 
 def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], finding: Finding) -> None:
-    """Raise where the camera hardly moved, moved along the way that it looks, or turned too far.
+    """Raise if the camera hardly moved, moved along its viewing direction, or turned too far.
 
     Raises
     ------
     SepiError
-        Of that, and where the pictures show next to nothing, or nothing that two of them show.
+        In these cases, and if pictures have hardly any features, or no two of them match.
     """
     chosen = np.unique(np.rint(np.linspace(0, len(pictures) - 1, _LOOKED_AT)).astype(int)).tolist()
-    # neighbours, where those far apart have nothing in common
+    # also neighbours, in case distant pictures do not match
     looked_at = [pictures[n] for n in sorted({*chosen, 1})]
     with tempfile.TemporaryDirectory() as place, colmap(folder):
         database = Path(place) / "look.db"
@@ -84,7 +84,7 @@ def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], findin
 
 
 def require_sideways(folder: Path, names: Sequence[str], steps: Sequence[Step], unit: float) -> None:
-    """Raise for steps of a camera that make no light field; ``unit`` is the width of a pixel that was looked at."""
+    """Raise for motion that does not suit a light field; ``unit`` is the width of a reduced picture's pixel."""
     if not steps:
         raise SepiError(
             f"{folder}: no two of {_listed(names)} match; expected pictures of one static scene, each from a position "

@@ -1,4 +1,4 @@
-"""Where the pictures of calibrated cameras are, and what their lenses are in pictures of another size."""
+"""Pictures of calibrated cameras, and their lenses for pictures of another size."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sepi.rig import Lens
 
 # where COLMAP says it, and names of folders that it and others use
 PROJECT = "project.ini"
-"""File of COLMAP that says where the pictures are."""
+"""COLMAP's file with the folder of the pictures."""
 
 _FOLDERS = ("images", ".")
 # how much larger or smaller, and how differently down and across, the picture is whose middle is the principal point,
@@ -32,10 +32,10 @@ class Pictures:
     model : Path
         The model's file or folder.
     given : Path or None
-        The folder that the user names; else it is the one that COLMAP's ``project.ini`` names, or ``images`` beside the
-        model or above it, or the model's own.
+        The user's folder; default: that in COLMAP's ``project.ini``, or ``images`` beside the model or above it, or the
+        model's own.
     crop_of : (int, int, int, int), optional
-        As :func:`sepi.camera.camera_from` takes it.
+        As for :func:`sepi.camera.camera_from`.
     """
 
     def __init__(self, model: Path, given: Path | None, crop_of: Part | None = None) -> None:
@@ -48,7 +48,7 @@ class Pictures:
         self._places = [given] if given is not None else list(_around(home))
 
     def find(self, *names: str) -> Path:
-        """The file of a picture, by the first of its names that leads to one.
+        """The file of a picture, by the first of its names that exists.
 
         Raises
         ------
@@ -67,25 +67,25 @@ class Pictures:
         raise SepiError(f"{self._model}: no picture '{names[0]}' in {where}; name the folder by --images")
 
     def size(self, file: Path) -> tuple[int, int]:
-        """Width and height of a picture, or of that which it is a part of."""
+        """Width and height of a picture, or of the whole picture for a crop."""
         header = picture_header(file)
         return (header.width, header.height) if self._crop is None else self._crop[:2]
 
     def fitted(self, file: Path, lens: Lens, size: tuple[float, float] | None) -> Lens:
-        """The lens in a picture as it lies here, which may be a scaled one, or a part, of that which was calibrated.
+        """The lens for a picture file, which may be a scaled or cropped version of the calibrated picture.
 
         Parameters
         ----------
         file : Path
         lens : Lens
-            As the model tells it.
+            Lens in the model.
         size : (float, float) or None
-            Width and height of the picture that was calibrated, where the model tells them.
+            Width and height of the calibrated picture, if the model has them.
 
         Raises
         ------
         SepiError
-            If the picture has other sides.
+            If the sizes do not fit.
         """
         header, whole, told = picture_header(file), self.size(file), (lens.width, lens.height)
         if size is None:
@@ -100,12 +100,12 @@ class Pictures:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was assumed of the lenses.
+        """Assumptions about the lenses.
 
         Raises
         ------
         SepiError
-            If they cannot be those of the pictures.
+            If the lenses cannot belong to the pictures.
         """
         low, high = sorted(np.mean(self._middles or [[1.0, 1.0]], axis=0))
         if 0 < low <= high < _ALIKE * low and not 1 / _OTHER < low < _OTHER:

@@ -1,8 +1,8 @@
 """The plane through the cameras: their common axes, positions in view steps, and the effect of standing off it.
 
-A camera that stands ``dz`` before the reference camera, and has the focal length ``f (1 - dz / Z0)``, sees a point at
-depth ``Z`` at ``k`` times its distance from the principal point, ``k = (1 - dz / Z0) / (1 - dz / Z)``, of what it would
-see from the plane: nothing differs at the depth ``Z0`` in the middle of the scene, and hardly anything near by.
+A camera at ``dz`` in front of the reference camera, with the focal length ``f (1 - dz / Z0)``, sees a point at depth
+``Z`` at ``k = (1 - dz / Z0) / (1 - dz / Z)`` times the distance from the principal point that a camera in the plane
+sees. This factor is 1 at the depth ``Z0`` in the middle of the scene, and close to 1 near it.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from sepi.cameras.model import CameraModel
 from sepi.errors import SepiError
 from sepi.rig import Floats
 
-# extent of the cameras' places across a row, as part of that along it, that tells how the plane slopes there
+# extent of the cameras' positions across a row, relative to that along it, from which the plane's slope is known
 _ROW = 0.02
-# least angle, degrees, of where the cameras go to the way that they look
+# least angle between motion and viewing direction, degrees
 _LEAST_ANGLE = 45.0
 
 
 @dataclass(frozen=True)
 class Plane:
-    """Where cameras stand, in the axes of the views to be made.
+    """Positions of the cameras in the axes of the rectified views.
 
     Attributes
     ----------
     rotation : ndarray, shape (3, 3), float64
-        From the world's axes: x and y in the plane, z the way that the cameras look.
+        From the world's axes to those of the views: x and y in the plane, z along the viewing direction.
     places : ndarray, shape (N, 3), float64
-        The cameras from the reference camera, in these axes and the world's units.
+        Positions from the reference camera, in these axes and the world's units.
     reference : int
     step : float
         Median distance from a camera to the next, in the plane.
@@ -54,7 +54,7 @@ def plane_through(model: CameraModel, reference: int | None) -> Plane:
     Raises
     ------
     SepiError
-        If the cameras move along the way that they look rather than across it.
+        If the cameras move along their viewing direction instead of sideways.
     """
     centres = model.centres
     middle = centres.mean(axis=0)
@@ -62,10 +62,10 @@ def plane_through(model: CameraModel, reference: int | None) -> Plane:
     off = centres - middle
     ahead = off @ looking
     beside = off - ahead[:, None] * looking
-    # the plane's slope, damped: where cameras stand in a row it is nearly free across that
+    # the plane's slope, damped, since cameras in a row do not determine it across the row
     damping = len(off) * (_ROW * np.linalg.norm(np.ptp(off, axis=0))) ** 2
     slope = np.linalg.solve(beside.T @ beside + damping * np.eye(3), beside.T @ ahead)
-    # medians: a single camera off the plane is left out later
+    # medians, since a single camera off the plane is left out later
     angle = np.degrees(np.arctan2(np.median(np.linalg.norm(beside, axis=1)), np.median(np.abs(ahead))))
     if angle < _LEAST_ANGLE:
         raise SepiError(
@@ -79,7 +79,7 @@ def plane_through(model: CameraModel, reference: int | None) -> Plane:
     flat = (centres - middle) @ rotation.T
     if reference is None:
         centre = (flat[:, :2].max(axis=0) + flat[:, :2].min(axis=0)) / 2
-        # of equally central ones the first, whatever the rounding
+        # the first of equally central ones, up to rounding
         distance = np.linalg.norm(flat[:, :2] - centre, axis=1)
         reference = int(np.flatnonzero(distance <= distance.min() + 1e-6 * float(np.ptp(flat[:, :2])))[0])
     step = _median_step(flat[:, :2])
@@ -89,9 +89,7 @@ def plane_through(model: CameraModel, reference: int | None) -> Plane:
 
 
 def _median_step(places: Floats) -> float:
-    """Median distance along x from a camera to the next in its row, along y where there is no next; to the nearest
-    where the cameras stand in no grid.
-    """
+    """Median distance of cameras along x in a row, along y without rows; to the nearest without a grid."""
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
     np.fill_diagonal(apart, np.inf)
     step = float(np.median(apart.min(axis=1)))

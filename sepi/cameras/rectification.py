@@ -23,19 +23,19 @@ from sepi.io.files import name_of
 from sepi.lightfield import DisparityRange, LightField
 from sepi.rig import Floats, Rectified, Rig
 
-# disparity errors, pixels per view step, from which one is reported, and a view is left out
+# disparity errors from which a note mentions them, and from which a view is left out, pixels per view step
 _TOLD, _TOO_MUCH = 0.1, 0.5
-# views below which nothing is made of many
+# least number of views that may remain
 _FEWEST = 3
-# part of the points beyond each end of the range, the margin as part of it, and the least, pixels
+# share of the points beyond each end of the range, margin relative to the range, and least margin, pixels
 _BEYOND, _MARGIN, _LEAST_MARGIN = 0.005, 0.06, 0.1
-# parallax between the farthest and the nearest point, pixels in the farthest view, too small for depth
+# least parallax between the farthest and the nearest point for depth, pixels in the farthest view
 _NOTHING = 0.05
 
 
 @dataclass(frozen=True)
 class Rectification:
-    """What is made of the cameras, before any picture is read."""
+    """Result of rectifying the cameras, before any picture is read."""
 
     model: CameraModel
     plane: Plane
@@ -55,14 +55,14 @@ def rectification_of(
     ----------
     model : CameraModel
     reference : str, optional
-        Name of the picture whose depth is made; the most central one unless given.
+        Name of the picture whose depth is estimated; default: the most central one.
     inverse_depths : (float, float), optional
-        Of the farthest and the nearest surface from the reference camera; from the model's points unless given.
+        Inverse depth of the farthest and the nearest surface from the reference camera; default: by the model's points.
 
     Raises
     ------
     SepiError
-        If the cameras make no light field.
+        If the cameras do not suit a light field.
     """
     model.require_sound()
     notes = list(model.notes)
@@ -71,7 +71,7 @@ def rectification_of(
         plane = plane_through(model, chosen)
         known = inverse_depths or _of_points(model, plane)
         seeing = Seeing(model, plane, zooms(plane, known or (0.0, 0.0)))
-        # how far off its plane a camera may stand depends on the frame; that on the cameras that are left
+        # the error of a camera off the plane depends on the frame, and the frame on the remaining cameras
         frame, kept = frame_of(seeing)
         errors = (
             np.zeros(len(model.shots)) if known is None else disparity_errors(plane, known, frame.corners, frame.focal)
@@ -115,7 +115,7 @@ def _told(plane: Plane, errors: Floats, known: tuple[float, float] | None) -> tu
 
 
 def _of_points(model: CameraModel, plane: Plane) -> tuple[float, float] | None:
-    """Inverse depths of the farthest and the nearest of nearly all points that the reference camera has before it."""
+    """Inverse depths of the farthest and the nearest point (of nearly all) in front of the reference camera."""
     if not len(model.points):
         return None
     shot = model.shots[plane.reference]
@@ -135,7 +135,7 @@ def _of_points(model: CameraModel, plane: Plane) -> tuple[float, float] | None:
 
 
 def light_field_of(found: Rectification) -> LightField:
-    """The rectified views as a light field, of one brightness; the pictures are read here."""
+    """The rectified views as a light field of equal brightness, with the pictures read and resampled."""
     model, plane, frame = found.model, found.plane, found.frame
     pictures, absent = zip(*(rectified_view(found.seeing, frame, n) for n in range(len(model.shots))), strict=True)
     channels = {picture.shape[2] for picture in pictures}
@@ -147,7 +147,7 @@ def light_field_of(found: Rectification) -> LightField:
     missing = np.zeros(grid.shape[:4], bool)
     for (t, s), view, lacking, baseline in zip(at.tolist(), views, absent, plane.baselines, strict=True):
         grid[t, s], missing[t, s] = completed(view, lacking), lacking
-        # a mask may leave nothing
+        # a mask may leave no pixels
         present[t, s], positions[t, s] = not lacking.all(), baseline
     view = tuple(at[plane.reference].tolist())
     scale = plane.step * frame.focal
@@ -175,7 +175,7 @@ def light_field_of(found: Rectification) -> LightField:
     )
     down, across = light_field.from_centre
     (x, y), (height, width) = frame.principal, frame.shape
-    # the camera tells of the principal point of the grid's centre view
+    # the camera's principal point is that of the grid's centre view
     right = float(x - (width - 1) / 2 - across * frame.offset)
     below = float(y - (height - 1) / 2 - down * frame.offset)
     return equally_bright(replace(light_field, camera=Camera(scale, frame.offset, frame.focal, right, below)))

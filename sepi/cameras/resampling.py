@@ -1,4 +1,4 @@
-"""Pictures of calibrated cameras, turned and undistorted by one interpolation each."""
+"""Pictures of calibrated cameras, rotated and undistorted with a single interpolation."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from sepi.lightfield import BoolMap, FloatMap, as_unit_float
 
 # order of the splines: the third blurs more, which costs accuracy at silhouettes
 _SPLINES = 5
-# samples this close to pixels are these pixels
+# largest distance of samples that count as exactly on a pixel
 _ON_PIXEL = 1e-6
 
 
 def rectified_view(seeing: Seeing, frame: Frame, view: int) -> tuple[FloatMap, BoolMap]:
-    """A view's pixels (H, W, C), float32, in 0..1 except for overshoot, and a mask of those it does not show.
+    """A view's pixels (H, W, C), float32, in 0..1 except for overshoot, and the mask of missing ones, which are 0.
 
-    The latter are 0. By splines of the fifth order: they blur less than the same number of samples weighted directly.
+    Splines of the fifth order blur less than direct weights of as many samples.
     """
     from scipy import ndimage
 
     height, width = frame.shape
-    # the frame's first pixel, as the reference's own picture counts
+    # the frame's first pixel in the reference's original picture
     first = np.subtract(seeing.principal, frame.principal)
     pixels = (
         np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2).astype(np.float64) + first
@@ -38,7 +38,7 @@ def rectified_view(seeing: Seeing, frame: Frame, view: int) -> tuple[FloatMap, B
         row, column = np.rint(at).astype(int)
         found = picture[row, column]
     else:
-        # samples between pixels take from the four round them, most of all
+        # samples between pixels depend mostly on the four around them
         unusable = np.asarray(cv2.dilate(unusable, np.ones((3, 3), np.uint8)), np.uint8)
         channels = [
             ndimage.map_coordinates(picture[..., c], at, np.float32, order=_SPLINES, mode="mirror")
@@ -51,7 +51,7 @@ def rectified_view(seeing: Seeing, frame: Frame, view: int) -> tuple[FloatMap, B
 
 
 def completed(view: FloatMap, missing: BoolMap) -> FloatMap:
-    """A view (H, W, C) that has at missing pixels (H, W) what the nearest other one shows."""
+    """A view (H, W, C) with missing pixels (H, W) replaced by the nearest other one."""
     if missing.all() or not missing.any():
         return view
     from scipy import ndimage
@@ -61,7 +61,7 @@ def completed(view: FloatMap, missing: BoolMap) -> FloatMap:
 
 
 def _masked(seeing: Seeing, view: int) -> npt.NDArray[np.uint8]:
-    """1 where a picture is not to be used, else 0."""
+    """Mask of a picture: 1 where it is not to be used, else 0."""
     lens, masks = seeing.model.shots[view].lens, seeing.model.masks
     path = masks[view] if masks else None
     if path is None:

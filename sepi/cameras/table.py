@@ -1,8 +1,8 @@
-"""Calibrated cameras in a table of one's own: CSV, or YAML.
+"""Calibrated cameras in a user's table, CSV or YAML.
 
 docs/depth/calibrated_cameras.md describes both. A row of a CSV, or an entry of ``cameras`` in a YAML file, is a
-picture: ``file``, the camera's place, its rotation from the world's axes, and its lens. What all pictures share stands
-once in the YAML file, below ``shared``.
+picture: ``file``, the camera's position, its rotation from the world's axes, and its lens. Values shared by all
+pictures stand below ``shared`` in a YAML file.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from sepi.models import AS_PAIR, CheckedModel, validated
 from sepi.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Lens, Shot
 from sepi.validation import require_known
 
-# a table is short; what is longer is something else
+# largest size of a table in bytes
 _MOST_BYTES = 16 * 2**20
-# what a matrix may be from a rotation, and a quaternion's length from 1: what was typed with a few digits
+# largest difference of a matrix from a rotation, and of a quaternion's length from 1, for values with few digits
 _NEARLY = 1e-2
 
-# numbers may be text: YAML takes 1e-4 for that
+# numbers may be text, since YAML reads 1e-4 as text
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=False)]
 _PLACE = ("x", "y", "z")
@@ -59,12 +59,12 @@ class _Table(CheckedModel):
 
 
 def read_table(path: Path, pictures: Pictures) -> CameraModel:
-    """Read a table of cameras.
+    """The cameras of a table.
 
     Raises
     ------
     SepiError
-        If it is damaged, a key is missing, unknown or no number, or a picture is not there.
+        If it is damaged, a key is missing, unknown or not a number, or a picture is missing.
     """
     with reading(path, "table of cameras"):
         if path.stat().st_size > _MOST_BYTES:
@@ -89,7 +89,7 @@ def read_table(path: Path, pictures: Pictures) -> CameraModel:
 
 def _rows(text: str) -> list[dict[str, Any]]:
     lines = text.splitlines()
-    # as spreadsheets of countries write it whose numbers have commas
+    # separators of spreadsheets in countries with decimal commas
     separator = next((mark for mark in ";\t" if lines and mark in lines[0]), ",")
     rows = csv.DictReader(lines, delimiter=separator, skipinitialspace=True)
     rows.fieldnames = [name.strip() for name in rows.fieldnames or ()]
@@ -129,7 +129,7 @@ def _shot(camera: _Camera, pictures: Pictures, file: Path) -> Shot:
 
 
 def rotation_of(told: Any) -> Floats:
-    """A rotation matrix from a quaternion ``(w, x, y, z)`` or a matrix that was written down with a few digits."""
+    """A rotation matrix from a quaternion ``(w, x, y, z)`` or a matrix, both with few digits."""
     values = np.array(told, np.float64) if len({np.size(row) for row in told}) == 1 else np.zeros(0)
     if values.shape == (4,) and abs(np.linalg.norm(values) - 1) < _NEARLY:
         return np.asarray(Rotation.from_quat(values, scalar_first=True).as_matrix(), np.float64)

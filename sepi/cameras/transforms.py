@@ -1,7 +1,7 @@
 """Calibrated cameras in a ``transforms.json`` of nerfstudio or instant-ngp.
 
-Poses go from the camera to the world; the camera's axes point right, up and back. Principal points are counted from the
-corner of the picture. What is not said of a frame is said of all.
+Poses are from the camera to the world; the camera's axes point right, up and back. Principal points count from the
+picture's corner. Values that a frame lacks are those of the file.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ _TURN = np.diag([1.0, -1.0, -1.0])
 
 
 def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
-    """Read the cameras of a ``transforms.json``.
+    """The cameras of a ``transforms.json``.
 
     Raises
     ------
     SepiError
-        If it is damaged, something is missing or of another kind, or a picture is not there.
+        If it is damaged, a value is missing or wrong, or a picture is missing.
     """
     with reading(path, "transforms.json"):
         if path.stat().st_size > _MOST_BYTES:
@@ -44,7 +44,7 @@ def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
     frames = told.get("frames") if isinstance(told, dict) else None
     if not isinstance(frames, list) or not frames or not all(isinstance(frame, dict) for frame in frames):
         raise SepiError(f"{path}: no cameras; expected a list 'frames'")
-    # what nerfstudio adds: its own turn and scale of the world
+    # nerfstudio's own rotation and scale of the world
     shots, files, masks = [], [], []
     for n, frame in enumerate(frames, 1):
         entry = {**told, **frame}
@@ -63,7 +63,7 @@ def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
 
 
 def _found(pictures: Pictures, name: str) -> Path:
-    # the folder of pictures itself may be given, or lie elsewhere; NeRF's files leave the ending out
+    # paths may contain the folder of pictures, which may lie elsewhere; NeRF's files leave out the ending
     return pictures.find(name, PureWindowsPath(name).name, f"{name}.png")
 
 
@@ -86,7 +86,7 @@ def _shot(name: str, entry: Mapping[str, Any], pictures: Pictures, file: Path) -
         focal_x = width / 2 / math.tan(min(3.0, max(1e-3, number("camera_angle_x"))) / 2)
     else:
         focal_x = number("fl_x")
-    # from the corner to the middle of the first pixel
+    # counted from the picture's corner, not from the middle of the first pixel
     principal = number("cx", width / 2) - 0.5, number("cy", height / 2) - 0.5
     coefficients = tuple(number(key, 0.0) for key in _COEFFICIENTS[kind])
     try:
@@ -100,7 +100,7 @@ def _shot(name: str, entry: Mapping[str, Any], pictures: Pictures, file: Path) -
 
 
 def _points(path: Path, told: Mapping[str, Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Points of the PLY file beside it that is named, as far as they can be read."""
+    """Points of the PLY file that it names, if they can be read."""
     name = told.get("ply_file_path")
     if not isinstance(name, str) or Path(name).is_absolute() or ".." in Path(name).parts:
         return np.zeros((0, 3))
