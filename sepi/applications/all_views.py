@@ -34,26 +34,26 @@ from sepi.validation import require_type
 from sepi.variants import Variant
 
 EDGE_VIEWS = 25
-"""Views that each view is compared with at its depth steps, at least."""
+"""Least number of views with which each view is compared at its depth steps."""
 
 _AT_ONCE = 8  # views made at a time; their maps are held beside the sources
 _CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 
 
 class Sources(NamedTuple):
-    """The maps that are carried.
+    """The source maps.
 
     Attributes
     ----------
     disparity, confidence : ndarray, shape (N, H, W), float32
         Pixels per view step; 0..1.
     bars : ndarray, shape (N, H, W, 3), float32
-        Standard deviation of the disparity, and how far the bounds of its interval lie below and above it; of no maps
-        where there are none.
+        Standard deviation of the disparity, and distances of its interval's bounds below and above it; N is 0 without
+        error bars.
     corners : ndarray, shape (N, H, W, 4), float32
         Disparity at the corners of each pixel, from :func:`sepi.applications.carried_map.corner_disparities`.
     baselines : ndarray, shape (N, 2), float64
-        Of the views that the maps belong to, down and across, in view steps.
+        Baselines of the maps' views, down and across, in view steps.
     """
 
     disparity: FloatMap
@@ -73,11 +73,11 @@ class ViewMaps(NamedTuple):
     disparity, confidence : ndarray, shape (H, W), float32
         Pixels per view step; 0..1.
     extended : ndarray, shape (H, W), bool
-        No map shows anything there: the background beside it was extended. The confidence is 0.
+        Pixels that no source map shows, filled with the background beside them, with confidence 0.
     sigma : ndarray, shape (H, W), float32, or None
-        Standard deviation of the disparity, pixels per view step; None where the variant has no model of its error.
+        Standard deviation of the disparity, pixels per view step; None if the variant has no error bars.
     low, high : ndarray, shape (H, W), float32, or None
-        Bounds of the interval of 90 %: the whole range where the background was extended.
+        Bounds of the interval of 90 %; the whole range at extended pixels.
     """
 
     position: tuple[int, int]
@@ -96,22 +96,22 @@ class ViewMaps(NamedTuple):
 
 @dataclass(frozen=True)
 class AllViews:
-    """The maps of every view.
+    """Maps of all views.
 
     Attributes
     ----------
     disparity : ndarray, shape (T, S, H, W), float32
-        Pixels per view step, positive nearer, as of the reference view; NaN in missing views.
+        Pixels per view step, positive nearer, like that of the reference view; NaN in missing views.
     confidence : ndarray, shape (T, S, H, W), float32
         0..1; 0 in missing views.
     extended : ndarray, shape (T, S, H, W), bool
-        Pixels that none of the maps tells about; see :class:`ViewMaps`.
+        Pixels that no source map shows; see :class:`ViewMaps`.
     sigma, low, high : ndarray, shape (T, S, H, W), float32, or None
-        Error bars, pixels per view step; NaN in missing views, None where the variant has no model of its own error.
+        Error bars, pixels per view step; NaN in missing views, None if the variant has no error bars.
 
     Examples
     --------
-    A point stays at its disparity, and moves by it from one view to the next:
+    A point has the same disparity in all views:
 
     >>> import sepi
     >>> from sepi.scenes import render
@@ -139,25 +139,25 @@ def estimate_all_views(
     memory: int | None = None,
     edge_views: int = EDGE_VIEWS,
 ) -> AllViews:
-    """Disparity of every view.
+    """Maps of all views: disparity, confidence and error bars.
 
     Parameters
     ----------
     light_field : LightField
-        Where its disparity range is unknown, it is estimated from the views.
+        If its disparity range is unknown, the range is estimated from the views.
     maps : StageMaps, optional
-        Of the reference view; computed unless given. Its disparity, confidence and error bars stay as they are.
+        Maps of the reference view, which stay unchanged; default: computed.
     variant : str or Variant
-        As of :func:`sepi.estimate_depth`, which makes the maps of up to five views.
+        As for :func:`sepi.estimate_depth`, which computes the maps of up to five views.
     parameters : mapping, optional
         As there.
     progress : callable
         Called with the fraction done.
     memory : int, optional
-        Bytes, as there; what is returned does not count.
+        Bytes, as there, without the returned maps.
     edge_views : int
-        Views that each view is compared with at its depth steps, at least; 0: none, outlines stay as they were carried.
-        That takes a fraction of the time.
+        Least number of views with which each view is compared at its depth steps. With 0, outlines stay as warped,
+        which takes a fraction of the time.
 
     Returns
     -------
@@ -167,9 +167,9 @@ def estimate_all_views(
     Raises
     ------
     SepiError
-        If ``maps`` are not of the light field's shape, or as of :func:`sepi.pipeline.estimate_depth`.
+        If ``maps`` have another shape than the views, or as for :func:`sepi.pipeline.estimate_depth`.
     MemoryError
-        If a limit on the process's address space cannot be enough.
+        If a limit on the process's address space is too small.
 
     Examples
     --------
@@ -206,9 +206,9 @@ def maps_of_all_views(
     memory: int | None = None,
     edge_views: int = EDGE_VIEWS,
 ) -> Iterator[ViewMaps]:
-    """The maps of one view after the other, row by row of the grid; missing views are left out.
+    """The maps of one view after the other, row by row of the grid, without missing views.
 
-    Arguments and errors as for :func:`estimate_all_views`; only a few views' maps are held at a time.
+    Arguments and errors are those of :func:`estimate_all_views`. Only a few views' maps are in memory at a time.
 
     Yields
     ------
@@ -221,7 +221,7 @@ def maps_of_all_views(
     if light_field.disparity_range is None:
         from sepi.inspection.disparity_range import estimate_range
 
-        # once, so that all maps are searched for alike
+        # once, so that all maps have the same range
         light_field = light_field.with_range(estimate_range(light_field))
     anchors = anchor_views(light_field)
     places = np.argwhere(light_field.present)
@@ -237,7 +237,7 @@ def maps_of_all_views(
         found.append(known or estimate_depth(light_field.seen_from(position), variant, parameters, of_all, memory))
         of_all(1.0)
     sources = _sources(found, np.array([light_field.baselines[position] for position in anchors]))
-    # the others' maps are not held twice
+    # frees the other views' maps
     reference = found[0]
     del found
     for begin in range(0, len(places), _AT_ONCE):
@@ -252,7 +252,7 @@ def maps_of_all_views(
 
 
 def anchor_views(light_field: LightField) -> list[tuple[int, int]]:
-    """The views whose maps are estimated: the reference view, and the farthest in each diagonal direction.
+    """The views of the source maps: the reference view, and the farthest in each diagonal direction.
 
     Parameters
     ----------
@@ -270,12 +270,12 @@ def anchor_views(light_field: LightField) -> list[tuple[int, int]]:
 
 
 def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sources:
-    """The maps that are carried, with the surfaces that their pixels are parts of."""
+    """The source maps, with the surfaces of their pixels."""
     bars = [offsets for offsets in map(_offsets, found) if offsets is not None]
     return Sources(
         _stacked([maps.disparity for maps in found]),
         _stacked([maps.confidence for maps in found]),
-        # of all maps, or of none
+        # error bars of all maps, or of none
         _stacked(bars) if len(bars) == len(found) else np.empty((0, *found[0].disparity.shape, 3), np.float32),
         _stacked([corner_disparities(maps.disparity) for maps in found]),
         baselines,
@@ -287,16 +287,16 @@ def _stacked(maps: list[FloatMap]) -> FloatMap:
 
 
 def _offsets(maps: StageMaps) -> FloatMap | None:
-    """Sigma, and how far the bounds lie below and above the disparity, (H, W, 3): what is the same in other views."""
+    """Sigma, and distances of the bounds below and above the disparity, which hold in other views, too; (H, W, 3)."""
     if maps.sigma is None or maps.low is None or maps.high is None:
         return None
     below, above = maps.disparity - maps.low, maps.high - maps.disparity
-    # where nothing is known the disparity may lie beyond both
+    # an unknown disparity may lie beyond both bounds
     return np.stack([maps.sigma, np.maximum(below, 0), np.maximum(above, 0)], axis=2).astype(np.float32, copy=False)
 
 
 def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int64]) -> list[ViewMaps]:
-    """What the carried maps say of some views."""
+    """Maps of some views, fused from the source maps."""
     shape = (len(places), *light_field.shape)
     disparity, confidence, extended = np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, bool)
     baselines = np.ascontiguousarray(light_field.baselines[tuple(places.T)])
@@ -314,14 +314,14 @@ def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int
 
 
 def _with_doubt(light_field: LightField, view: ViewMaps, decided: FloatMap) -> ViewMaps:
-    """A view's maps with the disparity decided on, and error bars that allow for that and for extended background."""
+    """A view's maps with the decided disparity, and error bars that allow for changes and extended background."""
     if view.sigma is None or view.low is None or view.high is None:
         return view._replace(disparity=decided)
-    # a pixel that changed sides may be of either
+    # a pixel that changed sides may belong to either surface
     moved = decided - view.disparity
     low, high = view.low + np.minimum(moved, 0), view.high + np.maximum(moved, 0)
     sigma = np.hypot(view.sigma, moved / 2)
-    # what no map shows may be anywhere, as may what no view knows (sepi.matching.unknown)
+    # extended and unknown pixels may have any disparity
     lowest, highest = light_field.require_disparity_range().candidates(2)
     low = np.where(view.extended, np.minimum(lowest, decided), low)
     high = np.where(view.extended, np.maximum(highest, decided), high)
@@ -330,7 +330,7 @@ def _with_doubt(light_field: LightField, view: ViewMaps, decided: FloatMap) -> V
 
 
 def _with_own_edges(light_field: LightField, view: ViewMaps, edge_views: int) -> FloatMap:
-    """A view's disparity, the pixels at its depth steps being given to the surface that fills most of them there."""
+    """A view's disparity, with pixels at its depth steps on the surface that fills most of them."""
     if edge_views == 0:
         return view.disparity
     from sepi.boundaries.decision import assigned_to_surfaces
@@ -338,13 +338,13 @@ def _with_own_edges(light_field: LightField, view: ViewMaps, edge_views: int) ->
 
     own, parameters = light_field.seen_from(view.position), BoundaryParameters(share_views=edge_views)
     decided = assigned_to_surfaces(own, view.disparity, parameters)
-    # a slope is no step, however steep: a pixel there would leave its surface
+    # a steep slope is not a step, and its pixels stay on their surface
     beside = np.ones((2 * parameters.share_radius + 1,) * 2, np.uint8)
     return np.where(cv2.dilate(torn_pixels(view.disparity).astype(np.uint8), beside) > 0, decided, view.disparity)
 
 
 def torn_pixels(disparity: FloatMap) -> BoolMap:
-    """Pixels at whose side the surface comes apart, beyond what slopes explain; shape (H, W), bool."""
+    """Pixels beside a depth step that slopes do not explain; shape (H, W), bool."""
     top_left, top_right, bottom_right, bottom_left = np.moveaxis(corner_disparities(disparity), 2, 0)
     torn = np.zeros(disparity.shape, bool)
     for first, second in ((top_right, top_left), (bottom_right, bottom_left)):

@@ -1,19 +1,19 @@
-"""Poses and intrinsics of a light field's cameras: pinhole cameras for programs that do not know light fields.
+"""Poses and intrinsics of a light field's views as pinhole cameras, for other programs.
 
-All cameras look the same way. Axes are those of computer vision: x to the right, y down, z forward, the way that they
-look; the origin is the camera of the reference view. A view ``n`` view steps to the right of the reference view and
-``m`` below it is taken from ``(n b, m b, 0)`` with the baseline ``b``.
+All cameras have the same viewing direction. Axes are those of computer vision: x to the right, y down, z forward; the
+origin is the camera of the reference view. A view ``n`` view steps to the right of the reference view and ``m`` below
+it is taken from ``(n b, m b, 0)`` with the baseline ``b``.
 
 Cameras are sheared (:mod:`sepi.camera`): their sensors are shifted so that a point at the focus distance is at the same
-pixel in all views. So each view has a principal point of its own. With the focal length ``f`` in pixels and the
-camera's ``offset`` (``b f / F``), a view ``N`` steps to the right of the *grid's centre view* has it at
+pixel in all views. So each view has its own principal point. With the focal length ``f`` in pixels and the camera's
+``offset`` (``b f / F``), a view ``N`` steps to the right of the *grid's centre view* has it at
 ``(W - 1) / 2 + N offset`` across, and likewise down. Projection into a view ``n`` steps from the reference view, itself
-``n0`` from the centre view, then gives what the conventions of :mod:`sepi.lightfield` ask for::
+``n0`` from the centre view, then agrees with the conventions of :mod:`sepi.lightfield`::
 
     x' = (W - 1) / 2 + (n0 + n) offset + f (X - n b) / Z = x - n (b f / Z - offset) = x - n d
 
-Where the camera is not known, focal length and focus distance are free: every choice gives these very pixels, and
-shapes that differ by a projective map. :func:`nominal_camera` makes one.
+If the camera is unknown, focal length and focus distance are free: all choices give the same pixels, and shapes that
+differ by a projective map. :func:`nominal_camera` makes one.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 Points = npt.NDArray[np.float64]
 
 FOCAL_FACTOR = 1.2
-"""Nominal focal length as a multiple of the picture's longer side; COLMAP, too, begins with it where it knows none."""
+"""Nominal focal length as a multiple of the picture's longer side, COLMAP's default."""
 
 NEAREST, FARTHEST = 1.0, 2.0
-"""Depth of the nearest and the farthest surface that a nominal camera sees, in units of its own."""
+"""Depth of the nearest and the farthest surface for a nominal camera, in its own units."""
 
-# part of the pixels beyond each end of what counts as the range of a map, so that a few wrong ones do not stretch it
+# share of the pixels beyond each end of a map's range, so that a few wrong ones do not widen it
 _BEYOND = 0.005
 
 
@@ -45,20 +45,20 @@ class CameraPoses:
     Attributes
     ----------
     positions : ndarray, shape (N, 2), int64
-        Place of each view in the grid, ``(t, s)``.
+        Grid position of each view, ``(t, s)``.
     baselines : ndarray, shape (N, 2), float64
         ``(down, across)`` from the reference view, in view steps.
     centres : ndarray, shape (N, 3), float64
-        Where each camera stands: x right, y down, z forward; metres (or units of a nominal camera) from the reference
-        view's camera.
+        Position of each camera, x right, y down, z forward, from the reference view's; metres, or units of a nominal
+        camera.
     principal_points : ndarray, shape (N, 2), float64
         ``(x, y)`` in pixels, the middle of the top left pixel being (0, 0).
     focal_px : float
-        Focal length of all of them in pixels.
+        Common focal length in pixels.
     shape : (int, int)
         Height and width of a view.
     reference : int
-        Which of them is the reference view.
+        Number of the reference view.
     """
 
     positions: npt.NDArray[np.int64]
@@ -74,9 +74,7 @@ class CameraPoses:
 
     @property
     def from_corner(self) -> Points:
-        """Principal points ``(x, y)`` counted from the corner of the picture, the middle of its first pixel being (0.5,
-        0.5): as COLMAP and nerfstudio count.
-        """
+        """Principal points ``(x, y)`` from the picture's corner, as in COLMAP and nerfstudio."""
         return self.principal_points + 0.5
 
     def project(self, points: Points, view: int) -> Points:
@@ -85,9 +83,9 @@ class CameraPoses:
         Parameters
         ----------
         points : ndarray, shape (P, 3), float64
-            Before the cameras: with positive z.
+            In front of the cameras, with positive z.
         view : int
-            Which of the cameras.
+            Number of the camera.
         """
         seen = points - self.centres[view]
         across_down = self.principal_points[view] + self.focal_px * seen[:, :2] / seen[:, 2:]
@@ -106,7 +104,7 @@ def camera_poses(light_field: LightField, camera: Camera) -> CameraPoses:
     ----------
     light_field : LightField
     camera : Camera
-        Its own, or a nominal one.
+        The light field's own, or a nominal one.
     """
     positions = np.argwhere(light_field.present)
     baselines = light_field.baselines[light_field.present]
@@ -127,11 +125,11 @@ def camera_poses(light_field: LightField, camera: Camera) -> CameraPoses:
 
 
 def nominal_camera(disparity: FloatMap, known: BoolMap) -> Camera:
-    """A camera for a map of which none is known.
+    """A nominal camera for a map without a known one.
 
-    Its focal length is :data:`FOCAL_FACTOR` times the longer side of the picture; baseline and focus distance are such
-    that the nearest surface of the map lies at depth :data:`NEAREST` and the farthest at :data:`FARTHEST`, but for half
-    a per cent of the pixels at either end. So depth is neither in metres nor to scale.
+    Its focal length is :data:`FOCAL_FACTOR` times the longer side of the picture. Baseline and focus distance put the
+    nearest surface of the map at depth :data:`NEAREST` and the farthest at :data:`FARTHEST`, without half a per cent of
+    the pixels at either end. So depth is neither in metres nor to scale.
 
     Parameters
     ----------
@@ -142,7 +140,7 @@ def nominal_camera(disparity: FloatMap, known: BoolMap) -> Camera:
     """
     values = disparity[known & np.isfinite(disparity)].astype(np.float64)
     low, high = np.quantile(values, (_BEYOND, 1 - _BEYOND)) if values.size else (0.0, 0.0)
-    # a plane has no range: any will do
+    # any range for a single plane
     width = float(high - low) or 1.0
     # scale / (low + offset) is the farthest, scale / (low + width + offset) the nearest
     scale = width / (1 / NEAREST - 1 / FARTHEST)

@@ -1,4 +1,4 @@
-"""A disparity map, or values of its pixels, as another view sees its surfaces; the nearest surface wins."""
+"""A disparity map, or values of its pixels, warped to another view as surfaces; the nearest surface wins."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from sepi.kernels import all_views as kernels
 from sepi.lightfield import BoolMap, FloatMap
 
 TOLERANCE: float = kernels.TOLERANCE
-"""Disparities that differ by no more are of one surface, pixels per view step."""
+"""Largest difference of neighbours on one surface, pixels per view step."""
 
 
 def carried_map(disparity: FloatMap, baseline: tuple[float, float], known: BoolMap | None = None) -> FloatMap:
-    """A disparity map as another view sees its surfaces.
+    """A disparity map warped to another view.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def carried_map(disparity: FloatMap, baseline: tuple[float, float], known: BoolM
     baseline : (float, float)
         From the map's view to the other, down and across, in view steps.
     known : ndarray, shape (H, W), bool, optional
-        Pixels that count, whose disparity is finite; all unless given.
+        Pixels that count, whose disparity is finite; default: all.
 
     Returns
     -------
@@ -35,12 +35,12 @@ def carried_map(disparity: FloatMap, baseline: tuple[float, float], known: BoolM
 def carried_values(
     disparity: FloatMap, values: FloatMap, baseline: tuple[float, float], known: BoolMap | None = None
 ) -> FloatMap:
-    """Values of a map's pixels as another view sees its surfaces; arguments as :func:`carried_map`.
+    """Values of a map's pixels warped to another view; other arguments are those of :func:`carried_map`.
 
     Parameters
     ----------
     values : ndarray, shape (H, W), float32
-        Of each pixel of the map.
+        Value of each pixel of the map.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def carried_values(
 
 
 def corner_disparities(disparity: FloatMap) -> FloatMap:
-    """Disparity at the corners of each pixel: what the pixels that meet there, and belong together, agree on.
+    """Disparity at the corners of each pixel, averaged over the pixels of one surface that meet there.
 
     Parameters
     ----------
@@ -72,16 +72,16 @@ def corner_disparities(disparity: FloatMap) -> FloatMap:
 def _carried(
     disparity: FloatMap, baseline: tuple[float, float], known: BoolMap | None
 ) -> tuple[FloatMap, npt.NDArray[np.int32]]:
-    """The map that :func:`carried_map` gives, and the number of the pixel that is seen, -1 where none is."""
+    """The map of :func:`carried_map`, and the number of the pixel that is seen, or -1."""
     nearest, origin = np.empty(disparity.shape, np.float32), np.empty(disparity.shape, np.int32)
     if known is not None:
-        # compiled code knows no NaN; behind all else, what is unknown hides nothing
+        # kernels take no NaN; unknown pixels lie behind all others, and occlude nothing
         disparity = np.where(known, disparity, disparity[known].min(initial=0) - np.float32(1))
     disparity = np.ascontiguousarray(disparity, np.float32)
     kernels.carry(disparity, corner_disparities(disparity), *baseline, nearest, origin)
     if known is not None:
         origin[~known.ravel()[origin]] = -1
     nearest[origin < 0] = np.nan
-    # surfaces go on to the border of their last pixel, but no surface is farther or nearer than the map has one
+    # surfaces reach the border of their last pixel, within the map's range of disparities
     seen = disparity if known is None else disparity[known]
     return (np.clip(nearest, seen.min(), seen.max()) if seen.size else nearest), origin

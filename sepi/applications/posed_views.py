@@ -1,7 +1,4 @@
-"""Views with camera poses, depth and points, from which data sets for other programs are made.
-
-:mod:`sepi.io.colmap` and :mod:`sepi.io.nerfstudio` write them.
-"""
+"""Views with camera poses, depth and points, for :mod:`sepi.io.colmap` and :mod:`sepi.io.nerfstudio`."""
 
 from __future__ import annotations
 
@@ -21,12 +18,12 @@ from sepi.rig import Rig
 Colours = npt.NDArray[np.uint8]
 
 Surfaces = Callable[[tuple[int, int]], FloatMap]
-"""Gives the disparity of the view at a grid position, (H, W) float32, NaN where it is unknown."""
+"""Function from a grid position to that view's disparity, (H, W) float32, NaN where unknown."""
 
 MAX_POINTS = 10000
-"""Most points unless told; each has a track through all the views that see it."""
+"""Default of the most points; each has a track through all views that see it."""
 
-# surfaces apart by more than this many pixels between the two views are different ones
+# largest difference of one surface's positions in a view, pixels
 _APART = 1.0
 
 
@@ -38,7 +35,7 @@ class PosedViews:
     ----------
     light_field : LightField
     camera : Camera
-        The one that was given, the light field's own, or a nominal one.
+        The given camera, the light field's own, or a nominal one.
     metric : bool
         Whether positions and depth are in metres; False with a nominal camera.
     poses : CameraPoses
@@ -49,13 +46,13 @@ class PosedViews:
     chosen : ndarray, shape (H, W), bool
         Pixels of the reference view that have a point.
     surfaces : callable or None
-        Disparity of the other views; the reference view's, carried to them, where there is none.
+        Disparity of the other views; None: the reference view's, warped to them.
     rig : Rig or None
-        Where the cameras stand in the world that they were calibrated in; None: in the reference view's axes.
+        Poses in the world of the calibrated cameras; None: poses in the reference view's axes.
     sigma : ndarray, shape (H, W), float32, or None
-        Standard deviation of the reference view's disparity, pixels per view step; None where nothing tells it.
+        Standard deviation of the reference view's disparity, pixels per view step; None without error bars.
     sigmas : callable or None
-        That of the other views, where ``surfaces`` gives their disparity.
+        Standard deviation of the other views, if ``surfaces`` gives their disparity.
     """
 
     light_field: LightField
@@ -72,7 +69,7 @@ class PosedViews:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name of each view, without the end of a file's name, such as ``view_04_04``: its row and column."""
+        """Name of each view by its row and column, such as ``view_04_04``."""
         digits = max(2, *(len(str(size - 1)) for size in self.light_field.grid))
         return tuple(f"view_{t:0{digits}d}_{s:0{digits}d}" for t, s in self.poses.positions.tolist())
 
@@ -85,11 +82,11 @@ class PosedViews:
 
     @property
     def rotation(self) -> Points:
-        """From the world's axes to those of all cameras, (3, 3)."""
+        """Rotation from the world's axes to those of all cameras, (3, 3)."""
         return np.eye(3) if self.rig is None else self.rig.rotation
 
     def in_world(self, points: Points) -> Points:
-        """Points (P, 3) of the reference view's axes in the world."""
+        """World coordinates of points (P, 3) in the reference view's axes."""
         return points if self.rig is None else self.rig.to_world(points)
 
     @property
@@ -104,7 +101,7 @@ class PosedViews:
         return self.picture(self.poses.reference)[self.chosen]
 
     def picture(self, view: int) -> Colours:
-        """A view as (H, W, 3) RGB of 8 bit, which all programs read."""
+        """A view as RGB of 8 bits, which all programs read; shape (H, W, 3)."""
         t, s = self.poses.positions[view]
         pixels = self.light_field.rgb_views[t, s]
         if pixels.dtype == np.uint8:
@@ -113,11 +110,11 @@ class PosedViews:
 
     @property
     def incomplete(self) -> bool:
-        """Whether there are pixels that a view does not show."""
+        """Whether a view has missing pixels."""
         return self.light_field.missing is not None
 
     def shown(self, view: int) -> BoolMap:
-        """Which pixels (H, W) a view shows."""
+        """Mask of the pixels that a view shows, (H, W)."""
         missing = self.light_field.missing
         if missing is None:
             return np.ones(self.light_field.shape, bool)
@@ -125,7 +122,7 @@ class PosedViews:
         return np.asarray(~missing[t, s])
 
     def carried(self, view: int) -> FloatMap:
-        """Disparity as a view sees it, (H, W) float32; NaN where it is not known, or the view does not show it."""
+        """Disparity of a view, (H, W) float32; NaN at unknown and missing pixels."""
         carried = self._carried(view)
         return np.where(self.shown(view), carried, np.float32(np.nan)) if self.incomplete else carried
 
@@ -139,13 +136,13 @@ class PosedViews:
         return self.surfaces((t, s))
 
     def depth(self, carried: FloatMap) -> FloatMap:
-        """Depth of a view, (H, W) float32, from its :meth:`carried` disparity; 0 where it is not known."""
+        """Depth of a view, (H, W) float32, from its :meth:`carried` disparity; 0 where unknown."""
         depth = self.camera.depth(carried)
         return np.where(np.isfinite(depth) & ~np.isnan(carried), depth, np.float32(0))
 
     @property
     def sure(self) -> bool:
-        """Whether :meth:`depth_sigma` is known of all views."""
+        """Whether all views have a :meth:`depth_sigma`."""
         return self.sigma is not None and (self.surfaces is None or self.sigmas is not None)
 
     def depth_sigma(self, view: int, carried: FloatMap) -> FloatMap:
@@ -166,16 +163,16 @@ class PosedViews:
         return self.sigmas((t, s))
 
     def pixel_errors(self, sees: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
-        """Expected reprojection error of the points, mean over views, (P,), pixels; 0 where it is not known.
+        """Expected reprojection error of the points, mean over views, (P,), pixels; 0 where unknown.
 
         Parameters
         ----------
         sees : ndarray, shape (N, P), bool
-            Which views see which points: the mean is over these.
+            Whether a view sees a point.
         """
         if self.sigma is None:
             return np.zeros(sees.shape[1])
-        # what is wrong by sigma in each view step is wrong by this much at a view so many steps away
+        # an error of sigma per view step grows with the view's distance
         steps = np.linalg.norm(self.poses.baselines, axis=1)
         mean = (sees * steps[:, None]).sum(axis=0) / np.maximum(sees.sum(axis=0), 1)
         return np.asarray(self.sigma[self.chosen].astype(np.float64) * mean)
@@ -183,7 +180,7 @@ class PosedViews:
     def normals(self, view: int, carried: FloatMap) -> FloatMap:
         """Unit normals of a view's surfaces in its camera's axes, towards it, (3, H, W) float32; 0 without depth.
 
-        Inverse depth, and so disparity, is linear on a plane: its slopes tell the normal exactly.
+        Inverse depth, and so disparity, is linear on a plane, so its slopes give the normal exactly.
         """
         down, across = (_slopes(carried, axis) for axis in (0, 1))
         x, y = self.poses.principal_points[view]
@@ -201,9 +198,9 @@ class PosedViews:
         baseline, disparity = self.poses.baselines[view], self.disparity[self.chosen].astype(np.float64)
         there = np.argwhere(self.chosen) - disparity[:, None] * baseline
         inside = ((there > -0.5) & (there < np.array(carried.shape) - 0.5)).all(axis=1)
-        # of what lies outside no whole number need exist
+        # positions outside may exceed integers
         rows, columns = np.rint(np.where(inside[:, None], there, 0)).astype(np.int64).T
-        # comparison with NaN is false: where nothing is known, nothing is seen
+        # comparison with NaN is false, so unknown pixels see no points
         nearer = (carried[rows, columns] - disparity) * float(np.abs(baseline).max())
         return np.asarray(inside & (nearer <= _APART), bool)
 
@@ -221,35 +218,35 @@ def posed_views(
     sigma: FloatMap | None = None,
     sigmas: Surfaces | None = None,
 ) -> PosedViews:
-    """Prepare a light field and the disparity map of its reference view for other programs.
+    """The posed views of a light field with the disparity map of its reference view.
 
     Parameters
     ----------
     light_field : LightField
     disparity : ndarray, shape (H, W), float32
-        Of its reference view, pixels per view step.
+        Disparity of its reference view, pixels per view step.
     confidence : ndarray, shape (H, W), float32, optional
-        0..1; full unless given.
+        0..1; default: 1.
     unknown : ndarray, shape (H, W), bool, optional
         Pixels without depth.
     camera : Camera, optional
-        The light field's own unless given, or a nominal one where it has none.
+        Default: the light field's own, or a nominal one.
     min_confidence : float, optional
-        Less sure pixels have no point. Unless given, the surer half of all pixels with a depth has one: by ``sigma``
-        where it is given, else by the confidence.
+        Least confidence of points. Default: points at the surer half of all pixels with a depth, by ``sigma`` if given,
+        else by the confidence.
     max_points : int
-        Every so-many-th row and column has points, so that they are no more than this.
+        Most points, on every n-th row and column.
     surfaces : callable, optional
-        Disparity of the other views; the map is carried to them unless given.
+        Disparity of the other views; default: the map, warped to them.
     sigma : ndarray, shape (H, W), float32, optional
         Standard deviation of the disparity, pixels per view step.
     sigmas : callable, optional
-        That of the other views; needed beside ``surfaces`` for the error of their depth.
+        Standard deviation of the other views; needed with ``surfaces`` for the error of their depth.
 
     Raises
     ------
     SepiError
-        If a map is not of the light field's shape, or a number is out of bounds.
+        If a map has another shape than the views, or a number is out of bounds.
     """
     given = {"disparity": disparity, "confidence": confidence, "unknown": unknown, "sigma": sigma}
     for name, values in given.items():
@@ -286,25 +283,25 @@ def _slopes(disparity: FloatMap, axis: int) -> npt.NDArray[np.float64]:
     steps = np.diff(disparity.astype(np.float64), axis=axis)
     ends = np.full((1, steps.shape[1]) if axis == 0 else (steps.shape[0], 1), np.nan)
     before, after = np.concatenate([ends, steps], axis), np.concatenate([steps, ends], axis)
-    # what is not known differs without end
+    # differences from unknown pixels are infinite
     size_before, size_after = (np.nan_to_num(np.abs(slope), nan=np.inf) for slope in (before, after))
     return np.nan_to_num(np.where(size_before <= size_after, before, after))
 
 
 def _surer(known: BoolMap, confidence: FloatMap | None, least: float | None, sigma: FloatMap | None) -> BoolMap:
-    """The known pixels that are sure enough."""
+    """The known pixels with enough confidence for a point."""
     if sigma is not None and least is None and known.any():
-        # many pixels have the greatest confidence there is; hardly any two have one sigma
+        # by sigma, since many pixels share the largest confidence
         return known & (sigma <= np.median(sigma[known]))
     if confidence is None or not known.any():
         return known
-    # unknown confidence is none
+    # unknown confidence counts as 0
     sureness = np.nan_to_num(confidence, nan=-1.0)
     return known & (sureness >= (np.median(sureness[known]) if least is None else least))
 
 
 def _thinned(sure: BoolMap, most: int) -> BoolMap:
-    """At most so many of the pixels: those of every n-th row and column, with the least n that does."""
+    """At most this number of the pixels: those on every n-th row and column, with the smallest possible n."""
     step = 1
     while sure[step // 2 :: step, step // 2 :: step].sum() > most:
         step += 1

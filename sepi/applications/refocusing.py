@@ -1,10 +1,9 @@
-"""Pictures focused after the fact: at one disparity, or everywhere.
+"""Refocused pictures: focused at one disparity, or everywhere.
 
 The views of a light field are samples of one large lens, the *synthetic aperture*. Sheared by a disparity, they show
-its points at the same place, and their mean is the photograph that the lens would have taken, focused there [1]_:
-:func:`refocus`. It needs no map; with one, the gaps between the views are filled. And with a map, each pixel can be
-focused at its own disparity: :func:`all_in_focus`, the reference view with the light of all views that see its points,
-and so with less noise.
+points of this disparity at the same place. Their mean is the photograph by that lens, focused there [1]_
+(:func:`refocus`). It needs no map; with one, the gaps between the views are filled. With a map, :func:`all_in_focus`
+focuses each pixel at its own disparity: the mean of all views that see a point has less noise than the reference view.
 
 References
 ----------
@@ -31,19 +30,19 @@ from sepi.stage import Progress, StageMaps, no_progress
 from sepi.validation import described, is_finite, require_map, require_type
 
 OCCLUSION_MARGIN = 0.15
-"""By how much an occluder must be nearer, pixels per view step; that of the stages."""
+"""By how much an occluder must be nearer, pixels per view step; as in the stages."""
 
 COLOUR_SCALE = 0.0316
-"""RGB distance from the expected colour at which a view counts a quarter, in 0..1; noise comes on top."""
+"""RGB distance from the expected colour at which a view counts a quarter, colours in 0..1; noise adds to it."""
 
 ROUNDS = 2
-"""Times that the mean of the views is made: the first expects the reference view's colour, the next the first mean."""
+"""Number of means of the views: the first expects the reference view's colour, the next one the first mean."""
 
-# sides in pixels of the windows by which holes are filled, one after the other; together they reach 16 pixels
+# sides in pixels of the windows that fill holes, one after the other; together they reach 16 pixels
 _FILL = (3, 3, 5, 9, 17)
 
 BEYOND = 0.005
-"""Part of a map's pixels beyond each end of a focal stack, so that a few wrong ones do not stretch it."""
+"""Share of a map's pixels beyond each end of a focal stack, so that a few wrong ones do not widen it."""
 
 
 def refocus(
@@ -56,9 +55,9 @@ def refocus(
 ) -> FloatMap:
     """Picture of the synthetic aperture, focused at one disparity.
 
-    Nearer and farther points are out of focus: the more so, the larger the aperture. Where they move more than about a
-    pixel between neighbouring views, they would show as sharp copies instead of a blur. A map tells this movement: each
-    view then stands for all views around it, half way to its neighbours.
+    Nearer and farther points are out of focus, more so with a larger aperture. Points that move by more than about a
+    pixel between neighbouring views would give sharp copies instead of a blur. With a map, which tells this movement,
+    each view represents all views around it, half way to its neighbours.
 
     Parameters
     ----------
@@ -66,25 +65,24 @@ def refocus(
     disparity : float
         Pixels per view step. Points of this disparity are sharp.
     maps : StageMaps, or ndarray of shape (H, W), float32, optional
-        Maps of the reference view, or its disparity in pixels per view step, to fill in the views between the views;
-        the mean of the views alone unless given.
+        Maps of the reference view, or its disparity in pixels per view step, to interpolate between the views; default:
+        the mean of the views alone.
     aperture : float, optional
-        Radius of the aperture in view steps, round the reference view: the views in that disc are used. All views
-        unless given.
+        Radius of the aperture round the reference view, in view steps; default: all views.
     progress : callable
         Called with the fraction done.
 
     Returns
     -------
     ndarray, shape (H, W, C), float32
-        Colours in 0..1, as the reference view sees the scene, C as the views have it. A pixel that some views do not
-        hold is the mean of those that do.
+        Colours in 0..1, seen from the reference view, with the channels of the views. A pixel outside some views is the
+        mean of the others.
 
     Raises
     ------
     SepiError
-        If the disparity is not finite, the map does not have the views' shape, or the aperture is no positive number or
-        too small for any view but one.
+        If the disparity is not finite, the map does not have the views' shape, or the aperture is not positive or too
+        small for a second view.
 
     Examples
     --------
@@ -104,11 +102,11 @@ def refocus(
     surfaces = None if maps is None else _surfaces(_disparity_of(light_field, maps))
     height, width = light_field.shape
     moved = disparity * light_field.baselines
-    # of others no pixel is left
+    # at larger disparities, no pixel is left
     held = (np.abs(moved) <= (height - 1, width - 1)).all(axis=2)
     chosen = views_within(light_field, aperture) & held
     sums, counts = np.zeros((3, height, width), np.float32), np.zeros((height, width), np.float32)
-    # a row of views at a time: all at once take much memory
+    # a row of views at a time, since all views take much memory
     for t in range(light_field.grid[0]):
         one_row = np.zeros_like(chosen)
         one_row[t] = chosen[t]
@@ -135,20 +133,20 @@ def all_in_focus(
     occlusion_margin: float = OCCLUSION_MARGIN,
     progress: Progress = no_progress,
 ) -> FloatMap:
-    """The reference view, each pixel the mean of the views that see its point.
+    """The reference view with each pixel averaged over the views that see its point.
 
-    Views in which a nearer pixel of the map occludes the point are left out. A view's weight falls as its colour
-    differs from the others: where the map is wrong, the reference view's own colour stays. N views that see a point
-    lower its noise to about 1 / sqrt(N).
+    Views in which a nearer pixel of the map occludes the point are left out. A view weighs less if its colour differs
+    from the others', so that the reference view's own colour stays where the map is wrong. N views that see a point
+    reduce its noise to about 1 / sqrt(N).
 
     Parameters
     ----------
     light_field : LightField
     maps : StageMaps, or ndarray of shape (H, W), float32
-        Maps of the reference view, or its disparity in pixels per view step. Where that is not finite, the reference
-        view is taken as it is.
+        Maps of the reference view, or its disparity in pixels per view step. Pixels that are not finite keep the
+        reference view's colour.
     aperture : float, optional
-        Radius in view steps of the views that are used; all unless given.
+        Radius of the views that are used, in view steps; default: all views.
     occlusion_margin : float
         By how much an occluder must be nearer, pixels per view step.
     progress : callable
@@ -157,13 +155,12 @@ def all_in_focus(
     Returns
     -------
     ndarray, shape (H, W, C), float32
-        Colours in 0..1, C as the views have it.
+        Colours in 0..1, with the channels of the views.
 
     Raises
     ------
     SepiError
-        If the map does not have the views' shape, or the aperture is no positive number or too small for any view but
-        one.
+        If the map does not have the views' shape, or the aperture is not positive or too small for a second view.
 
     Examples
     --------
@@ -211,12 +208,12 @@ def all_in_focus(
 
 
 def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
-    """The views in an aperture of this radius in view steps round the reference view; shape (T, S). All for None.
+    """Views within this radius of the reference view, in view steps; None: all; shape (T, S), bool.
 
     Raises
     ------
     SepiError
-        If the radius is no positive number, or no view but the reference view is so near.
+        If the radius is not positive, or too small for a second view.
     """
     if aperture is None:
         return light_field.present.copy()
@@ -243,14 +240,14 @@ def focal_stack(disparity: FloatMap, count: int, unknown: BoolMap | None = None)
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
     count : int
-        How many; 1: the middle.
+        Number of disparities; 1: the middle.
     unknown : ndarray, shape (H, W), bool, optional
         Pixels that do not count.
 
     Returns
     -------
     list of float
-        Falling in even steps, the ends being the map's but for a few pixels; fewer where the map is constant.
+        Falling in even steps, from end to end of the map without a few pixels; one if the map is constant.
 
     Raises
     ------
@@ -265,29 +262,27 @@ def focal_stack(disparity: FloatMap, count: int, unknown: BoolMap | None = None)
 
 
 def evenly_spaced(low: float, high: float, count: int) -> list[float]:
-    """``count`` disparities from ``high`` down to ``low``; the middle if one, and one if both are the same."""
+    """``count`` disparities from ``high`` down to ``low``; a single one is the middle; one if both are the same."""
     if count == 1 or high <= low:
         return [(low + high) / 2]
     return [float(value) for value in np.linspace(high, low, count)]
 
 
 def _disparity_of(light_field: LightField, maps: StageMaps | FloatMap) -> FloatMap:
-    """The disparity of maps, which must have the views' shape."""
+    """The disparity of maps, checked to have the views' shape."""
     disparity = maps.disparity if isinstance(maps, StageMaps) else maps
     require_map(f"{light_field.name}: map", disparity, light_field.shape)
     return np.ascontiguousarray(disparity, np.float32)
 
 
 def _surfaces(disparity: FloatMap) -> FloatMap | None:
-    """A map whose non-finite pixels are set to the farthest disparity, so that they occlude nothing; None if none is
-    finite.
-    """
+    """A map with the farthest disparity at pixels that are not finite, so that these occlude nothing; None without any."""
     known = np.isfinite(disparity)
     return np.where(known, disparity, disparity[known].min()).astype(np.float32) if known.any() else None
 
 
 def _cell(light_field: LightField) -> FloatMap:
-    """Height and width in view steps of what a view stands for: the usual distance to its neighbours; 0 without any."""
+    """Height and width in view steps of a view's cell: the usual distance of neighbours; 0 without neighbours."""
     baselines, present = light_field.baselines, light_field.present
     found = []
     for axis in (0, 1):
@@ -317,28 +312,28 @@ def _filled_between(
 
 
 def _without_holes(nearest: FloatMap, otherwise: float) -> FloatMap:
-    """A z-buffer whose holes, which show what the reference view does not see, have the farthest surface beside them.
+    """A z-buffer with holes, which the reference view does not see, filled with the farthest surface beside them.
 
-    What is farther inside than holes usually reach gets the disparity ``otherwise``.
+    Pixels farther inside than the reach of the windows get the disparity ``otherwise``.
     """
     empty = nearest == EMPTY
     found = np.where(empty, np.float32(np.inf), nearest)
     if empty.any():
         for side in _FILL:
             window = np.ones((side, side), np.uint8)
-            # beyond the border nothing is known
+            # no surfaces beyond the border
             beside = cv2.erode(found, window, borderType=cv2.BORDER_CONSTANT, borderValue=(np.inf,))
             found = np.where(empty, beside, found)
     return np.where(np.isinf(found), np.float32(otherwise), found).astype(np.float32)
 
 
 def _shown(light_field: LightField, place: tuple[int, ...], moved: FloatMap) -> FloatMap:
-    """1 where a view shows what is read of it for the pixels of the reference view, else 0; shape (H, W)."""
+    """Mask of the reference pixels whose samples a view shows, as 1 and 0; shape (H, W)."""
     height, width = light_field.shape
     shown = np.ones((height, width), np.float32)
-    # of what the reference view itself does not show, something has to stand there
+    # the reference view counts even at its missing pixels, for lack of others
     if light_field.missing is not None and place != light_field.reference_position:
-        # as far as a cubic sample reaches
+        # reach of a cubic sample
         beside = cv2.dilate(light_field.missing[place].astype(np.uint8), np.ones((5, 5), np.uint8))
         rows = np.clip(np.rint(np.arange(height) - moved[0]), 0, height - 1).astype(int)
         columns = np.clip(np.rint(np.arange(width) - moved[1]), 0, width - 1).astype(int)
@@ -347,7 +342,7 @@ def _shown(light_field: LightField, place: tuple[int, ...], moved: FloatMap) -> 
 
 
 def _held(moved: float, length: int) -> slice:
-    """Pixels of a line that a view holds when its pixel ``p - moved`` is read for the pixel ``p``."""
+    """Pixels ``p`` of a line for which a view has the pixel ``p - moved``."""
     return slice(max(0, math.ceil(moved)), min(length, math.floor(length - 1 + moved) + 1))
 
 

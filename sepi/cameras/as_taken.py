@@ -119,7 +119,7 @@ def _sampled(values: FloatMap, at: Floats) -> FloatMap:
 
 
 def _inside(shape: tuple[int, ...], at: Floats) -> tuple[npt.NDArray[np.bool_], Floats]:
-    """Mask of positions ``(x, y)``, (N, 2), inside a picture, and positions moved to within its outer pixels' middles."""
+    """Mask of positions ``(x, y)``, (N, 2), inside a picture, and positions limited to its outer pixels' middles."""
     height, width = shape
     # positions beyond the middle of a border pixel belong to it
     with np.errstate(invalid="ignore"):
