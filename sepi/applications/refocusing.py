@@ -276,7 +276,7 @@ def _disparity_of(light_field: LightField, maps: StageMaps | FloatMap) -> FloatM
 
 
 def _surfaces(disparity: FloatMap) -> FloatMap | None:
-    """A map with the farthest disparity at pixels that are not finite, so that these occlude nothing; None without any."""
+    """A map with the farthest disparity at pixels that are not finite, so that these occlude nothing."""
     known = np.isfinite(disparity)
     return np.where(known, disparity, disparity[known].min()).astype(np.float32) if known.any() else None
 
