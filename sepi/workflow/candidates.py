@@ -1,4 +1,4 @@
-"""Memory and time of a job by its number of candidates, which is known once the light field is read."""
+"""A job's memory and time by its number of disparity candidates, which is known once the light field is read."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from sepi.workflow.datasets import Scene
 
 
 def candidates_mb(scene: Scene, light_field: Path, parameters: Parameters, threads: int = 1) -> int:
-    """Memory in MB that a sweep takes beyond one of the usual number of candidates: a cost volume, or rows of costs.
+    """Memory in MB that a sweep needs beyond that for the default number of candidates: a cost volume or cost rows.
 
     Parameters
     ----------
     scene : Scene
     light_field : Path
-        What ingest writes of it; until then only a number that is set can be told.
+        The output of ingest; before it exists, only a configured number of candidates is known.
     parameters : Parameters
-        Of the job's choice.
+        Parameters of the job's choice.
     threads : int
-        Each of a plane sweep has rows of its own.
+        Each thread of a plane sweep has its own cost rows.
     """
     if isinstance(parameters, SweepParameters):
         usual = type(parameters)().thread_bytes(parameters.rule.usual, scene.width)
@@ -38,7 +38,7 @@ def candidates_mb(scene: Scene, light_field: Path, parameters: Parameters, threa
 
 
 def candidates_factor(scene: Scene, light_field: Path, parameters: Parameters) -> float:
-    """How many times the usual number of candidates a job goes through; 1 where it does not sweep over any."""
+    """Ratio of a job's number of candidates to the default; 1 without a sweep."""
     if not isinstance(parameters, CandidateParameters):
         return 1.0
     return _number(scene, light_field, parameters) / parameters.rule.usual
@@ -47,9 +47,9 @@ def candidates_factor(scene: Scene, light_field: Path, parameters: Parameters) -
 def _number(scene: Scene, light_field: Path, parameters: CandidateParameters) -> int:
     if parameters.num_disparities is not None:
         return parameters.num_disparities
-    # absent, or of an earlier version: it is made before the job runs
+    # missing or from an earlier version: it is made before the job runs
     with suppress(SepiError, KeyError):
-        # a plan asks for many; the job itself checks the file
+        # planning reads many files; the job itself checks its file
         known = read_attributes(light_field, check=False)
         minimum, maximum = known["disparity_range"]
         return parameters.rule.number(float(maximum - minimum), float(known["reach"]), scene.height * scene.width)

@@ -1,4 +1,4 @@
-"""The workflow's configuration: the model of ``config.yaml``, its check, and what the rules are told."""
+"""The workflow's configuration: the model of ``config.yaml``, and its check, which returns the rules' settings."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from sepi.workflow.parameters import stage_settings
 from sepi.workflow.rendered_dataset import Rendered
 from sepi.workflow.settings import Report, Settings
 
-# names of folders, panels and columns of tables that stand beside those of variants
+# names already in use for folders, panels and table columns, where variants have theirs too
 _RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view", "dataset", "scene", "row", "region")
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
-# keys whose values are text even where they look like numbers
+# keys whose values stay text even if they look like numbers
 _TEXTS = ("path", "truth", "images", "reference", "pattern", "variable", "include", "exclude")
 _WORDS = {"true": True, "false": False, "null": None}
 
@@ -41,13 +41,13 @@ class Builtin(CheckedModel):
     """Keys of ``builtin``."""
 
     scenes: list[str] = Field(
-        list(SCENES), description="which of the built-in scenes to use, in the order of the tables; [] for none"
+        list(SCENES), description="built-in scenes to use, in the order of the tables; [] for none"
     )
     size: int = Field(192, ge=64, le=1024, description="height and width of a view in pixels")
 
 
 class Root(CheckedModel):
-    """A folder of scenes, and patterns of the names of those to take and to leave out."""
+    """A folder of scenes, and name patterns to include and exclude."""
 
     path: str
     include: list[str] = Field([])
@@ -55,7 +55,7 @@ class Root(CheckedModel):
 
 
 class _Own(CheckedModel):
-    """Keys of one of the ``light_fields`` beside those of :class:`ReadOptions`: where it is, and its ground truth."""
+    """Keys of one of the ``light_fields``, apart from those of :class:`ReadOptions`: its path and ground truth."""
 
     path: str = Field(min_length=1)
     truth: str | None = Field(None, min_length=1)
@@ -64,7 +64,7 @@ class _Own(CheckedModel):
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """How to read it, as flags of the command line."""
+        """Its reading options as flags of the command line."""
         pairs = {"grid": "x", "view": ","}
         flags: list[str] = []
         given = self.model_dump(exclude={"path", "truth", "truth_scale"}, exclude_defaults=True)
@@ -76,7 +76,7 @@ class _Own(CheckedModel):
 
     @property
     def own_truth(self) -> TruthFile | None:
-        """The file of ground truth, if there is one."""
+        """The ground truth file, if given."""
         return None if self.truth is None else TruthFile(Path(self.truth).expanduser(), self.truth_scale)
 
 
@@ -84,7 +84,7 @@ _HINTS = get_type_hints(ReadOptions, include_extras=True)
 OwnLightField: type[_Own] = create_model(  # type: ignore[call-overload]
     "OwnLightField", __base__=_Own, **{field.name: (_HINTS[field.name], field.default) for field in fields(ReadOptions)}
 )
-"""Keys of one of the ``light_fields``: the flags of ``sepi depth`` that say how to read it are among them."""
+"""Keys of one of the ``light_fields``, including the reading flags of ``sepi depth``."""
 
 
 class Config(CheckedModel):
@@ -107,45 +107,45 @@ class Config(CheckedModel):
     )
     light_fields: dict[str, dict[str, Any]] = Field(
         {},
-        description="Dataset 'own': light fields of any format that 'sepi depth' reads, by a name of yours, such as "
-        "{lego: {path: /data/lego, grid: [17, 17]}}. Beside path: format, grid, pattern, axes, variable, central, "
-        "order, exclude, view, row_spacing, white, images, reference, crop_of, follow_links, which mean what the flags "
-        "of 'sepi depth' mean; truth, a file of ground truth, and truth_scale, pixels per view step for each of its "
-        "levels (docs/reproduce/real_truth.md).",
+        description="Dataset 'own': light fields of any format that 'sepi depth' reads, by names that you choose, such "
+        "as {lego: {path: /data/lego, grid: [17, 17]}}. Besides path: format, grid, pattern, axes, variable, central, "
+        "order, exclude, view, row_spacing, white, images, reference, crop_of, follow_links, which are flags of "
+        "'sepi depth'; truth, a ground truth file, and truth_scale, pixels per view step per unit of its values "
+        "(docs/reproduce/real_truth.md).",
     )
     rendered: Rendered = Field(
         Rendered(),
-        description="Dataset 'rendered', of 'snakemake rendered' alone: path-traced scenes with exact ground truth, in "
-        "several levels of noise (docs/reproduce/rendered.md). To render them needs the extra sepi[render].",
+        description="Dataset 'rendered', used only by 'snakemake rendered': path-traced scenes with exact ground "
+        "truth, at several noise levels (docs/reproduce/rendered.md). Rendering needs the extra sepi[render].",
     )
     external: dict[str, dict[str, Any]] = Field(
         {},
-        description="Disparity maps of external methods, by the method's name, to be scored and shown beside ours: "
+        description="Disparity maps of external methods, by the method's name, to be scored and shown next to ours: "
         "a folder with SCENE.pfm, .npy, .png or .h5, a file pattern such as {SPO: '/maps/{dataset}/{scene}/spo.pfm'}, "
         "or {path: ..., scale: ..., offset: ...} where disparity = value * scale + offset.",
     )
     bad_thresholds: list[Positive] = Field(
         [],
-        description="Errors in pixels per view step to score beside 0.07, 0.03 and 0.01: the percentage of the pixels "
-        "with a larger one.",
+        description="Error thresholds in pixels per view step, in addition to 0.07, 0.03 and 0.01; the score is the "
+        "percentage of pixels with a larger error.",
     )
     report: Report = Field(Report(), description="The report's page.")
     disparity_range: dict[str, tuple[float, float]] = Field(
         {},
-        description="Disparity range of single scenes in pixels per view step, such as {hci/cotton: [-1.6, 1.5]}. "
-        "Other scenes have the range of their own parameters.cfg, or one estimated from the views.",
+        description="Disparity ranges of individual scenes in pixels per view step, such as {hci/cotton: [-1.6, 1.5]}. "
+        "Other scenes use the range in their parameters.cfg, or one estimated from the views.",
     )
     variants: dict[str, dict[str, Any]] = Field(
         VARIANT_ENTRIES,
-        description="A choice for each stage, or {choice: CHOICE, PARAMETER: VALUE} with what it overrides; with base, "
-        "only what differs from that variant. 'paper' is the method; 'paper' to 'no_occlusion_no_textureless' are the "
-        "columns of its table 4, 'no_noise_correction' is for noisy light fields. 'best' is the most accurate variant, "
-        "'best_...' are the same with one part switched off; 'oavc' to 'occ' are the compared methods, 'onnx' is a "
-        "network of yours (docs/reproduce/compared.md). These have fixed meanings; add variants of your own beside "
-        "them.",
+        description="Each variant has a choice per stage, or {choice: CHOICE, PARAMETER: VALUE} to set parameters; "
+        "with base, only its differences from that variant. 'paper' is the published method; 'paper' to "
+        "'no_occlusion_no_textureless' are the columns of its table 4, 'no_noise_correction' is for noisy light "
+        "fields. 'best' is the most accurate variant, 'best_...' are 'best' with one part switched off; 'oavc' to "
+        "'occ' are the compared methods, 'onnx' is your own network (docs/reproduce/compared.md). Built-in variants "
+        "cannot be changed; add your own after them.",
     )
     stages: dict[str, dict[str, dict[str, Any] | None] | None] = Field(
-        {}, description="Parameters of each stage, by choice. What several choices have is explained at the first."
+        {}, description="Parameters of each stage, by choice. Those of several choices are explained at the first."
     )
 
 
@@ -155,14 +155,14 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
     Raises
     ------
     SepiError
-        One line that names the first key, scene, variant, stage or choice that is wrong, and what would be right.
+        At the first wrong key, scene, variant, stage or choice; the one-line message names it and what is expected.
     """
     try:
-        # a key with nothing below it is left out
+        # a key without a value counts as absent
         given = {key: value for key, value in _with_paths(values).items() if value is not None}
         spelled = {key: _with_numbers(value) for key, value in given.items()}
     except RecursionError as error:
-        raise SepiError("config: a key holds itself (by & and *), or values lie too deep in each other") from error
+        raise SepiError("config: a key contains itself (through & and *), or values are nested too deeply") from error
     config = validated(Config, spelled, "config")
     scenes, rendered = _scenes(config), config.rendered.found("config.rendered")
     ranges = config.disparity_range
@@ -191,7 +191,7 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
 
 
 def _with_paths(values: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The path alone of a method under ``external``, or of a folder of scenes, as ``{path: ...}``."""
+    """Entries of ``external`` and scene folders given as a bare path become ``{path: ...}``."""
     roots = {key: values[key] for key in ("hci_root", "hci_2013_root") if isinstance(values.get(key), str)}
     values = {**values, **{key: {"path": root} if root else None for key, root in roots.items()}}
     external = values.get("external")
@@ -204,9 +204,9 @@ def _with_paths(values: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _with_numbers(value: Any, top: bool = True) -> Any:
-    """Numbers, true, false and null that were left as text below a key.
+    """Convert text below a key to the number, true, false or null that it spells.
 
-    Snakemake reads ``--config 'builtin={size: 96}'`` with text for every value, and YAML takes 1e-4 for text.
+    Snakemake reads every value of ``--config 'builtin={size: 96}'`` as text, and YAML reads 1e-4 as text.
     """
     if isinstance(value, Mapping):
         return {key: inner if key in _TEXTS else _with_numbers(inner, False) for key, inner in value.items()}
@@ -238,10 +238,10 @@ def _scenes(config: Config) -> dict[str, Scene]:
         require_known(f"{where}.order", [values.get("order", AS_GIVEN)], ORDERS)
         require_known(f"{where}.format", filter(None, [own.format]), FORMATS)
         if own.truth is None and own.truth_scale is not None:
-            raise SepiError(f"{where}.truth_scale: says what the numbers of a file mean; name it as truth")
+            raise SepiError(f"{where}.truth_scale: needs a ground truth file; give truth as well")
         scenes.append(own_scene(name, Path(own.path).expanduser(), own.flags, where, own.own_truth))
     if not scenes:
-        raise SepiError("config: no scene to run on; name some in builtin.scenes or light_fields, or set hci_root")
+        raise SepiError("config: no scenes; list some in builtin.scenes or light_fields, or set hci_root")
     for scene in scenes:
         for file in (*scene.files, *scene.truth):
             require_plain_path(str(file), f"config: scene {scene.dataset}/{scene.name}")
@@ -253,8 +253,8 @@ def _variant(name: str, entries: Mapping[str, Any]) -> Variant:
     where = f"config.variants.{name}"
     if name in VARIANTS and variant != VARIANTS[name]:
         raise SepiError(
-            f"{where}: a built-in variant has a fixed meaning, of which a configuration of another version may say "
-            f"otherwise; leave the entry out, or give yours another name"
+            f"{where}: a built-in variant cannot be redefined; the entry may come from the configuration of another "
+            f"version: remove it, or rename your variant"
         )
     if not name.isidentifier() or name in _RESERVED or len(name.encode()) > LONGEST_NAME:
         raise SepiError(
@@ -268,7 +268,7 @@ def _external(name: str, entry: Mapping[str, Any], variants: Collection[str]) ->
     where = f"config.external.{name}"
     source = validated(ExternalSource, entry, where)
     if name in variants:
-        raise SepiError(f"{where}: a variant has this name; give the method another")
+        raise SepiError(f"{where}: a variant already has this name; rename the method")
     plain = name.strip() == name != "" and "/" not in name and not name.startswith(".") and name.isprintable()
     if not plain or len(name.encode()) > LONGEST_NAME:
         raise SepiError(
@@ -281,12 +281,10 @@ def _external(name: str, entry: Mapping[str, Any], variants: Collection[str]) ->
     if "{scene}" not in source.path and (
         os.path.isfile(path) or (path.suffix.lower() in SUFFIXES and not os.path.isdir(path))
     ):
-        # one file would be taken for the map of every scene
-        raise SepiError(
-            f"{where}.path: '{source.path}' is one file; write {{scene}} for the scene's name, or give the folder"
-        )
+        # a single file would be used as the map of every scene
+        raise SepiError(f"{where}.path: '{source.path}' is a single file; give a folder, or a pattern with {{scene}}")
     if source.scale == 0:
-        raise SepiError(f"{where}.scale: must not be 0, or every disparity would be the offset")
+        raise SepiError(f"{where}.scale: must not be 0")
     return source
 
 

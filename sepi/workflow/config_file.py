@@ -1,6 +1,6 @@
-"""The commented file ``config.yaml``, made from the models: every key with its default, unit and meaning.
+"""Generates the commented ``config.yaml`` from the models: every key with its default, unit and meaning.
 
-What lies below a key is commented out: a copy of the file that is kept follows the defaults of later versions.
+Lines below a key are commented out, so that a kept copy of the file follows the defaults of later versions.
 
 ``python -m sepi.workflow.config_file`` prints it.
 """
@@ -25,13 +25,13 @@ from sepi.workflow.config import Config
 def default_yaml() -> str:
     """The text of ``config.yaml``: every key with its default, and a comment with its meaning, unit and bounds.
 
-    A line ``#NAME: VALUE`` is what holds without it; prose has a space after the ``#``.
+    A line ``#NAME: VALUE`` shows a default; prose has a space after the ``#``.
     """
     lines = [
         "# Configuration of the workflow (docs/reproduce/configure.md). Every key may be left out; these are defaults.",
-        "# To change a value, here or in your own file (--configfile FILE): take the # from its line and from those",
-        "# that it lies below. Or give --config KEY=VALUE.",
-        "# This file is made from the code: python -m sepi.workflow.config_file > config.yaml",
+        "# To change a value, here or in your own file (--configfile FILE), remove the # from its line and from its",
+        "# parents' lines. Or give --config KEY=VALUE.",
+        "# This file is generated: python -m sepi.workflow.config_file > config.yaml",
         "",
     ]
     for key, field in Config.model_fields.items():
@@ -62,7 +62,7 @@ def _stage_lines() -> list[str]:
             lines.append(f"    {name}:" if values else f"    {name}: {{}}")
             for field, value in values.items():
                 comment = _comment(choice.parameters.model_fields[field], "      ")
-                # what several choices have is explained at the first
+                # parameters of several choices are explained at the first
                 lines += [*(comment if comment[0] not in lines else []), f"      {field}: {_flow(value)}"]
     return lines
 
@@ -95,7 +95,7 @@ def _flow(value: Any) -> str:
     """A value as YAML on one line."""
     plain = json.loads(json.dumps(value))
     text = yaml.safe_dump(plain, default_flow_style=True, width=10**6, sort_keys=False)
-    # a bare scalar is followed by a line that ends the document
+    # after a bare scalar, PyYAML writes a line "..."
     return text.split("\n")[0]
 
 

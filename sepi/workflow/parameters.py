@@ -1,4 +1,4 @@
-"""The parameters of the stages in the configuration: a value stands at ``STAGE.CHOICE.NAME`` below ``stages``."""
+"""The stages' parameters in the configuration: ``STAGE.CHOICE.NAME`` below ``stages``."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ Values = Mapping[str, Mapping[str, Mapping[str, Any] | None] | None]
 
 
 def stage_settings(values: Values, variants: Mapping[str, Variant]) -> dict[str, dict[str, Parameters]]:
-    """Stage to label to what the stage is run with: for every choice, and for every choice that a variant overrides.
+    """Stage to label to parameters, for every choice and for every choice with a variant's overrides.
 
     Parameters
     ----------
     values : mapping
-        What the configuration has below ``stages``.
+        The configuration's ``stages``.
     variants : mapping of str to Variant
         By name.
 
     Raises
     ------
     SepiError
-        One line that names the first stage, choice, field or value that is wrong.
+        At the first wrong stage, choice, field or value; the one-line message names it.
     """
     where = "config.stages"
     require_known(where, values, STAGES)

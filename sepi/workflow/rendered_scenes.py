@@ -1,4 +1,4 @@
-"""Names of rendered scenes in the workflow: scene of :mod:`sepi.rendered`, level of noise, and seed of the noise."""
+"""Names of rendered scenes in the workflow: scene of :mod:`sepi.rendered`, noise level and noise seed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from sepi.rendered.catalogue import NOISE_LEVELS, WITHOUT_NOISE, exposed_name
 
 DATASET = "rendered"
-"""The dataset of rendered scenes, and their report."""
+"""Name of the dataset of rendered scenes and of its report."""
 
 
 class RenderedScene(NamedTuple):
@@ -21,7 +21,7 @@ class RenderedScene(NamedTuple):
     noise : str
         One of :data:`sepi.rendered.NOISE_LEVELS`.
     seed : int
-        Of the noise, from 1.
+        Seed of the noise, from 1.
     """
 
     world: str
@@ -30,12 +30,12 @@ class RenderedScene(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """The scene's name."""
         return exposed_name(*self)
 
 
 def rendered_scene(name: str) -> RenderedScene:
-    """What a name says."""
+    """Parse a scene's name."""
     levels = "|".join(level for level in NOISE_LEVELS if level != WITHOUT_NOISE)
     found = re.fullmatch(rf"(.+?)(?:_({levels})(?:_(\d+))?)?", name)
     assert found is not None

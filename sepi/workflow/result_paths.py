@@ -1,6 +1,6 @@
-"""Where every file of the results lies: the patterns of the rules and the files of the report are made here alone.
+"""Paths of all result files; the rules' patterns and the report's files are defined only here.
 
-A path with wildcards in place of names, ``scene_files("{dataset}", "{scene}")``, is the pattern of a rule.
+With wildcards instead of names, as in ``scene_files("{dataset}", "{scene}")``, a path is a rule's pattern.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from pathlib import Path
 from sepi.variants import HANDED_ON, STAGES
 
 RESULTS = Path("results")
-"""Folder of the results, in the folder that the workflow runs in."""
+"""Folder of the results, relative to the workflow's working directory."""
 
 PARTS_ENDING = "_parts"
-"""Ending of the files that belong to the ablation of the best variant alone."""
+"""Ending of the files that only the ablation of the best variant has."""
 
 
 def render_file(world: str) -> Path:
-    """What the renderer makes of a rendered scene: views without noise and ground truth, for all levels of noise."""
+    """The renderer's output for a scene: noise-free views and ground truth, shared by all noise levels."""
     return RESULTS / "renders" / f"{world}.h5"
 
 
@@ -30,7 +30,7 @@ class SceneFiles:
     Attributes
     ----------
     folder : Path
-        That holds them: ``results/DATASET/SCENE``.
+        ``results/DATASET/SCENE``.
     """
 
     folder: Path
@@ -42,7 +42,7 @@ class SceneFiles:
 
     @property
     def truth(self) -> Path:
-        """Ground truth and masks, if there are any."""
+        """Ground truth and masks, if available."""
         return self.folder / "truth.h5"
 
     @property
@@ -56,9 +56,9 @@ class SceneFiles:
         return self.folder / "stages"
 
     def stage(self, labels: Mapping[str, str], stage: str, ending: str = "h5") -> Path:
-        """The file with the maps after a stage, or one beside it: ``ending`` is ``"time.json"``.
+        """The file with the maps after a stage, or with another ``ending`` its companion, such as ``"time.json"``.
 
-        It is that of an earlier stage where this one hands its maps on.
+        If the stage passes its maps on unchanged, it is the file of the earlier stage.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class SceneFiles:
         return self.stages / key / f"{stage_of(key)}.{ending}"
 
     def scores(self, which: str = "") -> Path:
-        """The scores of the maps; ``which`` is :data:`PARTS_ENDING` or ``_REPORT`` for those of these alone."""
+        """The scores of the maps; with ``which``, only those of the ablation (:data:`PARTS_ENDING`) or ``_REPORT``."""
         return self.folder / f"scores{which}.h5"
 
     def variant(self, name: str) -> Path:
@@ -85,10 +85,10 @@ def scene_files(dataset: str, scene: str, results: Path = RESULTS) -> SceneFiles
 
 
 def key_of(labels: Mapping[str, str], stage: str) -> str:
-    """What names the maps after a stage: the labels up to the stage that made them, ``"sepi/half_sepi/lti"``.
+    """Key of the maps after a stage: the labels up to the stage that made them, such as ``"sepi/half_sepi/lti"``.
 
-    Variants that begin alike share it, and a stage that hands maps on has that of the stage before. It is the folder of
-    the stage file.
+    Variants with the same first stages share it; a stage that passes its maps on has the previous stage's key. It is
+    the folder of the stage file.
 
     Parameters
     ----------
@@ -103,5 +103,5 @@ def key_of(labels: Mapping[str, str], stage: str) -> str:
 
 
 def stage_of(key: str) -> str:
-    """The stage that made the maps which :func:`key_of` names."""
+    """The stage that made the maps of a key of :func:`key_of`."""
     return list(STAGES)[key.count("/")]

@@ -1,4 +1,4 @@
-"""A checked configuration: what the rules are told of it."""
+"""A checked configuration, as the rules use it."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from sepi.workflow.datasets import Scene
 from sepi.workflow.rendered_dataset import Rendered
 from sepi.workflow.result_paths import RESULTS
 
-# what is drawn of a scene
+# image files and page data of a scene
 _PICTURES = re.compile(r"reports/(?:comparison/|rendered/)?(?:maps/([^/]+)/([^/]+)|page/([^/]+)/([^/]+)\.json)")
 
 
 PAGES = tuple(f"reports/{report}index.html" for report in ("", "comparison/", "rendered/"))
 
 MOST_ON_PAGE = 50
-"""Scenes that a page has unless it is asked for: 100 MB, which a browser still opens."""
+"""Most scenes for which the page is made by default: 100 MB, which a browser still opens."""
 
 
 class Report(CheckedModel):
@@ -37,21 +37,21 @@ class Report(CheckedModel):
 
     pixels: dict[str, list[tuple[Index, Index]]] = Field(
         {},
-        description="pixels to look into beside those chosen automatically, such as {hci/cotton: [[200, 310]]}: row "
-        "and column",
+        description="pixels (row, column) to examine in addition to those chosen automatically, such as "
+        "{hci/cotton: [[200, 310]]}",
     )
     page: bool | None = Field(
         None,
-        description=f"whether there is a page; null: for up to {MOST_ON_PAGE} scenes, each of which adds up to 2 MB",
+        description=f"whether to make the page; null: only for up to {MOST_ON_PAGE} scenes, each of which adds up to 2 MB",
     )
     partial: bool = Field(
         False,
-        description="whether the tables are of the scenes alone that are computed, and name the others: after a run in "
-        "which some failed",
+        description="whether the tables contain only computed scenes and list the others; use it after a run with "
+        "failures",
     )
     parts_of_best: bool = Field(
         False,
-        description="whether the page also shows the ablation of 'best'; its variants are then run by 'all', too",
+        description="whether the page also shows the ablation of 'best'; 'all' then runs its variants too",
     )
 
 
@@ -64,19 +64,19 @@ class Settings:
     scenes : mapping of (dataset, scene) to Scene
         Every scene of ``all``, ``ablation`` and ``comparison``, in the tables' order.
     rendered_scenes : mapping of (dataset, scene) to Scene
-        Those of ``rendered``.
+        Scenes of ``rendered``.
     variants : mapping of str to Variant
         The built-in variants, then the user's own.
     parameters : mapping of stage to label to Parameters
-        What each stage runs with, by choice and what is overridden of it.
+        Parameters of each stage; the label names the choice and its overridden parameters.
     external : mapping of str to ExternalSource
-        External methods, and where their maps are.
+        External methods and the paths of their maps.
     report : Report
-        What the report's page shows beside the rest.
+        Settings of the report.
     rendered : Rendered
-        How scenes are rendered.
+        Settings of the rendered scenes.
     bad_thresholds : tuple of float
-        Errors to score beside the usual ones.
+        Additional error thresholds.
     """
 
     scenes: Mapping[tuple[str, str], Scene]
@@ -90,12 +90,12 @@ class Settings:
 
     @property
     def datasets(self) -> list[str]:
-        """Names of the datasets that have scenes, but for the rendered ones."""
+        """Names of the datasets that have scenes, except ``rendered``."""
         return list(dict.fromkeys(dataset for dataset, _ in self.scenes))
 
     @property
     def rendered_variants(self) -> list[str] | None:
-        """The variants that the user chose for the rendered scenes, if any."""
+        """The variants chosen for the rendered scenes; None if not configured."""
         if self.rendered.variants == "all":
             return [name for name in VARIANTS if name not in LEARNED]
         return self.rendered.variants
@@ -115,9 +115,9 @@ class Settings:
         Raises
         ------
         SepiError
-            If there is none; the message suggests the nearest.
+            If it does not exist; the message suggests the nearest name.
         """
-        # thousands of jobs ask: all names are gone through only where one is wrong
+        # called by thousands of jobs: names are listed only on an error
         for known in (self.scenes, self.rendered_scenes):
             if (dataset, name) in known:
                 return known[dataset, name]
@@ -126,12 +126,12 @@ class Settings:
         raise AssertionError(f"{dataset}/{name} is among the known ones")
 
     def require_target(self, path: str) -> None:
-        """Check the names in a file that a user asks for, if it lies among the results or is of a scene's pictures.
+        """Check the names in a requested path, if it is a file of the results or an image of a scene.
 
         Raises
         ------
         SepiError
-            If there is no such dataset, scene or variant; the message suggests the nearest.
+            If there is no such dataset, scene or variant; the message suggests the nearest name.
         """
         if path in PAGES and not self.has_page:
             why = "is false" if self.report.page is False else f"is null, and there are over {MOST_ON_PAGE} scenes"
@@ -147,7 +147,7 @@ class Settings:
 
     @property
     def has_page(self) -> bool:
-        """Whether the report has a page."""
+        """Whether the report's page is made."""
         return len(self.scenes) <= MOST_ON_PAGE if self.report.page is None else self.report.page
 
     def parameters_json(self, stage: str, label: str) -> str:
@@ -155,7 +155,7 @@ class Settings:
         return json.dumps(self.parameters[stage][label].model_dump(mode="json"), sort_keys=True)
 
     def external_files(self, dataset: str, name: str) -> dict[str, Path]:
-        """Method to the file of its map of a scene, whether or not it is there.
+        """Method to the path of its map of a scene, which need not exist.
 
         Raises
         ------
@@ -166,7 +166,7 @@ class Settings:
         return {method: source.file(scene.dataset, scene.name) for method, source in self.external.items()}
 
     def external_json(self, dataset: str, name: str) -> str:
-        """What ``python -m sepi.external`` is to read for a scene, in the order of the configuration."""
+        """Input of ``python -m sepi.external`` for a scene, in the order of the configuration."""
         files = self.external_files(dataset, name)
         return json.dumps(
             {method: source.model_dump() | {"path": str(files[method])} for method, source in self.external.items()}

@@ -83,7 +83,10 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
         ({"builtin": {"size": "big"}}, "config.builtin.size: input should be a valid integer, got 'big'"),
         ({"builtin": {"size": 3}}, "config.builtin.size: input should be greater than or equal to 64, got 3"),
         ({"builtin": {"scenes": ["dotz"]}}, "config.builtin.scenes: unknown 'dotz'; did you mean 'dots'?"),
-        ({"builtin": {"scenes": []}}, "config: no scene to run on; name some in builtin.scenes or light_fields"),
+        (
+            {"builtin": {"scenes": []}},
+            "config: no scenes; list some in builtin.scenes or light_fields",
+        ),
         ({"bad_thresholds": [0]}, "config.bad_thresholds.0: input should be greater than 0, got 0"),
         ({"builtin": 3}, "config.builtin: input should be an object, got 3"),
         ({"hci_root": "/nowhere"}, "config.hci_root: no folder '/nowhere'"),
@@ -128,7 +131,7 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
             {"variants": {"mine": {"base": "other"}, "other": {"base": "mine"}}},
             "config.variants.other.base: ",
         ),
-        ({"variants": {"paper": {"base": "best"}}}, "config.variants.paper: a built-in variant has a fixed meaning"),
+        ({"variants": {"paper": {"base": "best"}}}, "config.variants.paper: a built-in variant cannot be redefined"),
         ({"variants": {"region": {"base": "wang"}}}, "config.variants.region: a variant's name must be letters"),
         # its folder would lie where the file does that says that the scene is complete
         ({"variants": {"complete": {"base": "wang"}}}, "config.variants.complete: a variant's name must be letters"),
@@ -157,7 +160,7 @@ def test_a_wrong_key_or_value_is_named(values: dict[str, Any], expected: str) ->
 @pytest.mark.parametrize("key", ["light_fields", "variants", "stages", "report"])
 def test_a_key_that_holds_itself_is_told(key: str) -> None:
     """A slip with YAML's & and * used to be a traceback of a thousand lines."""
-    assert "config: a key holds itself" in message_of(yaml.safe_load(f"{key}: &a {{x: *a}}"))
+    assert "config: a key contains itself" in message_of(yaml.safe_load(f"{key}: &a {{x: *a}}"))
 
 
 @pytest.mark.parametrize("key", ["hci_root", "hci_2013_root", "light_fields", "external"])
@@ -338,7 +341,7 @@ class TestOwnLightFields:
             ({"path": "/", "central": 0}, "config.light_fields.a.central: input should be greater than or equal to 1"),
             ({"path": "/", "view": [-1, 2]}, "light_fields.a.view.0: input should be greater than or equal to 0"),
             ({"path": "/", "truth": "/nowhere.pfm"}, "config.light_fields.a.truth: no file '/nowhere.pfm'"),
-            ({"path": "/", "truth_scale": 2.0}, "config.light_fields.a.truth_scale: says what the numbers of a file"),
+            ({"path": "/", "truth_scale": 2.0}, "config.light_fields.a.truth_scale: needs a ground truth file"),
             (
                 {"path": "/", "truth": "/", "truth_scale": 0.0},
                 "config.light_fields.a.truth_scale: input should be greater than 0",
@@ -469,7 +472,7 @@ class TestExternal:
             ({"path": "/", "scale": 0}, "config.external.SPO.scale: must not be 0"),
             ({"path": "/", "offset": None}, "config.external.SPO.offset: input should be a valid number, got None"),
             ("/maps/{scen}", "config.external.SPO.path: unknown '{scen}'; did you mean '{scene}'?"),
-            ("/maps/cotton.pfm", "config.external.SPO.path: '/maps/cotton.pfm' is one file; write {scene}"),
+            ("/maps/cotton.pfm", "config.external.SPO.path: '/maps/cotton.pfm' is a single file; give a folder"),
         ],
     )
     def test_a_wrong_entry_is_named(self, entry: Any, expected: str) -> None:
@@ -478,7 +481,7 @@ class TestExternal:
     def test_one_file_for_all_scenes_is_refused(self, tmp_path: Path) -> None:
         """It would be scored against every other scene's ground truth."""
         (tmp_path / "spo").touch()
-        assert "is one file; write {scene}" in message_of({"external": {"SPO": str(tmp_path / "spo")}})
+        assert "is a single file; give a folder" in message_of({"external": {"SPO": str(tmp_path / "spo")}})
         (tmp_path / "maps.pfm").mkdir()
         assert self.file(str(tmp_path / "maps.pfm")) == tmp_path / "maps.pfm/cotton.pfm"
 
@@ -495,4 +498,4 @@ class TestExternal:
     def test_a_variants_name_is_refused(self, name: str) -> None:
         """Two columns of one name could not be told apart."""
         values = {"variants": {"mine": {"base": "wang"}}, "external": {name: "/maps"}}
-        assert message_of(values) == f"config.external.{name}: a variant has this name; give the method another"
+        assert message_of(values) == f"config.external.{name}: a variant already has this name; rename the method"
