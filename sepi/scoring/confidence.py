@@ -1,4 +1,4 @@
-"""Sparsification curves [1]_: how well confidence ranks the pixels by error.
+"""Sparsification curves [1]_: how well confidence ranks pixels by error.
 
 References
 ----------
@@ -15,13 +15,13 @@ from sepi.lightfield import FloatMap
 from sepi.validation import require_type
 
 STEPS = 100
-"""Points of a sparsification curve."""
+"""Number of points of a sparsification curve."""
 
 FloatArray = npt.NDArray[np.float64]
 
 
 def sparsification(confidence: FloatMap, error: FloatMap) -> FloatArray:
-    """Mean absolute error of the pixels that stay when the least confident are taken away [1]_.
+    """Mean absolute error of the pixels that remain after the least confident ones are removed [1]_.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def sparsification(confidence: FloatMap, error: FloatMap) -> FloatArray:
 
     Examples
     --------
-    A confidence is worth something if the curve falls:
+    The curve of a useful confidence falls:
 
     >>> import sepi
     >>> from sepi.evaluate import evaluation_of
@@ -63,7 +63,7 @@ def sparsification(confidence: FloatMap, error: FloatMap) -> FloatArray:
 
 
 def oracle(error: FloatMap) -> FloatArray:
-    """The curve of :func:`sparsification` for a confidence that knows the errors: none can lie lower.
+    """The lowest possible curve of :func:`sparsification`: pixels are removed in order of their error.
 
     Parameters
     ----------

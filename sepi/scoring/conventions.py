@@ -1,4 +1,4 @@
-"""Detects ground truth in another convention than a map: upside down, other sign or scale, or depth."""
+"""Detects ground truth in a different convention from a map's: upside down, other sign or scale, or depth."""
 
 from __future__ import annotations
 
@@ -7,30 +7,30 @@ import numpy as np
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.rig import Floats
 
-# errors are close up to this part of the range that nearly all of a map lies within, or so many pixels per view step
+# largest error that is close: fraction of the map's range (2nd to 98th percentile), and minimum in pixels per view step
 _PART, _LEAST = 0.1, 0.07
-# share of pixels with a larger error from which the fit is doubted, and how much better another must be
+# share of larger errors from which the fit is doubted, and the factor by which another fit must reduce it
 _POOR, _BETTER = 0.2, 0.25
-# what a factor may be from the one that it is taken for
+# tolerance for recognising a factor
 _EQUAL = 0.05
-# errors that a fitted line should not exceed, pixels per view step; pixels that it is fitted to
+# soft error limit of the line fit in pixels per view step, and the number of pixels that it uses
 _CLOSE, _PIXELS = 0.003, 20000
 
 
 def misfit(estimate: FloatMap, truth: FloatMap, grid: tuple[int, int] | None = None) -> str | None:
-    """How ground truth would fit a map far better than as it is.
+    """Conversion with which ground truth would fit a map far better.
 
     Parameters
     ----------
     estimate, truth : ndarray, shape (H, W), float32
-        Pixels per view step; what is not finite is unknown.
+        Pixels per view step; non-finite values are unknown.
     grid : (int, int), optional
         Rows and columns of views.
 
     Returns
     -------
     str or None
-        None where it fits, or nothing tried fits far better.
+        None if the ground truth fits, or no conversion fits far better.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def misfit(estimate: FloatMap, truth: FloatMap, grid: tuple[int, int] | None = N
 
 
 def _line(values: FloatMap, wanted: FloatMap) -> tuple[float, float]:
-    """Robust linear fit: factor and summand that bring most values closest to the wanted ones."""
+    """Robust linear fit: factor and offset that bring most values close to the wanted ones."""
     from scipy.optimize import least_squares
 
     every = max(1, len(values) // _PIXELS)

@@ -1,4 +1,4 @@
-"""Maps of a part of the picture, brought into the frame of the whole picture's ground truth."""
+"""Places maps of a crop in the frame of the whole image's ground truth."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from sepi.lightfield import BoolMap, FloatMap
 
 
 def in_frame(crop: FloatMap, offset: tuple[int, int], shape: tuple[int, int]) -> tuple[FloatMap, BoolMap]:
-    """A crop's map in the frame of the whole picture.
+    """A crop's map in the frame of the whole image.
 
     Parameters
     ----------
     crop : ndarray, shape (h, w), float32
-        Disparity of a part of the picture, pixels per view step.
+        Disparity of the crop, pixels per view step.
     offset : (int, int)
-        Row and column in the whole picture of the crop's top left pixel, from 0.
+        Row and column of the crop's top left pixel in the whole image, from 0.
     shape : (int, int)
-        Height and width (H, W) of the whole picture.
+        Height and width (H, W) of the whole image.
 
     Returns
     -------
@@ -30,7 +30,7 @@ def in_frame(crop: FloatMap, offset: tuple[int, int], shape: tuple[int, int]) ->
     Raises
     ------
     SepiError
-        If the crop does not lie inside the whole picture.
+        If the crop extends beyond the whole image.
     """
     (row, column), (height, width) = offset, crop.shape
     require_part((shape[1], shape[0], column, row), crop.shape)

@@ -1,7 +1,7 @@
-"""Depth discontinuities for evaluation, and the fattening and thinning of surfaces beside them.
+"""Depth discontinuities for evaluation, and the fattening and thinning of surfaces next to them.
 
-The region, and fattening and thinning, follow the idea of the measures of the HCI 4D light field benchmark [1]_ for
-discontinuities and fine structures, with definitions that need nothing but the ground truth. Estimators never see them.
+The region and the two measures follow the idea of the HCI 4D light field benchmark's [1]_ measures for discontinuities
+and fine structures, but are defined from the ground truth alone. Estimators never see them.
 
 References
 ----------
@@ -20,24 +20,24 @@ from sepi.lightfield import BoolMap, FloatMap
 from sepi.validation import require_map
 
 LEAST_DISCONTINUITY = 0.125
-"""Difference of neighbours in pixels per view step; with 9 x 9 views, half a pixel in the farthest ones."""
+"""Minimum difference of neighbours in pixels per view step; half a pixel in the outermost of 9 x 9 views."""
 
 REACH = 2
-"""Pixels to each side of a depth discontinuity that belong to it."""
+"""Width in pixels of the region on each side of a depth discontinuity."""
 
 
 @dataclass(frozen=True)
 class Edges:
-    """Ground truth of the pixels beside depth discontinuities.
+    """Ground truth of the pixels near depth discontinuities.
 
     Attributes
     ----------
     region : ndarray, shape (H, W), bool
-        Pixels up to ``REACH`` beside a depth discontinuity.
+        Pixels within ``REACH`` of a depth discontinuity.
     middle : ndarray, shape (H, W), float32
-        There, the disparity half way between the nearest and the most distant surface within ``REACH``.
+        In the region, the disparity half way between the nearest and the most distant surface within ``REACH``.
     foreground : ndarray, shape (H, W), bool
-        Pixels of the region that are nearer than that; those with ground truth that are not are background.
+        Pixels of the region that are nearer than ``middle``; its other pixels with ground truth are background.
 
     Examples
     --------
@@ -59,7 +59,7 @@ def edges_of(ground_truth: FloatMap) -> Edges:
     Parameters
     ----------
     ground_truth : ndarray, shape (H, W), float32
-        Disparity in pixels per view step. A pixel that is not finite has no discontinuity beside it, and is in none.
+        Disparity in pixels per view step. Non-finite pixels neither form discontinuities nor belong to the region.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def edges_of(ground_truth: FloatMap) -> Edges:
     >>> edges.middle[0, 2:6].tolist()
     [0.5, 0.5, 0.5, 0.5]
     """
-    # slow to import, and not needed for the tables
+    # slow to import, and tables do not need it
     require_map("ground truth", ground_truth)
     from scipy import ndimage
 
@@ -99,27 +99,27 @@ def edges_of(ground_truth: FloatMap) -> Edges:
 
 
 def fattening_and_thinning(estimate: FloatMap, edges: Edges, chosen: BoolMap) -> tuple[float, float]:
-    """How often an estimate takes one side of a depth discontinuity for the other.
+    """How often an estimate is on the wrong side of a depth discontinuity.
 
     Parameters
     ----------
     estimate : ndarray, shape (H, W), float32
-        Disparity in pixels per view step; NaN is on no side.
+        Disparity in pixels per view step; NaN counts for neither side.
     edges : Edges
-        Those of the ground truth.
+        Depth discontinuities of the ground truth.
     chosen : ndarray, shape (H, W), bool
-        The pixels that are looked at.
+        Pixels to score.
 
     Returns
     -------
     fattening : float
-        Percentage of the background's pixels whose estimate is nearer than the middle; NaN where there is none.
+        Percentage of background pixels whose estimate is nearer than the middle; NaN without background.
     thinning : float
-        Percentage of the foreground's pixels whose estimate is not as near; NaN where there is none.
+        Percentage of foreground pixels whose estimate is more distant than it; NaN without foreground.
 
     Examples
     --------
-    An estimate whose edge lies a pixel too far out: half of the background beside it is fattened.
+    The estimated edge is one pixel too far out: half of the background in the region is fattened.
 
     >>> import numpy as np
     >>> from sepi.scoring.edges import edges_of, fattening_and_thinning

@@ -1,6 +1,6 @@
-"""Scores of error bars: coverage and width of the intervals, and whether doubt lies where errors are.
+"""Scores of error bars: coverage and width of the intervals, and how well uncertainty ranks the errors.
 
-An interval that always holds the truth may be as wide as the range: coverage says nothing without the width beside it.
+Coverage must be read together with the width: an interval as wide as the disparity range always contains the truth.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ ERROR_BAR_SCORES: dict[str, str] = {
     "ause_confidence": "AUSE, confidence",
     "gap": "confidence's gap %",
 }
-"""Score of error bars to its name in tables; maps without them have none of these."""
+"""Score of error bars to its name in tables; only for maps with error bars."""
 
 BINS = 10
-"""Parts of 0..1 that the said probabilities are sorted into."""
+"""Number of equal bins of the stated probability, 0..1."""
 
 ENOUGH = 0.01
-"""Least share of the pixels that a bin must hold for its gap to count."""
+"""Minimum share of the pixels in a bin for its gap to count."""
 
 FloatArray = npt.NDArray[np.float64]
 
 
 class Reliability(NamedTuple):
-    """How often errors are small where a confidence says how often they are; arrays (10,), by said probability.
+    """Observed against stated probability of small errors; arrays (10,), one entry per bin of the confidence.
 
     Attributes
     ----------
     pixels : ndarray
-        How many have such a confidence.
+        Number of pixels in the bin.
     said : ndarray
         Their mean confidence; NaN without pixels.
     found : ndarray
-        Share of them whose error is within the bound; NaN without pixels.
+        Share of the pixels whose error is within the bound; NaN without pixels.
     """
 
     pixels: FloatArray
@@ -55,29 +55,28 @@ class Reliability(NamedTuple):
 
     @property
     def enough(self) -> BoolMap:
-        """Which bins (10,) hold enough pixels: what few say is noise."""
+        """Bins (10,) with enough pixels; the others are too noisy."""
         return np.asarray((self.pixels > 0) & (self.pixels >= ENOUGH * self.pixels.sum()))
 
     @property
     def gap(self) -> float:
-        """Largest difference of what was said and found, in percent, over bins that hold enough pixels."""
+        """Largest difference between ``said`` and ``found`` in percent, over bins with enough pixels."""
         gaps = np.abs(self.found - self.said)[self.enough]
         return 100 * float(gaps.max()) if gaps.size else float("nan")
 
 
 @dataclass(frozen=True)
 class ErrorBars:
-    """Error bars of a disparity map, with what their scores need.
+    """Error bars of a disparity map, and the quantities needed to score them.
 
     Attributes
     ----------
     sigma, low, high, confidence : ndarray, shape (H, W), float32
-        As :class:`sepi.StageMaps` has them.
+        Maps as in :class:`sepi.StageMaps`.
     close : float or None
-        Error in pixels per view step that the confidence is about; None where nobody knows how far the views stand
-        apart.
+        Error bound of the confidence in pixels per view step; None if the views' distance is unknown.
     truth_step : float
-        What the ground truth is a multiple of, pixels per view step; 0 unless it is rounded.
+        Rounding step of the ground truth in pixels per view step; 0 if it is not rounded.
     """
 
     sigma: FloatMap
@@ -89,25 +88,25 @@ class ErrorBars:
 
     @classmethod
     def of(cls, maps: StageMaps, reach: float | None = None, truth_step: float = 0.0) -> Self | None:
-        """Those of finished maps, None where they have none; ``reach`` is the light field's."""
+        """Error bars of final maps, or None without any; ``reach`` is the light field's."""
         if maps.sigma is None or maps.low is None or maps.high is None:
             return None
         close = CLOSE * REACH / reach if reach else None
         return cls(maps.sigma, maps.low, maps.high, maps.confidence, close, truth_step)
 
     def in_frame(self, offset: tuple[int, int], shape: tuple[int, int]) -> Self:
-        """Those of a crop in the whole picture, as :func:`sepi.scoring.crops.in_frame` puts its map."""
+        """Error bars of a crop, placed in the whole image as by :func:`sepi.scoring.crops.in_frame`."""
         maps = (self.sigma, self.low, self.high, self.confidence)
         sigma, low, high, confidence = (in_frame(values, offset, shape)[0] for values in maps)
         return replace(self, sigma=sigma, low=low, high=high, confidence=confidence)
 
     def scores(self, estimate: FloatMap, ground_truth: FloatMap, chosen: BoolMap) -> Scores:
-        """Those of :data:`ERROR_BAR_SCORES`, over the chosen pixels (H, W) that have finite ground truth."""
+        """The :data:`ERROR_BAR_SCORES` over the chosen pixels (H, W) with finite ground truth."""
         picked = (values[chosen] for values in (estimate, ground_truth, self.sigma, self.low, self.high))
         disparity, truth, sigma, low, high = picked
         confidence = self.confidence[chosen]
         error = np.abs(disparity.astype(np.float64) - truth)
-        # an interval round nothing is none
+        # without a finite estimate there is no interval
         low = np.where(np.isfinite(disparity), low, np.float32(np.nan))
         widths = high.astype(np.float64) - low
         widths = widths[np.isfinite(widths)]
@@ -122,16 +121,16 @@ class ErrorBars:
 
 
 def coverage(low: FloatMap, high: FloatMap, truth: FloatMap, truth_step: float = 0.0) -> float:
-    """How often an interval holds the truth.
+    """Share of intervals that contain the truth.
 
     Parameters
     ----------
     low, high : ndarray of any shape, float32
-        Bounds, pixels per view step; one that is not finite holds nothing.
+        Bounds, pixels per view step; an interval with a non-finite bound contains nothing.
     truth : ndarray of the same shape, float32
-        Pixels where it is not finite count nowhere.
+        Pixels where it is not finite are left out.
     truth_step : float
-        What the truth is a multiple of: it is held where the interval meets half a step on either side.
+        Rounding step of the truth, which counts as contained if the interval comes within half a step of it.
 
     Returns
     -------
@@ -140,7 +139,7 @@ def coverage(low: FloatMap, high: FloatMap, truth: FloatMap, truth_step: float =
 
     Examples
     --------
-    Two of three, and the third within the truth's own rounding:
+    Two of three intervals contain the truth; the third does within the truth's rounding:
 
     >>> import numpy as np
     >>> from sepi.scoring.error_bars import coverage
@@ -158,14 +157,14 @@ def coverage(low: FloatMap, high: FloatMap, truth: FloatMap, truth_step: float =
 def normal_nll(error: FloatMap, sigma: FloatMap, truth_step: float = 0.0) -> float:
     """Mean negative log likelihood of errors under normal distributions of these standard deviations [1]_.
 
-    It is least, on average, where the standard deviations are the true ones: too small ones cost as too large ones do.
+    Its expectation is minimal for the true standard deviations; smaller and larger ones both increase it.
 
     Parameters
     ----------
     error, sigma : ndarray of the same shape
-        Pixels per view step. Where one is not finite, the pixel is left out.
+        Pixels per view step. Pixels where either is not finite are left out.
     truth_step : float
-        What the truth is a multiple of: the density is then its mean over half a step on either side.
+        Rounding step of the truth; the density is averaged over half a step on either side.
 
     Returns
     -------
@@ -188,7 +187,7 @@ def normal_nll(error: FloatMap, sigma: FloatMap, truth_step: float = 0.0) -> flo
     known = np.isfinite(error) & np.isfinite(sigma)
     if not known.any():
         return float("nan")
-    # a sigma of 0 is no distribution; its error costs what the smallest number's does
+    # a sigma of 0 has no density: use the smallest positive number
     spread = np.maximum(sigma[known].astype(np.float64), np.finfo(np.float32).tiny)
     distance = np.abs(error[known].astype(np.float64))
     if truth_step == 0:
@@ -196,28 +195,28 @@ def normal_nll(error: FloatMap, sigma: FloatMap, truth_step: float = 0.0) -> flo
     # slow to import
     from scipy.special import log_ndtr
 
-    # both ends of the step as upper tails, whose logarithms do not underflow
+    # both ends of the step as upper tails, so that their logarithms do not underflow
     near, far = (log_ndtr(-(distance + side * truth_step / 2) / spread) for side in (-1, 1))
     share = near + np.log(-np.expm1(np.minimum(far - near, -np.finfo(np.float64).tiny)))
     return float(np.mean(np.log(truth_step) - share))
 
 
 def ause(doubt: FloatMap, error: FloatMap) -> float:
-    """Area under the sparsification error curve [1]_: how far doubt is from the order of the errors.
+    """Area under the sparsification error curve [1]_: how far the ranking by uncertainty is from that by error.
 
-    Pixels are taken away from the most doubtful on, and, beside that, from the largest error on. The curve is the
-    difference of the mean absolute errors of those that stay, divided by that of all pixels.
+    Pixels are removed once in order of decreasing uncertainty and once in order of decreasing error. The curve is the
+    difference of the mean absolute errors of the remaining pixels, divided by that of all pixels.
 
     Parameters
     ----------
     doubt, error : ndarray of the same shape
-        The larger the more doubtful, such as a standard deviation, or ``1 - confidence``; estimate minus ground truth.
-        Pixels whose error is not finite are left out.
+        Uncertainty, such as a standard deviation or ``1 - confidence``; estimate minus ground truth. Pixels whose error
+        is not finite are left out.
 
     Returns
     -------
     float
-        Mean over the shares 0, 1, ... 99 % taken away: 0 for the order of the errors; NaN without pixels.
+        Mean over 0, 1, ... 99 % of pixels removed: 0 if both rankings agree; NaN without pixels.
 
     References
     ----------
@@ -232,7 +231,7 @@ def ause(doubt: FloatMap, error: FloatMap) -> float:
     >>> ause(np.abs(error), error), round(ause(np.ones_like(error), error), 1)
     (0.0, 0.6)
     """
-    # doubt that is no number is the greatest
+    # NaN counts as the largest uncertainty
     curve = sparsification(-np.nan_to_num(doubt, nan=np.inf, posinf=np.inf, neginf=-np.inf), error)
     if curve[0] == 0:
         return 0.0
@@ -247,14 +246,14 @@ def reliability(confidence: FloatMap, error: FloatMap, close: float) -> Reliabil
     confidence : ndarray
         Probability of an absolute error of at most ``close``, 0..1.
     error : ndarray of the same shape
-        Estimate minus ground truth; one that is not finite is a large one. Leave out pixels without ground truth.
+        Estimate minus ground truth; non-finite errors count as large. Leave out pixels without ground truth.
     close : float
-        In the error's unit.
+        Error bound, in the unit of ``error``.
 
     Returns
     -------
     Reliability
-        By ten equal parts of 0..1.
+        By ten equal bins of 0..1.
 
     References
     ----------

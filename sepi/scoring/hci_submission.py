@@ -1,8 +1,8 @@
 """A submission to the HCI 4D light field benchmark: a zip archive of disparity maps and run times of its 12 scenes.
 
-The archive's root holds ``disp_maps/SCENE.pfm``, 512 x 512 pixels and one channel, and ``runtimes/SCENE.txt``, the
-seconds as a number. The benchmark's own check looks for the files and the size of the maps; this one also finds what
-passes there and spoils the scores, such as missing values, and what else the archive holds.
+The archive contains ``disp_maps/SCENE.pfm``, 512 x 512 pixels with one channel, and ``runtimes/SCENE.txt``, the seconds
+as a number. The benchmark's own check tests for the files and the size of the maps; this one also finds errors that
+pass there but lower the scores, such as missing values, and files that do not belong to a submission.
 
 References
 ----------
@@ -37,10 +37,10 @@ SCENES = (
     *("boxes", "cotton", "dino", "sideboard"),
     *("bedroom", "bicycle", "herbs", "origami"),
 )
-"""The benchmark's scenes: stratified, training, test."""
+"""The benchmark's scenes: stratified, training and test."""
 
 SHAPE = (512, 512)
-"""Height and width of their views in pixels."""
+"""Height and width of the scenes' views in pixels."""
 
 MAPS, RUNTIMES = "disp_maps", "runtimes"
 
@@ -48,9 +48,9 @@ _NAMES = {part: [f"{part}/{scene}{end}" for scene in SCENES] for part, end in ((
 _EXPECTED = {name for names in _NAMES.values() for name in names}
 
 _PIXELS = f"{SHAPE[1]}x{SHAPE[0]}"
-# room for a header besides the pixels; for a number and white space around it
+# size limits: header of a map; run time with white space
 _MOST_BYTES = {MAPS: 4 * SHAPE[0] * SHAPE[1] + 256, RUNTIMES: 64}
-# about files that do not belong
+# maximum number of lines about unexpected files
 _MOST_LINES = 10
 
 
@@ -77,19 +77,19 @@ class Entry(NamedTuple):
 
 
 def entry_of(folder: Path, runtimes: Mapping[str, float]) -> tuple[str, Entry]:
-    """The scene of a result, and what it adds to a submission.
+    """The scene of a result, and its entry in a submission.
 
     Parameters
     ----------
     folder : Path
         Written by ``sepi depth --timing``: ``disparity.pfm``, ``result.h5`` (which names the scene), ``runtime.txt``.
     runtimes : mapping of str to float
-        Seconds by scene, in place of ``runtime.txt``.
+        Scene to seconds, instead of ``runtime.txt``.
 
     Raises
     ------
     SepiError
-        If it is not such a folder, its scene is none of the benchmark's, or its run time is not known.
+        If it is not such a folder, its scene is not one of the benchmark's, or its run time is unknown.
     """
     if not folder.is_dir():
         raise SepiError(f"{folder}: no such folder; expected one that 'sepi depth --timing' wrote")
@@ -107,21 +107,21 @@ def entry_of(folder: Path, runtimes: Mapping[str, float]) -> tuple[str, Entry]:
 
 
 def write_submission(path: str | Path, entries: Mapping[str, Entry], *, partial: bool = False) -> None:
-    """Write a submission, whole or not at all; equal content gives equal bytes.
+    """Write a submission atomically; equal content gives equal bytes.
 
     Parameters
     ----------
     path : str or Path
         Zip archive to write.
     entries : mapping of str to Entry
-        By scene.
+        Scene to entry.
     partial : bool
-        Take fewer than all scenes.
+        Allow missing scenes.
 
     Raises
     ------
     SepiError
-        If the submission has a problem, as :func:`problems_of` finds it, or cannot be written.
+        If :func:`problems_of` finds a problem, or the archive cannot be written.
 
     Examples
     --------
@@ -144,7 +144,7 @@ def write_submission(path: str | Path, entries: Mapping[str, Entry], *, partial:
     with atomic_path(path) as temporary:
         with zipfile.ZipFile(temporary, "w") as archive:
             for name, content in sorted(files.items()):
-                # neither dates nor compression, which differ from run to run and from library to library
+                # reproducible: no dates, and no compression, whose output depends on the library
                 info = zipfile.ZipInfo(name)
                 info.create_system, info.external_attr = 3, (stat.S_IFREG | 0o644) << 16
                 archive.writestr(info, content)
@@ -155,28 +155,28 @@ def write_submission(path: str | Path, entries: Mapping[str, Entry], *, partial:
 
 
 def problems_of(path: str | Path, *, partial: bool = False) -> list[str]:
-    """What is wrong with a submission.
+    """Problems of a submission.
 
     Parameters
     ----------
     path : str or Path
         Zip archive, or a folder with the same content.
     partial : bool
-        Take fewer than all scenes.
+        Allow missing scenes.
 
     Returns
     -------
     list of str
-        One line each, which begins with a name inside the submission, or with ``path``; empty if nothing is wrong.
+        One line each, beginning with a name inside the submission or with ``path``; empty without problems.
 
     Raises
     ------
     SepiError
-        If there is nothing at ``path``, or it cannot be read.
+        If ``path`` does not exist or cannot be read.
 
     Examples
     --------
-    A map of one scene, too small, and without its run time:
+    One scene's map is too small, and its run time is missing:
 
     >>> from pathlib import Path
     >>> import numpy as np
@@ -191,7 +191,7 @@ def problems_of(path: str | Path, *, partial: bool = False) -> list[str]:
     path = require_path("submission", path)
     try:
         if path.is_dir():
-            # files and folders down to the second level
+            # files and folders of the first two levels
             inner = {*path.glob("*/*"), *(entry for entry in path.iterdir() if not entry.is_dir())}
             names = sorted(file.relative_to(path).as_posix() for file in inner)
             return _strangers(names) + _problems_in(path, names, {}, partial)
@@ -215,7 +215,7 @@ def _problems_of_archive(path: Path, partial: bool) -> list[str]:
 
 
 def _unpack(archive: zipfile.ZipFile, folder: Path) -> dict[str, str]:
-    """Unpack the files of a submission, no other; name to what is wrong with those that cannot be."""
+    """Unpack only the files of a submission; returns name to problem for those that cannot be unpacked."""
     damaged: dict[str, str] = {}
     for part in _NAMES:
         (folder / part).mkdir()
@@ -224,7 +224,7 @@ def _unpack(archive: zipfile.ZipFile, folder: Path) -> dict[str, str]:
             continue
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             damaged[info.filename] = f"compressed by method {info.compress_type}; expected 'deflated' or none"
-        # zipfile unpacks no more than the file claims
+        # zipfile never unpacks more than the declared size
         elif problem := _size_problem(info.filename, info.file_size):
             damaged[info.filename] = problem
         else:
@@ -237,9 +237,9 @@ def _unpack(archive: zipfile.ZipFile, folder: Path) -> dict[str, str]:
 
 def _strangers(names: Collection[str]) -> list[str]:
     """Problems with names that do not belong to a submission."""
-    # entries for folders, which some programs write, do no harm
+    # some programs write entries for folders, which are harmless
     strange = {name: name.split("/") for name in names if name not in _EXPECTED and not name.endswith("/")}
-    # disp_maps/ and runtimes/ a level too low; __MACOSX/ holds what that system adds to an archive
+    # disp_maps/ and runtimes/ one level too low; macOS adds __MACOSX/
     wrapping = {parts[0] for parts in strange.values() if parts[1:2] and parts[1] in _NAMES} - {"", "__MACOSX"}
     lines = [f"{folder}/: expected {MAPS}/ and {RUNTIMES}/ at the root, not in this folder" for folder in wrapping]
     others = [name for name, parts in strange.items() if parts[0] not in wrapping]
@@ -250,7 +250,7 @@ def _strangers(names: Collection[str]) -> list[str]:
 
 
 def _problems_in(folder: Path, names: Collection[str], damaged: Mapping[str, str], partial: bool) -> list[str]:
-    """Problems with what a submission must hold: ``names`` in ``folder``, but for the ``damaged``, and why they are."""
+    """Problems with the required files: ``names`` in ``folder``, and the reasons for the ``damaged`` ones."""
     known = _EXPECTED.intersection(names)
     problems = []
     for part, expected in _NAMES.items():

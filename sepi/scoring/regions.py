@@ -1,7 +1,7 @@
-"""Regions for evaluation: pixels occluded in some view by the ground truth, and textureless pixels.
+"""Regions for evaluation: pixels that are occluded in some view according to the ground truth, and textureless pixels.
 
-The paper names another work for its occluded region and defines no textureless one. These definitions are the same for
-every scene and method, so that rows of a table compare. Estimators never see them.
+The paper cites another work for its occluded region and does not define its textureless one. These definitions are the
+same for all scenes and methods, so that rows of a table are comparable. Estimators never see them.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from sepi.lightfield import BoolMap, FloatMap
 from sepi.validation import require_map, require_type
 
 WINDOW = 7
-"""Side in pixels of the window that gradient energy is averaged over."""
+"""Side in pixels of the window over which gradient energy is averaged."""
 
 ENERGY_THRESHOLD = 0.005
-"""Root-mean-square gradient under which a pixel has no texture: part of the full range per pixel (1.3 of 255 steps)."""
+"""RMS gradient below which a pixel is textureless, as a fraction of the full range per pixel (1.3 of 255 steps)."""
 
 MIN_AREA = 225
 """Pixels: smaller patches are dropped and smaller holes filled (one superpixel of the paper, 15 x 15)."""
@@ -29,21 +29,21 @@ def occluded(
     ground_truth: FloatMap,
     baselines: npt.NDArray[np.float64],
 ) -> BoolMap:
-    """Pixels of the reference view that at least one other view does not see.
+    """Pixels of the reference view that are hidden in at least one other view.
 
-    A pixel is hidden in a view if a nearer pixel lands within half a pixel of it there: what a z-buffer of that view
-    would say. Instead of a buffer on the view's pixel grid, whose rounding marks slanted planes as hidden by
-    themselves, the sight line is followed through the disparity map. The nearer pixel ``q`` that hides ``p`` in the
-    view of baseline ``v`` lies at ``q = p + (d(q) - d(p)) v``, so one walk along ``v`` in steps of one pixel finds it
-    at its exact position. A surface whose slope, times the largest baseline, is under one half (0.125 of disparity per
-    pixel for 9 x 9 views) never hides itself.
+    A pixel is hidden in a view if a nearer pixel is projected to within half a pixel of it, as in a z-buffer. A buffer
+    on the view's pixel grid would round positions and mark slanted planes as hidden by themselves; therefore the line
+    of sight is followed through the disparity map. The nearer pixel ``q`` that hides ``p`` in the view of baseline
+    ``v`` lies at ``q = p + (d(q) - d(p)) v``, so a search along ``v`` in steps of one pixel finds its exact position. A
+    surface whose slope times the largest baseline is below one half (0.125 of disparity per pixel for 9 x 9 views)
+    never hides itself.
 
     Parameters
     ----------
     ground_truth : ndarray, shape (H, W), float32
-        Disparity in pixels per view step; pixels that are not finite neither hide nor are hidden.
+        Disparity in pixels per view step; non-finite pixels neither hide others nor are hidden.
     baselines : ndarray, shape (T, S, 2), float64
-        Down and across from the reference view, in view steps; zero for missing views.
+        Row and column offset from the reference view in view steps; zero for missing views.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def occluded(
 
     Examples
     --------
-    A bar before a plane hides a strip of it from the view to its right, and from no other:
+    A bar in front of a plane hides a strip of it in the view to the right:
 
     >>> import numpy as np
     >>> from sepi.scoring.regions import occluded
@@ -64,8 +64,7 @@ def occluded(
     """
     require_map("ground truth", ground_truth)
     reach = np.abs(baselines).max(axis=2).ravel()
-    # far views hide most: looking at them first ends the search early; those that stand where the reference view does
-    # hide nothing
+    # distant views hide most: testing them first ends the search early; views at the reference position hide nothing
     order = np.argsort(-reach, kind="stable")[: np.count_nonzero(reach)]
     finite = np.isfinite(ground_truth)
     hidden = np.zeros(ground_truth.shape, bool)
@@ -76,16 +75,16 @@ def occluded(
 
 
 def textureless(reference_view: FloatMap) -> BoolMap:
-    """Pixels of the reference view round which the image hardly changes.
+    """Pixels of the reference view with almost no image gradient around them.
 
-    The energy is the squared gradient, averaged over the channels and over a window of ``WINDOW`` pixels; its root is
-    compared with ``ENERGY_THRESHOLD`` (0.005 of the full range per pixel). Patches and holes under ``MIN_AREA`` (225
-    pixels) are removed.
+    The energy is the squared gradient, averaged over the channels and a window of ``WINDOW`` pixels; its root is
+    compared with ``ENERGY_THRESHOLD`` (0.005 of the full range per pixel). Patches and holes smaller than ``MIN_AREA``
+    (225 pixels) are removed.
 
     Parameters
     ----------
     reference_view : ndarray, shape (H, W, 3), float32
-        In 0..1.
+        Values in 0..1.
 
     Returns
     -------
@@ -105,7 +104,7 @@ def textureless(reference_view: FloatMap) -> BoolMap:
     energy = np.zeros(reference_view.shape[:2], np.float32)
     for channel in range(reference_view.shape[2]):
         plane = np.ascontiguousarray(reference_view[:, :, channel], np.float32)
-        # Scharr's weights sum to 32 per pixel of distance
+        # the Scharr kernel's response to a unit gradient is 32
         for dx, dy in ((1, 0), (0, 1)):
             energy += np.square(cv2.Scharr(plane, cv2.CV_32F, dx, dy) / 32)
     energy = cv2.blur(energy / reference_view.shape[2], (WINDOW, WINDOW))

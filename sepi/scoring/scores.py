@@ -1,12 +1,12 @@
-"""Scores: how far a disparity map is from the ground truth, by two protocols and over four regions.
+"""Scores of disparity maps against ground truth, for two protocols and four regions.
 
 Scores follow the paper (section V) and the HCI 4D light field benchmark. A non-finite estimate counts as bad and is
-reported, where the benchmark's own toolkit counts it as good. Pixels of the mask ``unknown`` are scored as they stand:
-no answer is no excuse. Pixels without finite ground truth are left out.
+reported, whereas the benchmark's own toolkit counts it as good. Pixels of the mask ``unknown`` are scored like all
+others. Pixels without finite ground truth are left out.
 
 Examples
 --------
-The paper's tables score whole maps, the HCI benchmark leaves a border out:
+The paper's tables score whole maps, the HCI benchmark excludes a border:
 
 >>> from sepi.scoring.scores import PROTOCOLS
 >>> PROTOCOLS
@@ -30,7 +30,7 @@ PROTOCOLS: dict[str, int] = {"paper": 0, "benchmark": 15}
 """Protocol to the pixels left out on each side."""
 
 BAD_PIXEL: dict[str, float] = {"badpix007": 0.07, "badpix003": 0.03, "badpix001": 0.01}
-"""Score to the error in pixels per view step above which a pixel is bad."""
+"""Score to its threshold: the error in pixels per view step above which a pixel is bad."""
 
 SCORES: dict[str, str] = {
     "mse100": "MSE x100",
@@ -40,35 +40,35 @@ SCORES: dict[str, str] = {
 """Score to its name in tables."""
 
 EDGE_SCORES: dict[str, str] = {"fattening": "fattening %", "thinning": "thinning %"}
-"""Score of what happens beside depth discontinuities (:mod:`sepi.scoring.edges`) to its name in tables."""
+"""Score at depth discontinuities (:mod:`sepi.scoring.edges`) to its name in tables."""
 
 OWN_BAD_PIXEL = "badpix_"
-"""What begins the names of scores of thresholds that a user chose."""
+"""Prefix of the scores for a user's thresholds."""
 
 COUNTS: dict[str, str] = {"non_finite": "non-finite", "pixels": "pixels"}
-"""Count that stands beside the scores to its name in tables."""
+"""Pixel count to its name in tables."""
 
 
 WHOLE_MAP = "all"
-"""Name of the region that is the whole map."""
+"""Region name of the whole map."""
 
 REGIONS: tuple[str, ...] = (WHOLE_MAP, "occluded", "textureless")
 """Regions of the paper's tables."""
 
 DISCONTINUITIES = "discontinuities"
-"""Name of the region beside depth discontinuities."""
+"""Region name of the pixels near depth discontinuities."""
 
 SCORED_REGIONS: tuple[str, ...] = (*REGIONS, DISCONTINUITIES)
-"""Regions that are scored of every scene; one that brings masks of other names has them scored, too."""
+"""Regions scored for every scene, in addition to a scene's own masks."""
 
 
 def own_bad_pixel(thresholds: Sequence[float]) -> dict[str, float]:
-    """Score to threshold as :data:`BAD_PIXEL` has them, for thresholds that are not among these.
+    """Score to threshold as in :data:`BAD_PIXEL`, for thresholds that are not in it.
 
     Raises
     ------
     SepiError
-        If one is no number above 0.
+        If a threshold is not a number above 0.
     """
     for one in thresholds:
         if not (is_finite(one) and one > 0):
@@ -77,7 +77,7 @@ def own_bad_pixel(thresholds: Sequence[float]) -> dict[str, float]:
 
 
 def score_heads(thresholds: Sequence[float] = ()) -> dict[str, str]:
-    """:data:`SCORES`, and those of thresholds that a user chose."""
+    """:data:`SCORES` and the scores of a user's thresholds, to their names in tables."""
     return SCORES | {name: f"BadPix {threshold:.10g} %" for name, threshold in own_bad_pixel(thresholds).items()}
 
 
@@ -90,7 +90,7 @@ def score(
     thresholds: Sequence[float] = (),
     bars: ErrorBars | None = None,
 ) -> Scores:
-    """Scores of a disparity map: those of the paper (section V) and of the HCI 4D light field benchmark [1]_.
+    """Scores of a disparity map as in the paper (section V) and the HCI 4D light field benchmark [1]_.
 
     Parameters
     ----------
@@ -99,22 +99,22 @@ def score(
     border : int
         Pixels left out on each side: 0 for the paper's protocol, 15 for the benchmark's.
     region : ndarray, shape (H, W), bool, optional
-        Where to score; everywhere unless given.
+        Pixels to score; default: all.
     edges : Edges, optional
-        Those of the ground truth, which are found unless given.
+        Depth discontinuities of the ground truth; computed if not given.
     thresholds : sequence of float
-        Further errors in pixels per view step above which a pixel is bad: 0.5 gives the score ``badpix_0.5``.
+        Further bad-pixel thresholds in pixels per view step: 0.5 gives the score ``badpix_0.5``.
     bars : ErrorBars, optional
-        Those of the estimate (:class:`sepi.scoring.error_bars.ErrorBars`), to be scored, too.
+        Error bars of the estimate (:class:`sepi.scoring.error_bars.ErrorBars`), which are then scored too.
 
     Returns
     -------
     dict
         ``mse100``: 100 x mean squared error over finite estimates; ``q25``: the 25th percentile of 100 x absolute
         error, not interpolated; ``badpix007``, ``badpix003``, ``badpix001``: percentage of pixels with a larger error
-        than 0.07, 0.03, 0.01, a non-finite estimate being one; ``fattening``, ``thinning``: as
+        than 0.07, 0.03, 0.01, including non-finite estimates; ``fattening``, ``thinning``: see
         :func:`sepi.scoring.edges.fattening_and_thinning`; ``non_finite``, ``pixels``: counts. A score over no pixels is
-        NaN. Of error bars those of :data:`sepi.scoring.error_bars.ERROR_BAR_SCORES`, too.
+        NaN. With ``bars``, also :data:`sepi.scoring.error_bars.ERROR_BAR_SCORES`.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def score(
 
     Examples
     --------
-    A map that is 0.02 too near everywhere, but for a tenth that is 0.1 too far:
+    A map whose error is 0.02, except for a tenth of the pixels with -0.1:
 
     >>> import numpy as np
     >>> from sepi.scoring.scores import score
@@ -153,7 +153,7 @@ def score(
     quarter = float(np.sort(100 * error)[error.size // 4]) if error.size else float("nan")
     scores: Scores = {"mse100": 100 * _mean(error[finite] ** 2), "q25": quarter}
     bad_pixel = BAD_PIXEL | own_bad_pixel(thresholds)
-    # written so that NaN is bad
+    # written so that NaN counts as bad
     scores |= {name: 100 * _mean(~(error <= threshold)) for name, threshold in bad_pixel.items()}
     edge_scores = fattening_and_thinning(estimate, edges or edges_of(ground_truth), chosen)
     scores |= dict(zip(EDGE_SCORES, edge_scores, strict=True))
@@ -171,25 +171,24 @@ def score_regions(
     thresholds: Sequence[float] = (),
     bars: ErrorBars | None = None,
 ) -> AllScores:
-    """Scores of a disparity map by every protocol and over every region.
+    """Scores of a disparity map for every protocol and region.
 
     Parameters
     ----------
     estimate, ground_truth : ndarray, shape (H, W), float32
         Disparity in pixels per view step.
     masks : mapping of str to ndarray, shape (H, W), bool, optional
-        Those of :func:`region_masks`; without them the regions are the whole map and the discontinuities.
+        Masks of regions (:func:`region_masks`); without them the regions are the whole map and the discontinuities.
     protocols : mapping of str to int
         Protocol to the pixels left out on each side.
     edges : Edges, optional
-        Those of the ground truth, which are found unless given.
+        Depth discontinuities of the ground truth; computed if not given.
     within : ndarray, shape (H, W), bool, optional
-        The pixels that count in every region, such as those of a crop (:func:`sepi.scoring.crops.in_frame`); all
-        unless given.
+        Pixels that count in every region, such as those of a crop (:func:`sepi.scoring.crops.in_frame`); default: all.
     thresholds : sequence of float
-        As :func:`score` takes them.
+        See :func:`score`.
     bars : ErrorBars, optional
-        As :func:`score` takes them.
+        See :func:`score`.
 
     Returns
     -------
@@ -203,7 +202,7 @@ def score_regions(
 
     Examples
     --------
-    With regions of one's own, here the left and the right half:
+    With custom regions, here the left and the right half:
 
     >>> import numpy as np
     >>> from sepi.scoring.scores import score_regions
@@ -231,13 +230,13 @@ def score_regions(
 
 
 def region_masks(light_field: LightField) -> dict[str, BoolMap]:
-    """The regions that maps are scored over.
+    """The regions over which maps are scored.
 
     Parameters
     ----------
     light_field : LightField
-        With ground truth. All of its own masks are taken; ``occluded`` and ``textureless``, where it has none, and
-        ``discontinuities`` are computed (:mod:`sepi.scoring.regions`, :mod:`sepi.scoring.edges`).
+        With ground truth. All of its own masks are used; ``discontinuities``, and ``occluded`` and ``textureless`` if
+        missing, are computed (:mod:`sepi.scoring.regions`, :mod:`sepi.scoring.edges`).
 
     Returns
     -------
@@ -277,7 +276,7 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
 
 
 def _within(border: int, shape: tuple[int, ...]) -> BoolMap:
-    """All pixels but those of a border."""
+    """All pixels except a border."""
     inside = np.zeros(shape, bool)
     inside[border : -border or None, border : -border or None] = True
     return inside
@@ -290,5 +289,5 @@ def _require_shape(what: str, values: FloatMap | BoolMap, estimate: FloatMap) ->
 
 
 def _mean(values: FloatMap | BoolMap) -> float:
-    # the mean of nothing would be a warning
+    # the mean of an empty array would warn
     return float(np.mean(values)) if values.size else float("nan")
