@@ -1,6 +1,6 @@
-"""The built-in scenes: contents of each one, and the difficulty that it poses.
+"""The built-in scenes: their surfaces, and the difficulty that each one poses.
 
-Lengths are fractions of the picture, disparities are pixels per view step.
+Lengths are fractions of the image size, disparities are pixels per view step.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from sepi.scenes import textures
 from sepi.scenes.surfaces import Plane, Surface, blob, everywhere, polygon, pyramid, rectangle, thread
 
-# made when they are drawn: where surfaces are does not depend on them
+# textures are made only for drawing; the surfaces' positions do not depend on them
 noise, photograph, shading = (textures.later(make) for make in (textures.noise, textures.photograph, textures.shading))
 
 
@@ -23,7 +23,7 @@ class Scene(NamedTuple):
     description: str
     surfaces: Callable[[], list[Surface]]
     pixel_noise: tuple[float, float] = (0.0, 0.0)
-    """Standard deviation at the left and at the right side of each view, full range = 1."""
+    """Noise standard deviation at the left and the right edge of each view, full range = 1."""
 
 
 def _fine_structures() -> list[Surface]:
@@ -128,13 +128,13 @@ def _curved_occluders() -> list[Surface]:
 
 def _rack() -> list[Surface]:
     ground = Surface([everywhere()], Plane(-1.4, across=0.5), noise(40, (0.42, 0.36, 0.3), 0.1))
-    # plates that stand one behind the other, each partly hidden by the next: three depths meet where outlines cross
+    # plates one behind the other, each partly hidden by the next: three depths meet where outlines cross
     plates = []
     for i in range(7):
         glaze = noise(41 + i, (0.78 - 0.05 * i, 0.76, 0.6 + 0.05 * i), 0.1 if i % 2 else 0.03)
         outline = blob(0.2 + 0.1 * i, 0.42 + 0.02 * (i % 3), 0.15)
         plates.append(Surface([outline], Plane(-0.9 + 0.3 * i, across=-0.5, down=0.2), glaze))
-    # rods before them, with gaps of one to five pixels of 192
+    # rods in front, with gaps of one to five pixels of 192
     rods, left = [], 0.05
     for i in range(28):
         rods.append(rectangle(left, 0.62, left + 0.016, 0.93))

@@ -15,8 +15,8 @@ from sepi.io.pfm import write_pfm
 from sepi.lightfield import FloatMap, LightField, require_light_field
 from sepi.validation import require_path
 
-# A made-up camera with the benchmark's numbers. A disparity of d pixels is then a depth of 36.57 / (d + 8.605) metres,
-# finite for every disparity of the scenes; the baseline shrinks with the picture to keep that so.
+# A fictitious camera with the benchmark's numbers. A disparity of d pixels is a depth of 36.57 / (d + 8.605) metres,
+# finite for all disparities of the scenes; the baseline scales with the image to preserve this.
 FOCAL_LENGTH_MM = 100.0
 SENSOR_SIZE_MM = 35.0
 FOCUS_DISTANCE_M = 4.25
@@ -29,28 +29,27 @@ def write_hci(
     camera: Mapping[str, float] | None = None,
     maps: Mapping[str, FloatMap] | None = None,
 ) -> None:
-    """Write a scene as an HCI 4D benchmark folder, whole or not at all.
+    """Write a scene as an HCI 4D benchmark folder, atomically.
 
-    The folder holds ``input_CamNNN.png`` (number ``S * t + s``), ``parameters.cfg``, and where they are known
+    The folder contains ``input_CamNNN.png`` (number ``S * t + s``), ``parameters.cfg`` and, if known,
     ``gt_disp_lowres.pfm`` and one ``mask_NAME.png`` per mask (white inside).
 
     Parameters
     ----------
     light_field : LightField
-        As :func:`sepi.scenes.render` makes it: all views present, uint8 or uint16 RGB, with a disparity range; rows as
-        far apart as columns, which is all that the layout can say.
+        As returned by :func:`sepi.scenes.render`: all views present, uint8 or uint16 RGB, with a disparity range and
+        with equal spacing of rows and columns, since the layout has only one baseline.
     folder : str or Path
-        Must not exist yet, or be empty.
+        Must be empty or not exist.
     camera : mapping of str to float, optional
-        ``focal_length_mm``, ``baseline_mm``, ``focus_distance_m`` and ``sensor_size_mm``; those of a made-up camera
-        unless given.
+        ``focal_length_mm``, ``baseline_mm``, ``focus_distance_m`` and ``sensor_size_mm``; default: a fictitious camera.
     maps : mapping of str to ndarray, shape (H, W), float32, optional
-        Further maps to write, by the names of their files without ``.pfm``.
+        Further maps to write, by file name without ``.pfm``.
 
     Raises
     ------
     SepiError
-        If rows are another distance apart than columns, views stand off the grid, or the folder cannot be written.
+        If rows and columns of views differ in spacing, views lie off the grid, or the folder cannot be written.
 
     Examples
     --------

@@ -18,8 +18,8 @@ from sepi.validation import require_known
 
 SMALLEST, LARGEST = 64, 1024
 MOST_VIEWS = 17
-# The range given with a scene reaches this far beyond its surfaces, and is at least this wide, so that a scene of one
-# plane still has to be searched.
+# Margin of a scene's disparity range around its surfaces, and the range's minimum width, so that even a scene of one
+# plane needs a search.
 MARGIN, LEAST_WIDTH = 0.2, 2.0
 
 
@@ -38,27 +38,26 @@ def render(
     name : str
         A key of ``sepi.scenes.SCENES``.
     size : int
-        Width and height of each view in pixels, 64 to 1024. Shapes grow with it, disparities and the fineness of the
-        textures stay.
+        Width and height of each view in pixels, 64 to 1024. Shapes scale with it; disparities and the scale of the
+        textures do not.
     views : int
         Rows and columns of the view grid, 2 to 17.
     row_spacing : float
-        Distance from one row of views to the next, in view steps.
+        Distance between rows of views in view steps.
     positions : ndarray, shape (views, views, 2), float64, optional
-        Where each view is taken, ``(down, across)`` in view steps; on the grid unless given.
+        Position of each view, ``(down, across)`` in view steps; default: the grid.
 
     Returns
     -------
     LightField
         Views uint8 RGB; exact disparity of the surface at each pixel centre as ``ground_truth``; the masks ``occluded``
-        (the point is hidden by a nearer surface in at least one view) and ``textureless`` (the surface carries no
-        depth). Equal arguments give equal bytes.
+        (the point is hidden by a nearer surface in at least one view) and ``textureless`` (the surface has no texture
+        from which to estimate depth). Equal arguments give equal bytes.
 
     Raises
     ------
     SepiError
-        If there is no such scene, size or views is out of bounds, or row spacing or positions are none of a light
-        field.
+        If there is no such scene, size or views is out of bounds, or row spacing or positions are invalid.
 
     Examples
     --------
@@ -89,7 +88,7 @@ def render(
 
 
 def scene_truth(name: str, size: int, views: int) -> Truth:
-    """Ground truth and masks of what :func:`render` makes, without its pictures."""
+    """Ground truth and masks of the light field of :func:`render`, without drawing its views."""
     _, light_field = _with_truth(name, size, views, textured=False)
     return light_field.ground_truth, light_field.masks
 
@@ -103,7 +102,7 @@ def _with_truth(
     *,
     textured: bool = True,
 ) -> tuple[Drawing, LightField]:
-    """What is to be drawn, with textures or only where, and the light field with all but its pictures."""
+    """The drawing, with or without textures, and the light field without its views."""
     _require_scene(name, size)
     _require_whole(name, "views", views, 2, MOST_VIEWS)
     surfaces = DEFINITIONS[name].surfaces()
@@ -124,7 +123,7 @@ def _with_truth(
 
 
 def true_disparity(name: str, *, size: int = 192, baseline: tuple[float, float] = (0.0, 0.0)) -> FloatMap:
-    """Exact disparity of a built-in scene in any view.
+    """Exact disparity of a built-in scene in an arbitrary view.
 
     Parameters
     ----------
@@ -133,14 +132,14 @@ def true_disparity(name: str, *, size: int = 192, baseline: tuple[float, float] 
     size : int
         Width and height of each view in pixels, as in :func:`render`.
     baseline : (float, float)
-        Of the view from the centre view, ``(down, across)`` in view steps: an entry of the ``baselines`` of the light
-        field that :func:`render` makes.
+        Position of the view relative to the centre view, ``(down, across)`` in view steps, as in the ``baselines`` of
+        the light field.
 
     Returns
     -------
     ndarray, shape (size, size), float32
-        Disparity of the nearest surface at each pixel centre, pixels per view step; at a baseline of zero the
-        ``ground_truth`` of the light field.
+        Disparity of the nearest surface at each pixel centre, pixels per view step; for a zero baseline, the
+        ``ground_truth`` of :func:`render`.
 
     Raises
     ------
@@ -163,7 +162,7 @@ def true_disparity(name: str, *, size: int = 192, baseline: tuple[float, float] 
 
 @lru_cache(maxsize=1)
 def drawn(name: str, size: int) -> Drawing:
-    """A scene's surfaces, kept from view to view: their textures take longer than a view."""
+    """A scene's surfaces, cached since making the textures takes longer than drawing a view."""
     _require_scene(name, size)
     return drawing(DEFINITIONS[name].surfaces(), size)
 
@@ -179,9 +178,9 @@ def _require_whole(name: str, what: str, value: int, least: int, most: int) -> N
 
 
 def _range_around(disparity: npt.NDArray[np.float64]) -> DisparityRange:
-    """Bounds in tenths that leave a margin on both sides."""
+    """Bounds with a margin on both sides, rounded outward to tenths."""
     low, high = float(disparity.min()), float(disparity.max())
     middle = (low + high) / 2
     low, high = min(low - MARGIN, middle - LEAST_WIDTH / 2), max(high + MARGIN, middle + LEAST_WIDTH / 2)
-    # rounding first keeps a bound that is a tenth up to the last bit where it is
+    # rounding first keeps bounds that equal a tenth up to floating-point error
     return DisparityRange(math.floor(round(10 * low, 6)) / 10, math.ceil(round(10 * high, 6)) / 10, "parameters")

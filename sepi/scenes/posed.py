@@ -1,8 +1,8 @@
 """Built-in scenes seen by cameras of any pose and lens.
 
-The world's axes are those of the camera that stands at the scene's centre view: x to the right, y down, z forward, and
-:class:`sepi.camera.Camera` says how disparities become depth there. Rays are traced to the scene's planes, so pictures
-and depth are exact whatever the pose and the distortion.
+The world's axes are those of a camera at the scene's centre view: x to the right, y down, z forward;
+:class:`sepi.camera.Camera` converts its disparities to depth. Rays are traced to the scene's planes, so that images and
+depth are exact for every pose and distortion.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ _SAMPLES = 4
 
 
 class Posed(NamedTuple):
-    """What a camera sees.
+    """Image and depth of a camera.
 
     Attributes
     ----------
     picture : ndarray, shape (H, W, 3), uint8
     depth : ndarray, shape (H, W), float32
-        Along the camera's axis, at the pixels' centres, in the units of the scene's camera; infinite where nothing is.
+        Along the camera's axis at pixel centres, in units of the scene's camera; infinite where there is no surface.
     """
 
     picture: npt.NDArray[np.uint8]
@@ -38,23 +38,23 @@ class Posed(NamedTuple):
 
 
 def render_shot(name: str, shot: Shot, *, camera: Camera, size: int = 192) -> Posed:
-    """Render a built-in scene as a camera of any pose and lens sees it.
+    """Render a built-in scene as seen by a camera of any pose and lens.
 
     Parameters
     ----------
     name : str
-        A key of ``sepi.scenes.SCENES``; its sensor noise, if it has some, is left out.
+        A key of ``sepi.scenes.SCENES``; sensor noise is not added.
     shot : Shot
-        The camera, in the axes of the one at the scene's centre view.
+        The camera, in the axes of the camera at the scene's centre view.
     camera : Camera
-        What makes depth of the scene's disparities.
+        Converts the scene's disparities to depth.
     size : int
         Width and height of the scene's centre view in pixels, as in :func:`sepi.scenes.render`.
 
     Returns
     -------
     Posed
-        Picture, and depth along the camera's axis.
+        Image, and depth along the camera's axis.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def render_shot(name: str, shot: Shot, *, camera: Camera, size: int = 192) -> Po
 
     Examples
     --------
-    A camera a view step to the right of the centre sees what the view there shows:
+    A camera one view step to the right of the centre sees the same as the view there:
 
     >>> import numpy as np
     >>> from sepi import Camera
@@ -85,7 +85,7 @@ def render_shot(name: str, shot: Shot, *, camera: Camera, size: int = 192) -> Po
     boxes, pinhole = boxes_round(scene), np.array([camera.focal_px, middle, middle])
 
     def met(samples: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """Depths and colours of what rays through so many samples per pixel and direction meet."""
+        """Depths and colours hit by rays, for a number of samples per pixel and direction."""
         y, x = (np.indices((shot.lens.height * samples, shot.lens.width * samples)) + 0.5) / samples - 0.5
         rays = shot.lens.rays(np.column_stack([x.ravel(), y.ravel()])) @ shot.rotation
         depths, colours = np.empty(len(rays)), np.empty((len(rays), 3))
@@ -95,6 +95,6 @@ def render_shot(name: str, shot: Shot, *, camera: Camera, size: int = 192) -> Po
 
     shape = shot.lens.height, shot.lens.width
     mean = met(_SAMPLES)[1].reshape(shape[0], _SAMPLES, shape[1], _SAMPLES, 3).mean(axis=(1, 3))
-    # rays have z = 1: their lengths are depths
+    # rays have z = 1, so that their lengths are depths
     depth = met(1)[0].reshape(shape).astype(np.float32)
     return Posed(np.round(np.clip(mean, 0, 1) * 255).astype(np.uint8), depth)

@@ -1,9 +1,9 @@
 """Exact rendering of planar surfaces into the views of a light field.
 
 A plane of disparity ``d(x, y) = a + b x + c y`` in the centre view is seen in the view of baseline ``(v, u)`` at
-``(x', y') = (x - u d, y - v d)``. Solved for the disparity, ``d = (a + b x' + c y') / (1 - b u - c v)``: it is a plane
-there, too, and a polygon stays a polygon. So each view is drawn by filling polygons along sub-pixel rows, the largest
-disparity wins, and the texture is looked up at ``(x' + u d, y' + v d)``; nothing is resampled from another view.
+``(x', y') = (x - u d, y - v d)``. Solved for the disparity, ``d = (a + b x' + c y') / (1 - b u - c v)``: also a plane
+there, and polygons remain polygons. Each view is therefore drawn by filling polygons along sub-pixel rows, where the
+largest disparity wins and the texture is sampled at ``(x' + u d, y' + v d)``; nothing is resampled from another view.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from sepi.scenes.surfaces import Surface
 
 # Sub-samples per pixel and direction.
 SAMPLES = 4
-# A plane closer than this to edge-on counts as seen from its edge.
+# Planes closer to edge-on than this count as edge-on.
 EDGE_ON = 1e-9
 
 FloatArray = npt.NDArray[np.float64]
@@ -28,26 +28,26 @@ IntArray = npt.NDArray[np.int64]
 
 
 class Drawing(NamedTuple):
-    """Surfaces as flat arrays in pixels of the centre view, or of another, for the compiled kernels."""
+    """Surfaces as flat arrays in pixels of a view, for the compiled kernels."""
 
     edges: FloatArray
     """Polygon edges ``x0, y0, x1, y1`` of all surfaces, shape (E, 4)."""
     first_edge: IntArray
-    """Surface ``p`` owns the edges ``first_edge[p]`` to ``first_edge[p + 1]``."""
+    """Surface ``p`` has the edges ``first_edge[p]`` to ``first_edge[p + 1]``."""
     planes: FloatArray
     """``a, b, c`` of each surface, shape (P, 3)."""
     texels: FloatMap
     """Spline coefficients of all textures, one after the other, shape (N, 4): three colours, and 0.
 
-    Each row goes on periodically for ``sepi.kernels.rendering.BEYOND`` texels."""
+    Each row continues periodically for ``sepi.kernels.rendering.BEYOND`` texels."""
     first_texel: IntArray
-    """Where the texture of each surface begins."""
+    """Start index of each surface's texture."""
     side: IntArray
-    """Its period in texels."""
+    """Period of each surface's texture in texels."""
 
 
 def drawing(surfaces: Sequence[Surface], size: int, *, textured: bool = True) -> Drawing:
-    """Put surfaces into pixels of a picture of ``size`` by ``size``; without textures where only their places count."""
+    """Surfaces in pixels of an image of ``size`` by ``size``; without textures if only positions are needed."""
     edges = [
         np.concatenate([np.hstack([outline, np.roll(outline, -1, axis=0)]) for outline in surface.outlines])
         for surface in surfaces
@@ -72,7 +72,7 @@ def drawing(surfaces: Sequence[Surface], size: int, *, textured: bool = True) ->
 
 
 def render_view(scene: Drawing, size: int, v: float, u: float) -> FloatMap:
-    """The view ``v`` steps below and ``u`` steps to the right of the centre; shape (size, size, 3) in about 0..1."""
+    """The view ``v`` steps below and ``u`` steps right of the centre; shape (size, size, 3), about 0..1."""
     picture = np.empty((size, size, 3), np.float32)
     kernels.shade(_seen_from(scene, v, u), v, u, SAMPLES, picture)
     return picture
@@ -81,7 +81,7 @@ def render_view(scene: Drawing, size: int, v: float, u: float) -> FloatMap:
 def visible(scene: Drawing, size: int, v: float = 0.0, u: float = 0.0) -> tuple[FloatArray, IntArray]:
     """Disparity and index of the surface at each pixel centre of a view, each of shape (size, size).
 
-    The view is that ``v`` steps below and ``u`` steps to the right of the centre.
+    The view is ``v`` steps below and ``u`` steps right of the centre.
     """
     disparity = np.empty((size, size))
     owner = np.empty((size, size), np.int64)
@@ -90,10 +90,9 @@ def visible(scene: Drawing, size: int, v: float = 0.0, u: float = 0.0) -> tuple[
 
 
 def occluded(scene: Drawing, disparity: FloatArray, baselines: FloatArray) -> BoolMap:
-    """Pixels of the centre view whose surface point a nearer surface hides in at least one of the views.
+    """Pixels of the centre view whose surface point is hidden by a nearer surface in at least one view.
 
-    ``baselines (T, S, 2)`` are those of the views from the centre view. A point that leaves the picture in a view does
-    not count as hidden there.
+    ``baselines (T, S, 2)`` are relative to the centre view. Points outside a view's image do not count as hidden there.
     """
     hidden = np.zeros(disparity.shape, bool)
     for v, u in baselines.reshape(-1, 2):
@@ -103,13 +102,13 @@ def occluded(scene: Drawing, disparity: FloatArray, baselines: FloatArray) -> Bo
 
 
 def boxes_round(scene: Drawing) -> FloatArray:
-    """Least and greatest x and y of the corners of each surface, ``x0, y0, x1, y1``."""
+    """Bounding box of each surface, ``x0, y0, x1, y1``."""
     corners, first = scene.edges[:, :2], scene.first_edge[:-1]
     return np.hstack([np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first)])
 
 
 def _coefficients(texture: FloatMap) -> FloatMap:
-    """Cubic B-spline coefficients of a periodic texture, shape (M * (M + BEYOND), 4), as a drawing has them."""
+    """Cubic B-spline coefficients of a periodic texture, shape (M * (M + BEYOND), 4), as in a drawing."""
     from scipy import ndimage
 
     values = texture.astype(np.float64)
@@ -120,7 +119,7 @@ def _coefficients(texture: FloatMap) -> FloatMap:
 
 
 def _seen_from(scene: Drawing, v: float, u: float) -> Drawing:
-    """Surfaces as they are in a view."""
+    """Surfaces in the pixels of a view."""
     of_edge = np.repeat(scene.planes, np.diff(scene.first_edge), axis=0)
     x, y = scene.edges[:, 0::2], scene.edges[:, 1::2]
     d = of_edge[:, :1] + of_edge[:, 1:2] * x + of_edge[:, 2:] * y

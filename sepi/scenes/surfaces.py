@@ -1,7 +1,7 @@
 """Surfaces of the built-in scenes: planar patches with an outline and a texture.
 
-Everything is described as seen in the centre view, in fractions of the picture: (0, 0) is the outer corner of the top
-left pixel, (1, 1) that of the bottom right pixel. Shapes therefore grow with the picture while disparities stay.
+Coordinates are those of the centre view, in fractions of the image: (0, 0) is the outer corner of the top left pixel,
+(1, 1) that of the bottom right pixel. Shapes therefore scale with the image while disparities do not.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ Outline = npt.NDArray[np.float64]
 """Corners ``(N, 2)`` of a closed polygon as (x, y)."""
 
 Texture = FloatMap | Callable[[], FloatMap]
-"""Periodic, one texel per pixel, shape (M, M, 3) in 0..1; or what makes it."""
+"""Periodic, one texel per pixel, shape (M, M, 3) in 0..1; or a function that makes it."""
 
-# Corners of a circle: at 1024 pixels the polygon is nowhere 0.1 pixels from the circle.
+# Corners of a circle: at 1024 pixels the polygon deviates by less than 0.1 pixels.
 CIRCLE_CORNERS = 180
 
 
@@ -32,7 +32,7 @@ class Plane(NamedTuple):
     down: float = 0.0
 
     def at(self, x: float, y: float) -> float:
-        """Disparity at a point of the picture."""
+        """Disparity at a point of the image."""
         return self.at_centre + self.across * (x - 0.5) + self.down * (y - 0.5)
 
 
@@ -40,15 +40,15 @@ class Surface(NamedTuple):
     """A planar patch."""
 
     outlines: Sequence[Outline]
-    """A point inside an odd number of them belongs to the surface (a second outline cuts a hole)."""
+    """Points inside an odd number of outlines belong to the surface (a second outline cuts a hole)."""
     plane: Plane
     texture: Texture
     textureless: bool = False
-    """The texture carries no depth."""
+    """Whether the texture has too little detail to estimate depth."""
 
 
 def everywhere() -> Outline:
-    """A rectangle that reaches far beyond what any view sees."""
+    """A rectangle far larger than the part visible in any view."""
     return rectangle(-3, -3, 4, 4)
 
 
@@ -63,7 +63,7 @@ def polygon(*corners: tuple[float, float]) -> Outline:
 
 
 def blob(x: float, y: float, radius: float, waves: Sequence[tuple[int, float, float]] = ()) -> Outline:
-    """A circle whose radius varies along its way round: waves of (periods, amplitude / radius, phase in radians)."""
+    """A circle with a radius that varies with the angle: waves of (periods, amplitude / radius, phase in radians)."""
     angle = 2 * np.pi * np.arange(CIRCLE_CORNERS) / CIRCLE_CORNERS
     r = radius * (1 + sum((a * np.cos(n * angle + phase) for n, a, phase in waves), np.zeros_like(angle)))
     return np.stack([x + r * np.cos(angle), y + r * np.sin(angle)], axis=1)
@@ -78,9 +78,9 @@ def thread(start: tuple[float, float], end: tuple[float, float], width: float) -
 
 
 def pyramid(base: Outline, apex: tuple[float, float], height: float, ground: Plane, texture: Texture) -> list[Surface]:
-    """The faces of a pyramid that stands on ``ground``; its top is seen at ``apex`` in the centre view.
+    """The faces of a pyramid on ``ground`` with its top at ``apex`` in the centre view.
 
-    ``height`` is the disparity by which the top is nearer than the ground; negative for a pyramid sunk into it.
+    ``height`` is the disparity of the top relative to the ground; negative for a pyramid sunk into it.
     """
     faces = []
     for a, b in zip(base, np.roll(base, -1, axis=0), strict=True):

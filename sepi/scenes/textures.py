@@ -1,7 +1,7 @@
 """Textures of the built-in scenes: periodic rasters, one texel per pixel of the centre view, sampled by cubic splines.
 
-A texture keeps its detail at the scale of a pixel whatever the size of the picture, so that depth stays recoverable;
-only the shapes grow. The photographs are samples that scikit-image installs with itself.
+Textures have pixel-scale detail at every image size, so that depth can be estimated; only shapes scale with the image.
+The photographs are samples included in scikit-image.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ Colour = tuple[float, float, float]
 PERIOD = 512
 # Shortest wavelength of noise in pixels.
 FINEST = 3.0
-# Part of a texture's variation that differs between the colour channels.
+# Share of a texture's variation that differs between colour channels.
 CHROMA = 0.25
-# Standard deviation of the noise in a photograph.
+# Standard deviation of the noise added to a photograph.
 GRAIN = 0.05
 
 
 def noise(seed: int, colour: Colour, contrast: float, *, coarsest: float = 48.0) -> FloatMap:
-    """Smooth noise round a colour with equal energy in every octave between two wavelengths in pixels.
+    """Smooth noise around a colour with equal energy per octave between two wavelengths in pixels.
 
-    ``contrast`` is the standard deviation of the brightness. Nothing is finer than 2 pixels, so that views are sampled
+    ``contrast`` is the standard deviation of the brightness. No wavelength is below 2 pixels, so that views are sampled
     without aliasing.
     """
     brightness, *chroma = _bands(np.random.default_rng(seed), coarsest)
@@ -40,13 +40,13 @@ def noise(seed: int, colour: Colour, contrast: float, *, coarsest: float = 48.0)
 
 
 def photograph(name: str, tint: Colour, *, seed: int) -> FloatMap:
-    """A sample picture of scikit-image that is installed with it, mirrored so that it repeats without a seam.
+    """A sample image included in scikit-image, mirrored so that it repeats without a seam.
 
-    Its colours are multiplied by ``tint``; fine noise is added, so that its smooth parts have detail, too.
+    Its colours are multiplied by ``tint``; fine noise is added so that smooth parts have detail too.
     """
     from skimage import data
 
-    # lifted out of black and white, where clipping would leave nothing to match
+    # range reduced, since clipping at black or white would leave no detail to match
     picture = 0.12 + 0.76 * np.asarray(getattr(data, name)(), np.float64) / 255
     if picture.ndim == 2:
         picture = np.repeat(picture[..., None], 3, axis=-1)
@@ -59,14 +59,14 @@ def photograph(name: str, tint: Colour, *, seed: int) -> FloatMap:
 
 
 def shading(colour: Colour, amplitude: float) -> FloatMap:
-    """One colour with a wave of brightness that changes over hundreds of pixels only: it carries no depth."""
+    """One colour with brightness varying only over hundreds of pixels: too smooth to estimate depth."""
     phase = 2 * np.pi * np.arange(PERIOD) / PERIOD
     wave = 0.5 * amplitude * (np.sin(phase)[:, None] + np.sin(phase)[None, :])
     return _limited(np.array(colour) + wave[..., None])
 
 
 def later(make: Callable[..., FloatMap]) -> Callable[..., Callable[[], FloatMap]]:
-    """One of these functions as one that remembers what is asked of it, until the texture is called for."""
+    """Wrap a texture function so that calls return a function that makes the texture later."""
 
     def asked(*given: Any, **named: Any) -> Callable[[], FloatMap]:
         return partial(make, *given, **named)
@@ -80,7 +80,7 @@ def _bands(rng: np.random.Generator, coarsest: float) -> npt.NDArray[np.float64]
     from scipy import fft
 
     frequency = np.hypot(fft.fftfreq(PERIOD)[:, None], fft.rfftfreq(PERIOD)[None, :])
-    # amplitude 1/f is equal energy per octave; the flanks are smooth so that no ripples appear
+    # amplitude 1/f gives equal energy per octave; smooth flanks avoid ripples
     with np.errstate(divide="ignore"):
         amplitude = np.where(frequency > 0, 1 / frequency, 0)
     amplitude *= np.exp(-((frequency * FINEST) ** 8)) * (1 - np.exp(-((frequency * coarsest) ** 4)))
@@ -90,5 +90,5 @@ def _bands(rng: np.random.Generator, coarsest: float) -> npt.NDArray[np.float64]
 
 
 def _limited(values: npt.NDArray[np.float64]) -> FloatMap:
-    """Values kept a little inside 0..1, so that the spline between them does not leave it."""
+    """Values limited to slightly inside 0..1, so that their spline stays within 0..1."""
     return np.clip(values, 0.02, 0.98).astype(np.float32)
