@@ -1,37 +1,37 @@
 r"""Depth from phase-shifted views, a compared method: all views against the reference view, with sub-pixel shifts [1]_.
 
-A lenslet camera's views are a few pixels apart at most, so that neighbouring candidates are fractions of a pixel apart.
-Interpolation blurs the views by a different amount at each fraction; the phase shift theorem moves them without. The
-data cost is the initial choice ``acc``, what follows the choice ``confident_labels`` of the optimisation.
+The views of a lenslet camera differ by a few pixels at most, so that neighbouring candidates differ by fractions of a
+pixel. Interpolation blurs views by a different amount at each fraction; the phase shift theorem avoids this. The data
+cost is the initial choice ``acc``, the remaining steps are the choice ``confident_labels`` of the optimisation.
 
 1. *Phase shift.* ``I(x + D) = F^-1{ F{I}(w) exp(2 pi i w D) }``, with ``D = -l b`` for a view of baseline ``b`` and the
    candidate ``l``.
 2. *Data cost.* With ``r_u = I(u_c, .) - I(u, . + D)`` and sums over the views ``u`` and a small window round ``x``,
    ``C(x, l) = sum a min(|r_u|, t1) + (1 - a) (B(u) min(|d/dx r_u|, t2) + (1 - B(u)) min(|d/dy r_u|, t2))``. The share
-   ``B(u) = |b_x| / (|b_x| + |b_y|)`` makes gradients count along the direction in which the view moved: across it, a
-   shift changes none.
+   ``B(u) = |b_x| / (|b_x| + |b_y|)`` weights gradients along the view's baseline; a shift does not change those across
+   it.
 3. *Aggregation.* Every cost slice is filtered with the reference view as guide; the candidates of least cost, after a
    weighted median, are the first map ``l_a``. Pixels whose costs hardly vary over the candidates are unreliable.
 4. *Labels.* The labels minimise ``sum_x C(x, l) + L1 [x reliable] |l - l_a| + L2 [x matched] |l - l_c| + L3 sum_x'
-   |l - l(x')|`` over neighbours ``x'``; ``l_c`` is the disparity of features that several views show
+   |l - l(x')|`` over neighbours ``x'``; ``l_c`` is the disparity of features matched in several views
    (:mod:`sepi.compared.acc_features`).
-5. *Iterative refinement.* From labels to a continuous map, four times: costs of the distance to the map so far are
-   filtered slice by slice, and the parabola through the least and its neighbours,
-   ``l - (E(l+) - E(l-)) / (2 (E(l+) + E(l-) - 2 E(l)))``, tells the new map.
+5. *Iterative refinement.* From labels to a continuous map, four times: costs of the distance to the current map are
+   filtered slice by slice, and the parabola through the least cost and its neighbours,
+   ``l - (E(l+) - E(l-)) / (2 (E(l+) + E(l-) - 2 E(l)))``, gives the new map.
 
-What the publication leaves open, or could not be confirmed, and what was chosen:
+Choices made here where the publication is not specific or could not be confirmed:
 
-- The border: views go on as their own mirror image (:mod:`sepi.compared.acc_phase_shift`).
+- The border: views continue as their mirror image (:mod:`sepi.compared.acc_phase_shift`).
 - Colours: differences are means over the channels, and the gradients central differences.
-- All numbers: the share ``a``, truncations, the size of windows and filters, and the weights. Truncations are of the
-  size of what occlusion and texture change; costs are brought to 0..1; weights count in hundredths of the range.
+- All numbers: the share ``a``, truncations, the size of windows and filters, and the weights. Truncations match the
+  differences caused by occlusion and texture; costs are scaled to 0..1; weights are in hundredths of the range.
 - The edge-preserving filter: the guided filter.
-- Graph cuts: message passing on the same energy (:mod:`sepi.compared.message_passing`, which says why).
+- Graph cuts: replaced by message passing on the same energy (for the reason, see :mod:`sepi.compared.message_passing`).
 - Which pixels are unreliable: the standard deviation of their costs over the candidates is below a threshold.
-- Features: mutual nearest neighbours with Lowe's ratio test and a median in the place of the robust regression.
-- The costs of the refinement: the squared distance, at most that of two labels. With a limit of one label, 0 at a
-  pixel's own label and 1 at all others, slopes steeper than a quarter of a label per pixel grow steps.
-- The correction of a lenslet camera's distortion is left out: it belongs to the decoding of its pictures.
+- Features: mutual nearest neighbours with Lowe's ratio test, and a median instead of the robust regression.
+- The costs of the refinement: the squared distance, truncated at two labels. Truncated at one label, that is 0 at a
+  pixel's own label and 1 at all others, slopes steeper than a quarter of a label per pixel become steps.
+- The correction of a lenslet camera's distortion is left out: it belongs to decoding.
 
 References
 ----------
@@ -64,7 +64,7 @@ _AT_ONCE = 8
 """Candidates that are transformed together."""
 
 _FARTHEST = 2.0
-"""Labels between a pixel's depth so far and a new one from which a further one costs the refinement nothing more."""
+"""Truncation of the refinement's costs: distance from the current depth in labels."""
 
 
 class AccParameters(CandidateParameters):
@@ -150,7 +150,7 @@ def acc(
 def phase_shift_costs(
     light_field: LightField, disparities: FloatMap, parameters: AccParameters, progress: Progress
 ) -> FloatMap:
-    """Mean truncated difference between the reference view and each other view, moved by each candidate.
+    """Mean truncated difference between the reference view and the other views shifted by each candidate.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def truncated_difference(
     for here, own in zip(moved, reference, strict=True):
         residual = here[:height, :width] - own
         colour += np.abs(residual)
-        # central differences, twice as large
+        # central differences without the division by 2
         across += np.abs(cv2.Sobel(residual, -1, 1, 0, ksize=1, borderType=cv2.BORDER_REPLICATE))
         down += np.abs(cv2.Sobel(residual, -1, 0, 1, ksize=1, borderType=cv2.BORDER_REPLICATE))
     gradients = across_share * np.minimum(across / 6, parameters.gradient_truncation)
@@ -202,7 +202,7 @@ def truncated_difference(
 
 
 def across_share(baseline: npt.NDArray[np.float64]) -> float:
-    """Share of the gradients across in the cost of a view of this baseline ``(down, across)``; 0..1."""
+    """Weight of horizontal gradients in the cost of a view with this baseline ``(down, across)``; 0..1."""
     down, across = np.abs(baseline).tolist()
     return float(across / (across + down)) if across + down else 0.5
 
@@ -210,9 +210,9 @@ def across_share(baseline: npt.NDArray[np.float64]) -> float:
 def confident_labels(
     light_field: LightField, previous: StageMaps | None, parameters: ConfidentLabelsParameters, progress: Progress
 ) -> StageMaps:
-    """Labels of least energy, drawn to reliable pixels and matched features, refined to a continuous map.
+    """Labels of least energy, guided by reliable pixels and matched features, refined to a continuous map.
 
-    Builds on maps with a cost volume.
+    Requires maps with a cost volume.
 
     Returns
     -------
@@ -238,7 +238,7 @@ def confident_labels(
 def _data_terms(
     light_field: LightField, first: FloatMap, volume: CostVolume, parameters: ConfidentLabelsParameters
 ) -> FloatMap:
-    """Costs of each label of each pixel by itself; shape (K, H, W), float32."""
+    """Unary costs of each label; shape (K, H, W), float32."""
     low, high = float(volume.disparities[0]), float(volume.disparities[-1])
     hundredths = 100 / (high - low)
     costs = volume.costs.astype(np.float32)
@@ -253,13 +253,13 @@ def _data_terms(
 
 
 def refined(disparity: FloatMap, disparities: FloatMap, smooth: GuidedFilter) -> FloatMap:
-    """A map between labels: the least filtered cost of the distance to the map so far.
+    """A continuous map from labels: the least filtered cost of the distance to the current map.
 
     Parameters
     ----------
     disparity : ndarray, shape (H, W), float32
     disparities : ndarray, shape (K,), float32
-        Of the labels, pixels per view step.
+        Disparities of the labels, pixels per view step.
     smooth : GuidedFilter
 
     Returns

@@ -1,9 +1,8 @@
-"""Features of the reference view that other views show as well, and the disparity that these views agree on.
+"""Features of the reference view that are matched in other views, and their disparity.
 
-Features are those of [1]_. One of the reference view and one of another view are a match where their descriptors are
-each other's nearest, clearly nearer than the next, and where the second lies on the line on which the other view's
-baseline puts the first, at a disparity within the range. The disparity of a feature is the least-squares one over the
-views that agree with the median over its matches.
+Features are those of [1]_. A feature of the reference view matches one of another view if their descriptors are mutual
+nearest neighbours, pass the ratio test, and the second lies on the first one's epipolar line at a disparity within the
+range. The disparity of a feature is the least-squares one over the views that agree with the median over its matches.
 
 References
 ----------
@@ -25,16 +24,16 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 _RATIO = 0.8
-"""Nearest to next nearest descriptor, from which on a match is doubtful [1]_."""
+"""Ratio of distances to the nearest and second nearest descriptor above which a match is rejected [1]_."""
 
 _OFF_LINE = 1.0
-"""How far a match may lie from where its disparity puts it, pixels."""
+"""Maximum distance of a match from its predicted position, pixels."""
 
 _LEAST_SUPPORT = 0.25
 """Share of the other views that must agree on a feature's disparity."""
 
 _SMALLEST = 16
-"""Views below this many pixels have no features worth the name."""
+"""Minimum size of views in pixels for the detection of features."""
 
 
 class Features(NamedTuple):
@@ -61,12 +60,12 @@ def matched_disparities(light_field: LightField, low: float, high: float) -> tup
     ----------
     light_field : LightField
     low, high : float
-        Disparities between which matches count, pixels per view step.
+        Disparity range of accepted matches, pixels per view step.
 
     Returns
     -------
     rows, columns : ndarray, shape (M,), int64
-        Each pixel once.
+        Each pixel occurs once.
     disparity : ndarray, shape (M,), float32
         Pixels per view step.
     """
@@ -84,7 +83,7 @@ def matched_disparities(light_field: LightField, low: float, high: float) -> tup
     disparity, support = agreed(found, np.hypot(*baselines.T))
     kept = support >= max(1.0, _LEAST_SUPPORT * len(baselines))
     pixels = np.floor(here.points[kept] + 0.5).astype(np.int64)
-    # a point with two orientations has two features
+    # a point with two orientations yields two features
     pixels, once = np.unique(pixels, axis=0, return_index=True)
     return pixels[:, 0], pixels[:, 1], disparity[kept][once].astype(np.float32)
 
@@ -101,7 +100,7 @@ def features_of(view: FloatMap) -> Features:
 
 
 def mutual_matches(first: FloatMap, second: FloatMap) -> tuple[IntArray, IntArray]:
-    """Numbers of the descriptors, ``(N, 128)`` and ``(M, 128)``, that match; each shape (K,), int64."""
+    """Indices of the matching descriptors of ``(N, 128)`` and ``(M, 128)``; each shape (K,), int64."""
     none = np.zeros(0, np.int64)
     if not (len(first) and len(second) > 1):
         return none, none
@@ -114,14 +113,14 @@ def mutual_matches(first: FloatMap, second: FloatMap) -> tuple[IntArray, IntArra
 
 
 def agreed(found: FloatArray, distances: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Disparity on which views agree: least squares over those within half a pixel of the median's place.
+    """Disparity on which views agree: least squares over those within half a pixel of the median.
 
     Parameters
     ----------
     found : ndarray, shape (V, N), float64
-        Disparity of each feature by each view; NaN where it was not found.
+        Disparity of each feature in each view; NaN where it was not found.
     distances : ndarray, shape (V,), float64
-        Of the views from the reference view, view steps.
+        Distance of the views from the reference view, view steps.
 
     Returns
     -------
@@ -143,7 +142,7 @@ def agreed(found: FloatArray, distances: FloatArray) -> tuple[FloatArray, IntArr
 
 
 def _along(moved: FloatArray, baseline: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Disparity that fits a movement ``(K, 2)`` best, and how far from its place that leaves the point."""
+    """Disparity that fits a displacement ``(K, 2)`` best, and the remaining distance."""
     squared = float(baseline @ baseline)
     disparity = -(moved @ baseline) / squared if squared else np.full(len(moved), np.nan)
     return disparity, np.hypot(*(moved + disparity[:, None] * baseline).T)

@@ -1,9 +1,9 @@
-"""Pictures moved by fractions of a pixel in the Fourier domain, by the phase shift theorem.
+"""Sub-pixel shifts of images in the Fourier domain, by the phase shift theorem.
 
-``I(x + D) = F^-1{ F{I}(w) exp(2 pi i w D) }`` is exact for a periodic picture without detail beyond the highest
-frequency. Views are not periodic: what leaves at one border would come in at the opposite one, and the jump between
-the two would ring. Here a picture goes on as its own mirror image, as far as samples reach, and crosses over to that of
-the opposite border beyond, so that its period has no seam.
+``I(x + D) = F^-1{ F{I}(w) exp(2 pi i w D) }`` is exact for a periodic, band-limited image. Views are not periodic: the
+jump between opposite borders would cause ringing, and content would wrap around. Here an image is extended by its
+mirror image as far as samples reach; beyond, that is blended with the mirror image of the opposite border, so that the
+period has no seam.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap
 
 _SEAM = 16
-"""Pixels over which the two mirror images cross over."""
+"""Pixels over which the two mirror images are blended."""
 
 
 class PhaseShift:
-    """Pictures, to be moved by fractions of a pixel in the Fourier domain.
+    """Images to be shifted by fractions of a pixel in the Fourier domain.
 
     Parameters
     ----------
     pictures : ndarray, shape (C, H, W), float32
     farthest : float or None
-        Of the offsets to come, pixels along either axis. None: the pictures are periodic.
+        Largest offset in pixels along either axis. None: the images are periodic.
     """
 
     def __init__(self, pictures: FloatMap, farthest: float | None) -> None:
@@ -38,7 +38,7 @@ class PhaseShift:
         self._spectrum = fft.rfft2(pictures)
 
     def by(self, offsets: npt.NDArray[np.float64]) -> FloatMap:
-        """The pictures' samples at ``(y, x) + offset``.
+        """Samples of the images at ``(y, x) + offset``.
 
         Parameters
         ----------
@@ -48,7 +48,7 @@ class PhaseShift:
         Returns
         -------
         ndarray, shape (M, C, H or more, W or more), float32
-            What lies beyond the pictures' own height and width is of no use.
+            Values beyond the images' height and width are meaningless.
         """
         from scipy import fft
 
@@ -59,16 +59,16 @@ class PhaseShift:
 
 
 def _phases(length: int, offsets: npt.NDArray[np.float64]) -> npt.NDArray[np.complex64]:
-    """Factors of the frequencies of a period for each offset; shape (M, length), complex64."""
+    """Phase factors of all frequencies for each offset; shape (M, length), complex64."""
     phases = np.exp(2j * np.pi * np.outer(offsets, np.fft.fftfreq(length)))
     if length % 2 == 0:
-        # the highest frequency stands for both its signs: a real picture stays real
+        # the Nyquist frequency represents both signs: a real image stays real
         phases[:, length // 2] = phases[:, length // 2].real
     return phases.astype(np.complex64)
 
 
 def _seamless(pictures: FloatMap, axis: int, margin: int) -> FloatMap:
-    """Pictures that go on, at the end of an axis, as their mirror image, which becomes that of their beginning."""
+    """Images extended at the end of an axis by their mirror image, blended into that of the start."""
     from scipy import fft
 
     length = pictures.shape[axis]
@@ -76,7 +76,7 @@ def _seamless(pictures: FloatMap, axis: int, margin: int) -> FloatMap:
     along = np.moveaxis(pictures, axis, -1)
     beyond_end = np.pad(along, ((0, 0), (0, 0), (0, extra)), mode="symmetric")[..., length:]
     before_begin = np.pad(along, ((0, 0), (0, 0), (extra, 0)), mode="symmetric")[..., :extra]
-    # both halves hold whole mirror images as far as samples reach
+    # both halves are unblended as far as samples reach
     step = np.linspace(-extra / 2, extra / 2, extra, dtype=np.float32) / np.float32(_SEAM / 2)
     share = np.float32(0.5) + np.float32(0.5) * np.sin(np.float32(np.pi / 2) * np.clip(step, -1, 1))
     joined = np.concatenate([along, beyond_end + share * (before_begin - beyond_end)], axis=-1)

@@ -1,11 +1,11 @@
 """The data costs of Williem, Park, Lee [1]_: constrained angular entropy and constrained adaptive defocus.
 
-Both are made to withstand occluders and noise. At the disparity of a pixel the views that see it show one colour, so
-the histogram of its angular patch is a single peak, of low entropy; what an occluder puts into the patch counts little,
-since each view counts as its colour resembles the pixel's own. And at that disparity the refocused light field is the
-reference view, if not all round an occluder, then in a part of the pixel's neighbourhood that lies on its own surface.
-The costs are added with equal weights, filtered with the reference view as guide [2]_, and the disparity is that of
-least energy (:mod:`sepi.compared.markov_field`).
+Both are robust to occluders and noise. At the correct disparity, the views that see a pixel show the same colour, so
+that the histogram of its angular patch has a single peak and low entropy; an occluder has little influence, since views
+are weighted by the similarity of their colour to the pixel's own. At that disparity the refocused light field also
+equals the reference view, near an occluder at least in a sub-patch on the pixel's own surface. The costs are added with
+equal weights, filtered with the reference view as guide [2]_, and the disparity minimises an energy
+(:mod:`sepi.compared.markov_field`).
 
 Equations, for pixel ``p`` of colour ``P(p)``, disparity ``d``, and the views' samples ``A_v``, ``v = 1..N``, of one
 channel of the light field sheared by ``d``:
@@ -18,19 +18,19 @@ channel of the light field sheared by ``d``:
   ``D(p, d) = min_c D_c``;
 - ``C = (E / mean_d E + D / mean_d D) / 4``, each slice of it filtered.
 
-What the publications leave open, or what could not be confirmed in them, and what was chosen here:
+Choices made here where the publications are not specific or could not be confirmed:
 
 - *the weights' width*: ``sigma`` is a tenth of full scale, one for both costs;
 - *the histogram*: one bin for each of 256 levels, each channel by itself;
 - *channels*: pooled half by the mean and half by the maximum, as in the authors' earlier method [3]_ to our knowledge;
-- *few alike*: an angular patch without any weight has the entropy of N different colours; views whose weight is below
-  a thousandth are left out;
+- *few similar views*: an angular patch without any weight has the entropy of N different colours; views with a weight
+  below a thousandth are left out;
 - *the neighbourhood*: 15 x 15 pixels in three by three sub-patches;
 - *the colour constraint on the defocus*: as above. A term ``gamma |R_d(q) - P(p)|`` with a small ``gamma`` lets thin
   occluders take the disparity of what they hide, whose sub-patches are sharp there;
-- *normalisation*: each cost by its mean over the candidates, at each pixel, but at least by a tenth of its mean over
-  all pixels, so that what has no texture does not decide as firmly as what has;
-- *labels*: 75, as the authors'; the result is refined between them by a parabola;
+- *normalisation*: each cost is divided by its mean over the candidates at the pixel, but at least by a tenth of its
+  mean over all pixels, so that textureless pixels have less influence;
+- *labels*: 75, as in the publication; the result is refined by a parabola;
 - *the minimiser*: message passing in place of graph cuts.
 
 References
@@ -61,7 +61,7 @@ CANDIDATES = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**
 """The authors' number, for light fields like theirs."""
 
 LEAST_MEAN = 0.1
-"""Part of a cost's mean over all pixels below which no pixel's mean is taken for its normalisation."""
+"""Lower bound of a pixel's normalisation, as a fraction of the cost's mean over all pixels."""
 
 LEAST_WEIGHT = 1e-3
 """Weight of a view below which it is left out."""
@@ -123,9 +123,9 @@ def entropies_and_responses(
     disparities : ndarray, shape (K,), float32
         Pixels per view step.
     sigma : float
-        Of the views' weights, colours in 0..1; infinite: the plain entropy.
+        Width of the views' weights, colours in 0..1; infinite: the plain entropy.
     progress : callable
-        Told of the first nine tenths.
+        Called for the first nine tenths.
 
     Returns
     -------
@@ -144,19 +144,19 @@ def entropies_and_responses(
 
 
 def level_weights(sigma: float) -> FloatMap:
-    """Weight of a view by the difference of its level to the pixel's, down to the least that counts; shape (n,)."""
+    """Weight of a view by its level's difference from the pixel's, down to the minimum weight; shape (n,)."""
     difference = np.arange(kernels.LEVELS) / (kernels.LEVELS - 1)
     weights = np.exp(-((difference / sigma) ** 2) / 2)
     return weights[weights >= LEAST_WEIGHT].astype(np.float32)
 
 
 def constrained_defocus(responses: FloatMap, guide: FloatMap, parameters: ConstrainedEntropyParameters) -> FloatMap:
-    """Least weighted response of the sub-patches round each pixel.
+    """Minimum weighted response over the sub-patches around each pixel.
 
     Parameters
     ----------
     responses : ndarray, shape (K, H, W), float32
-        Of single pixels.
+        Responses of single pixels.
     guide : ndarray, shape (H, W, 3), float32
         The reference view, colours in 0..1.
     parameters : ConstrainedEntropyParameters
@@ -173,7 +173,7 @@ def constrained_defocus(responses: FloatMap, guide: FloatMap, parameters: Constr
 
 
 def _normalised(costs: FloatMap) -> FloatMap:
-    """Costs ``(K, H, W)`` by their mean over the candidates."""
+    """Costs ``(K, H, W)`` divided by their mean over the candidates."""
     mean = costs.mean(axis=0)
     return np.asarray(costs / np.maximum(mean, max(LEAST_MEAN * float(mean.mean()), 1e-6)), np.float32)
 

@@ -1,4 +1,4 @@
-"""How much the colours of sheared views differ from those of the reference view."""
+"""Colour differences of sheared views from the reference view."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sepi.lightfield import FloatMap
 
 
 def colour_differences(sheared: FloatMap, reference: FloatMap) -> Iterator[FloatMap]:
-    """Mean absolute difference of the channels of each view (N, 3, H, W) from those of one (3, H, W); each (H, W)."""
+    """Mean absolute channel difference of each view (N, 3, H, W) from one view (3, H, W); each (H, W)."""
     for view in sheared:
         red, green, blue = cv2.absdiff(view, reference)
         yield (red + green + blue) * np.float32(1 / 3)

@@ -10,7 +10,7 @@ from sepi.stage import CostVolume
 
 
 def least_costs(volume: CostVolume) -> npt.NDArray[np.int64]:
-    """Number of the candidate of least cost of each pixel.
+    """Index of the candidate of least cost of each pixel.
 
     Parameters
     ----------
@@ -19,7 +19,7 @@ def least_costs(volume: CostVolume) -> npt.NDArray[np.int64]:
     Returns
     -------
     ndarray, shape (H, W), int64
-        Index into ``volume.disparities``; the first of equal ones.
+        Index into ``volume.disparities``; the first of equal costs.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def disparity_of(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
     Returns
     -------
     ndarray, shape (H, W), float32
-        Pixels per view step. A candidate at an end of the range, or one that is no minimum, stays as it is.
+        Pixels per view step. Candidates at an end of the range, or that are not a minimum, are not refined.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def disparity_of(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
 
 
 def distinctness(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
-    """How far the chosen candidates' costs lie below the mean over all: a confidence.
+    """Confidence: how far the chosen candidates' costs are below the mean over all candidates.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def distinctness(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
     Returns
     -------
     ndarray, shape (H, W), float32
-        As part of the mean, 0..1: 1 for a perfect match that stands alone, 0 where all candidates cost the same.
+        As a fraction of the mean, 0..1: 1 for a unique perfect match, 0 if all candidates have the same cost.
 
     Examples
     --------
@@ -93,7 +93,7 @@ def distinctness(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
     mean = volume.costs.mean(axis=0, dtype=np.float32)
     least = volume.costs.min(axis=0).astype(np.float32)
     chosen = np.take_along_axis(volume.costs, labels[None], axis=0)[0].astype(np.float32)
-    # costs need not begin at 0
+    # costs may be negative
     spread = np.maximum(mean - np.minimum(least, 0), np.float32(1e-6))
     return np.asarray(np.clip((mean - chosen) / spread, 0, 1), np.float32)
 
@@ -101,7 +101,7 @@ def distinctness(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
 def _costs_round(
     volume: CostVolume, labels: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Costs of the candidate before the chosen one, of that, and of the one after it; those at the ends repeat."""
+    """Costs of the chosen candidate and of its neighbours, which repeat at the ends."""
     last = len(volume.disparities) - 1
     numbers = (np.clip(labels + step, 0, last) for step in (-1, 0, 1))
     below, here, above = (

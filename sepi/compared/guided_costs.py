@@ -1,7 +1,7 @@
 """Filtering of the cost volume with the reference view as guide [1]_, a choice of the global optimisation.
 
-Each candidate's costs are smoothed by a guided filter (:mod:`sepi.compared.guided_filter`), then each pixel takes its
-least.
+Each candidate's costs are smoothed by a guided filter (:mod:`sepi.compared.guided_filter`); then each pixel selects the
+candidate of least cost.
 
 References
 ----------
@@ -32,7 +32,7 @@ def guided_costs(
 ) -> StageMaps:
     """Candidates of least filtered cost.
 
-    Builds on maps with a cost volume.
+    Requires maps with a cost volume.
 
     Returns
     -------

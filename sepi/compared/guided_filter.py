@@ -1,7 +1,7 @@
 """Guided filter with a colour guide [1]_: smoothing that keeps the edges of the guide.
 
-In each window the output is a linear function of the guide's colours, so an edge of the guide is one of the output, and
-each pixel takes the mean over all windows that hold it. The time does not depend on the window's size.
+In each window the output is a linear function of the guide's colours, which preserves the guide's edges, and each pixel
+is the mean over all windows that contain it. The run time does not depend on the window size.
 
 References
 ----------
@@ -17,7 +17,7 @@ from sepi.lightfield import FloatMap
 
 
 class GuidedFilter:
-    """A guided filter [1]_ with one guide for many maps, such as the costs of every candidate.
+    """A guided filter [1]_ that applies one guide to many maps, such as the costs of all candidates.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class GuidedFilter:
     radius : int
         The windows are ``2 radius + 1`` pixels wide.
     epsilon : float
-        Variance of colour within a window above which the window's edges are kept.
+        Colour variance within a window above which its edges are preserved.
 
     References
     ----------
@@ -34,7 +34,7 @@ class GuidedFilter:
 
     Examples
     --------
-    Noise is smoothed, and the step stays, since the guide has it too:
+    Noise is smoothed, and the step is preserved, since the guide has it too:
 
     >>> import numpy as np
     >>> from sepi.compared.guided_filter import GuidedFilter
@@ -52,7 +52,7 @@ class GuidedFilter:
         self._size = (2 * radius + 1, 2 * radius + 1)
         self._guide = guide.astype(np.float32)
         self._mean = self._box(self._guide)
-        # one-pass variances lose digits in single precision where the colours hardly vary: centred first
+        # centred first: one-pass variances of nearly constant colours lose precision in float32
         offset = self._guide.mean(axis=(0, 1), dtype=np.float64).astype(np.float32)
         self._guide -= offset
         self._mean -= offset

@@ -1,45 +1,45 @@
-"""The occlusion-aware vote cost [1]_: for each candidate disparity the views vote, and the most votes win.
+"""The occlusion-aware vote cost [1]_: views vote for candidate disparities, and the candidate with most votes wins.
 
-The mean difference of the views from the reference view, the usual cost, is small at the right candidate only where all
-views see the pixel; where something hides it from some of them, their colours are the occluder's, the mean is large at
-every candidate, and edges come out blurred or widened. Here a view has a vote for a candidate if what it shows there
-differs from the reference view by less than a small threshold. How far the others differ does not matter, so an
-occluder's colours are ignored without detecting edges or splitting the views into groups.
+The usual cost, the mean difference of the views from the reference view, is small at the correct candidate only if all
+views see the pixel. If some show an occluder instead, the mean is large at every candidate, and edges are blurred or
+widened. Here a view votes for a candidate if it differs from the reference view by less than a small threshold. The
+differences of the other views do not matter, so that an occluder's colours are ignored without detecting edges or
+splitting the views into groups.
 
 With the ``N`` views other than the reference view, ``delta_n(p, d)`` the difference of view ``n``, sheared by ``d``,
 from the reference view at pixel ``p``, and ``tau(p)`` the threshold of the pixel:
 
 - votes: ``V(p, d)`` = number of ``n`` with ``delta_n(p, d) <= tau(p)``;
-- mean difference of those that vote, as part of the threshold: ``M(p, d)`` = mean of ``delta_n(p, d) / tau(p)`` over
+- mean difference of the voting views, relative to the threshold: ``M(p, d)`` = mean of ``delta_n(p, d) / tau(p)`` over
   them, 0 without any;
-- cost: ``C(p, d) = 1 - (V(p, d) - M(p, d)) / N``, in 0..1. A vote more or less counts for more than any difference of
-  the means, which decide between candidates of equal votes and between the candidates' fractions;
-- threshold: ``tau(p) = max(tau_0, min over d of delta_(q N)(p, d))``, where ``delta_(m)`` is the ``m``-th least of the
-  differences: the least threshold by which a share ``q`` of the views agree on one candidate.
+- cost: ``C(p, d) = 1 - (V(p, d) - M(p, d)) / N``, in 0..1. One vote outweighs any difference of the means, which decide
+  between candidates with equal votes and determine the sub-candidate disparity;
+- threshold: ``tau(p) = max(tau_0, min over d of delta_(q N)(p, d))``, where ``delta_(m)`` is the ``m``-th smallest
+  difference: the least threshold with which a share ``q`` of the views agree on one candidate.
 
-The costs are smoothed by an edge-preserving filter, each pixel takes the candidate of least cost, a parabola through
-its neighbours' costs gives the fraction, and a weighted median takes out what is left of outliers. There is no global
-optimisation, so wide regions without texture stay as they are.
+The costs are smoothed by an edge-preserving filter, each pixel selects the candidate of least cost, a parabola through
+the neighbouring candidates' costs refines it, and a weighted median removes remaining outliers. There is no global
+optimisation, so that large textureless regions are not filled.
 
-What was confirmed of the publication is that the cost counts the views whose difference from the reference view is
-less than a small threshold, and selects by the number. Left open, or not confirmed, was the rest, and chosen here:
+Confirmed from the publication is only that the cost counts the views whose difference from the reference view is below
+a small threshold. Everything else was chosen here:
 
 - the difference: mean absolute difference of the three channels;
-- how the threshold adapts, as above. An occluder with a straight edge leaves a pixel at least half of the views, so
-  ``q`` is one half: the threshold comes from views that see the pixel, and is as wide as noise, the resampling of fine
-  texture, and changes of brightness make the better half of them differ. One wide threshold for all pixels lets wrong
-  candidates have all votes where texture is weak; one narrow for all leaves no votes where it is strong or the light
-  field noisy. ``tau_0`` is one step of 8-bit colours, below which differences say nothing;
-- how number and mean difference make one cost, as above;
-- 128 candidates, uniform over the disparity range; views resampled by cubic convolution. Beyond its border a view goes
-  on as it ends, and such a sample votes like an occluded one: by chance;
+- the adaptive threshold, as above. Behind an occluder with a straight edge, at least half of the views see a pixel, so
+  ``q`` is one half: the threshold comes from views that see the pixel and adapts to noise, resampling of fine texture
+  and brightness changes. With one wide threshold for all pixels, wrong candidates get all votes where texture is weak;
+  with a narrow one there are no votes where texture is strong or the light field noisy. ``tau_0`` is one step of 8-bit
+  colours, below which differences are meaningless;
+- the combination of the number of votes and the mean difference, as above;
+- 128 candidates, uniform over the disparity range; views resampled by cubic convolution. Views are extended by their
+  border pixels; samples there vote at random, like occluded ones;
 - the edge-preserving filter: the guided filter (:mod:`sepi.compared.guided_filter`), in windows of 15 pixels;
-- the fraction of a candidate, by a parabola through the filtered costs. With it most pixels are more precise than the
-  publication's figures say theirs are;
-- the last step: a weighted median, its weights by the colours of the reference view
+- the sub-candidate disparity, by a parabola through the filtered costs. It makes most pixels more precise than the
+  publication's results;
+- the last step: a weighted median with weights by the colours of the reference view
   (:mod:`sepi.compared.weighted_median`).
 
-Any set of views will do: one row, one column, positions off the grid.
+Any set of views works: one row, one column, positions off the grid.
 
 References
 ----------
@@ -65,11 +65,11 @@ from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps
 
 CANDIDATES = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=10**9)
-"""As many as fit a gigabyte at most, since the cost volume is kept."""
+"""Limited to a cost volume of 1 GB, since it is kept."""
 
 
 _ROWS = 64
-"""Of the views that are looked at together: the differences of all of them are kept."""
+"""Image rows processed at once, which limits the memory for the differences of all views."""
 
 
 class OavcParameters(CandidateParameters):
@@ -104,7 +104,7 @@ class GuidedMedianParameters(GuidedCostsParameters):
 def oavc(
     light_field: LightField, previous: StageMaps | None, parameters: OavcParameters, progress: Progress
 ) -> StageMaps:
-    """Candidates of most votes.
+    """Candidates with the most votes.
 
     Returns
     -------
@@ -123,7 +123,7 @@ def oavc(
 def vote_thresholds(
     views: ShearedViews, shape: tuple[int, int], disparities: FloatMap, parameters: OavcParameters, progress: Progress
 ) -> FloatMap:
-    """The least thresholds by which the asked share of the views agree on a candidate.
+    """Minimum thresholds with which the required share of the views agree on a candidate.
 
     Parameters
     ----------
@@ -150,24 +150,24 @@ def vote_thresholds(
 
 
 def lower_thresholds(sheared: FloatMap, reference: int, needed: int, thresholds: FloatMap) -> None:
-    """Lower thresholds (H, W) to those by which so many other views (N, 3, H, W) as needed agree with one of them."""
+    """Lower thresholds (H, W) to those with which ``needed`` other views (N, 3, H, W) agree with the reference."""
     for top in range(0, len(thresholds), _ROWS):
         rows = slice(top, top + _ROWS)
-        # the view agrees with itself, too
+        # the reference view agrees with itself too
         found = np.stack(list(colour_differences(sheared[:, :, rows], sheared[reference, :, rows])))
-        # few pixels: the thresholds soon are as low as most candidates leave them
+        # few pixels: most candidates do not lower the thresholds any more
         lower = np.count_nonzero(found < thresholds[rows], axis=0) > needed
         thresholds[rows][lower] = np.partition(found[:, lower], needed, axis=0)[needed]
 
 
 def vote_costs(sheared: FloatMap, reference: int, thresholds: FloatMap) -> FloatMap:
-    """What a candidate costs each pixel, ``1 - (V - M) / (N - 1)``, by the views (N, 3, H, W) sheared by it; (H, W)."""
+    """Cost ``1 - (V - M) / (N - 1)`` of a candidate, from the views (N, 3, H, W) sheared by it; shape (H, W)."""
     number, total = np.zeros((2, *thresholds.shape), np.float32)
     for difference in colour_differences(sheared, sheared[reference]):
         agrees = difference <= thresholds
         number += agrees
         total += difference * agrees
-    # the view itself has no vote
+    # the reference view has no vote
     number -= 1
     mean = total / (np.maximum(number, 1) * thresholds)
     return np.asarray(1 - (number - mean) / (len(sheared) - 1), np.float32)
@@ -202,7 +202,7 @@ def guided_median(
 ) -> StageMaps:
     """Candidates of least filtered cost, and the weighted median of their map.
 
-    Builds on maps with a cost volume.
+    Requires maps with a cost volume.
 
     Returns
     -------

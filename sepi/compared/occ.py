@@ -1,9 +1,9 @@
-"""Occlusion-aware depth from angular patches that edges split in two [1]_, a method that this one is compared with.
+"""Occlusion-aware depth from angular patches that are split along image edges [1]_, a compared method.
 
-Where nothing is hidden, all views sheared by a pixel's disparity show it in one colour. Beside an occluder only about
-half of the views do, and the line between those and the others runs as the occluder's edge runs in the picture. So the
-*angular patch* of a pixel near an edge is split along the edge, and its better half decides. Where occlusions are
-predicted from the result, the final map is smoothed less. Three stages:
+Without occlusion, all views sheared by a pixel's disparity show the same colour. Next to an occluder only about half of
+the views do, and the line that separates them from the others is parallel to the occluder's edge in the image. The
+*angular patch* of a pixel near an edge is therefore split along the edge, and the better half is used. The final map is
+smoothed less where occlusions are predicted. Three stages:
 
 *Initial*: for the views ``L_d`` sheared by candidate ``d``, with the mean ``m`` and the variance over the angular
 patch of pixel ``p``, the cost is correspondence and defocus, ``C_d + D_d``:
@@ -12,36 +12,35 @@ of least cost wins.
 
 *Occlusion*: pixels near Canny edges take the orientation of the nearest one. The two halves ``j`` of their patches
 have means ``m_j`` and variances ``V_j``. With the half ``i`` of smaller variance, ``C_d = V_i`` and
-``D_d = (m_i - L(p))^2``. A candidate beyond the occluder's depth shows the halves in reversed colours; those with
-``|m_1 - q_1| + |m_2 - q_2| > |m_2 - q_1| + |m_1 - q_2| + delta`` are left out, where ``q_1`` and ``q_2`` are the mean
-colours of the two sides in the reference view. Occlusions are predicted by three cues at the disparity ``d0`` that is
-found, its gradient, the ratio of the variances, and the difference of the means:
-``P = N(f(|grad d0|)) N(f(max(V_1 / V_2, V_2 / V_1))) N(f(|m_1 - m_2|))``, where ``f`` saturates and ``N`` takes the
-mean away and divides by the standard deviation.
+``D_d = (m_i - L(p))^2``. At candidates beyond the occluder's depth the halves' colours are swapped; candidates with
+``|m_1 - q_1| + |m_2 - q_2| > |m_2 - q_1| + |m_1 - q_2| + delta`` are rejected, where ``q_1`` and ``q_2`` are the mean
+colours of the two sides in the reference view. Occlusions are predicted by three cues at the resulting disparity
+``d0``: its gradient, the ratio of the variances, and the difference of the means:
+``P = N(f(|grad d0|)) N(f(max(V_1 / V_2, V_2 / V_1))) N(f(|m_1 - m_2|))``, where ``f`` saturates and ``N`` subtracts the
+mean and divides by the standard deviation.
 
 *Optimisation*: the energy ``sum_p (1 - exp(-(d(p) - d0(p))^2 / (2 (1 - c(p))^2))) + smoothness sum_pq S(d(p) - d(q)) /
 (|L(p) - L(q)| + k |P(p) - P(q)|)`` with the confidence ``c`` of the initial depth and a robust function ``S``.
 
-What the publication leaves open, or could not be confirmed, and what is chosen here:
+Choices made here where the publication is not specific or could not be confirmed:
 
-- The product of the cues, the energy's exact form and what the confidence is could not be confirmed. All weights and
-  tolerances were chosen here. That of ``P`` is small: ``P`` is large at occlusions, but also round islands of wrong
-  depths, and with more weight these stay.
+- The product of the cues, the energy's exact form and the confidence could not be confirmed. All weights and tolerances
+  were chosen here. The weight of ``P`` is small: ``P`` is large at occlusions, but also around islands of wrong depths,
+  which a larger weight would preserve.
 - Which pixels are near an edge: an occluder's edge moves by the difference of the disparities times the distance of the
-  view, so ``edge_reach`` is a part of the largest such shift.
-- The edge's orientation: that of the structure tensor round the edge pixel, to a sixteenth of half a turn.
-- Views on the dividing line belong to both halves, as the reference view does. A half that keeps fewer than a quarter
-  of the other views (a row of views along the edge, a reference view in a corner of the grid) tells nothing: there the
-  patch stays whole.
-- Colours: costs are means over the three channels. There is no window in the picture.
-- The side colours ``q`` come from a window as wide as the grid of views. Where all candidates are left out, the depth
-  of the whole patch stays.
+  view, so ``edge_reach`` is a fraction of the largest such shift.
+- The edge's orientation: that of the structure tensor at the edge pixel, in sixteen steps over half a turn.
+- Views on the dividing line belong to both halves, as does the reference view. If a half has fewer than a quarter of
+  the other views (a row of views along the edge, a reference view in a corner of the grid), the patch is not split.
+- Colours: costs are means over the three channels. There is no spatial window.
+- The side colours ``q`` come from a window as wide as the grid of views. Where all candidates are rejected, the depth
+  of the whole patch is kept.
 - Depth between candidates: the parabola through the least cost and its neighbours.
-- The gradient is divided by depth in the publication, which a disparity, of a plane linear in the picture, has no need
-  of: it is divided by the range, after a median of 3 x 3 pixels. ``f`` saturates at the 95th percentile. Of ``N`` the
-  part above 0 is taken, for two cues that deny an occlusion would otherwise affirm one. ``P`` is 0 away from edges.
-- The confidence is ``1 - least / mean`` of the costs; disparities in the energy are parts of the range. The colour
-  difference has a floor, for nothing may be divided by 0.
+- The publication divides the gradient by depth. Disparity does not need this, since that of a plane is linear in the
+  image: the gradient is divided by the range, after a median of 3 x 3 pixels. ``f`` saturates at the 95th percentile.
+  ``N`` is clipped at 0, since otherwise two negative cues would predict an occlusion. ``P`` is 0 away from edges.
+- The confidence is ``1 - least / mean`` of the costs; disparities in the energy are fractions of the range. The colour
+  difference has a lower bound, to avoid a division by 0.
 - ``S`` is the truncated linear function, and the energy is minimised by message passing instead of graph cuts
   (:mod:`sepi.compared.message_passing`). Occlusions are not predicted anew from the final map.
 
@@ -49,7 +48,7 @@ References
 ----------
 .. [1] Wang, Efros, Ramamoorthi: Occlusion-aware depth estimation using light-field cameras. ICCV 2015.
    doi:10.1109/ICCV.2015.398. Extended: Depth estimation with occlusion modeling using light-field cameras. IEEE TPAMI
-   38(11), 2016. doi:10.1109/TPAMI.2016.2515615. The extension's clusters of colours for several occluders are not here.
+   38(11), 2016. doi:10.1109/TPAMI.2016.2515615. Its colour clusters for several occluders are not implemented.
 """
 
 from __future__ import annotations
@@ -71,15 +70,15 @@ from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, require_previous
 
 CANDIDATES = CandidateRule(usual=101, finest=0.05, coarsest=0.5, volume_bytes=2**30)
-"""An eighth of a pixel or so in the farthest view of usual light fields."""
+"""About an eighth of a pixel in the outermost view of typical light fields."""
 
 LABELS = CandidateRule(usual=151, finest=0.02, coarsest=0.5, volume_bytes=2**28)
-"""Of the optimisation, which holds five numbers for each label and pixel."""
+"""Labels of the optimisation, which stores five numbers per label and pixel."""
 
 SATURATION = 95
 """Percentile at which a cue saturates."""
 
-# of the variances, so that the ratio of two that are nearly 0 tells nothing
+# added to variances, so that the ratio of two near 0 is about 1
 _LEAST_VARIANCE = np.float32(1e-5)
 
 
@@ -134,7 +133,7 @@ class OccFieldParameters(CandidateParameters):
 
 
 class Found(NamedTuple):
-    """Disparity and confidence by costs ``(K, ...)``; both of shape (...), float32."""
+    """Disparity and confidence from costs ``(K, ...)``; both of shape (...), float32."""
 
     disparity: FloatMap
     confidence: FloatMap
@@ -163,13 +162,13 @@ def occ_split(
 ) -> StageMaps:
     """Depth of pixels near edges from the better halves of their angular patches, and predicted occlusions.
 
-    Builds on depth from whole patches.
+    Requires depth from whole patches.
 
     Returns
     -------
     StageMaps
-        Adds ``occlusion_candidates``, bool, pixels whose patches are split, and ``predicted_occlusion``, float32, 0 or
-        more.
+        Adds ``occlusion_candidates``, bool, pixels whose patches are split, and ``predicted_occlusion``, float32, not
+        negative.
     """
     before = require_previous(previous)
     view = light_field.reference_view
@@ -191,7 +190,7 @@ def occ_field(
 ) -> StageMaps:
     """Disparities of least energy.
 
-    Takes the map ``predicted_occlusion`` where there is one.
+    Uses the map ``predicted_occlusion`` if there is one.
 
     Returns
     -------
@@ -211,18 +210,18 @@ def occ_field(
 
 
 def least_cost(disparities: FloatMap, costs: FloatMap) -> Found:
-    """Candidates of least cost, refined by a parabola, and how far their costs lie below the mean.
+    """Candidates of least cost, refined by a parabola, and how far their costs are below the mean.
 
     Parameters
     ----------
     disparities : ndarray, shape (K,), float32
     costs : ndarray, shape (K, ...), float32
-        Infinite for a candidate that is left out.
+        Infinite for a rejected candidate.
 
     Returns
     -------
     Found
-        No confidence where no candidate is left.
+        The confidence is 0 where all candidates are rejected.
     """
     last = len(disparities) - 1
     label = np.argmin(costs, axis=0)
@@ -255,13 +254,13 @@ def split_costs(
     edges : Edges
         With P pixels.
     tolerance : float
-        By how much the halves' colours may look reversed.
+        Tolerance of the test for swapped colours of the halves.
     progress : callable
 
     Returns
     -------
     costs : ndarray, shape (K, P), float32
-        Infinite where the halves' colours are reversed.
+        Infinite where the halves' colours are swapped.
     cues : ndarray, shape (P, 3), float32
         At the least cost: variances of the two halves, and the difference of their means; 0 where none is finite.
     """
@@ -280,10 +279,10 @@ def split_costs(
 
 
 def whole_patch_costs(sheared: FloatMap, reference: FloatMap) -> FloatMap:
-    """Variance of angular patches (N, 3, H, W), and how far their mean lies from a view (3, H, W); (H, W), float32."""
+    """Variance of angular patches (N, 3, H, W) plus squared distance of their mean from a view (3, H, W); (H, W)."""
     total, squares = np.zeros((2, *reference.shape), np.float32)
     for view in sheared:
-        # counted from the reference's colour, so that the squares keep their digits
+        # relative to the reference's colour, so that the squares keep their precision
         difference = view - reference
         total += difference
         squares += np.square(difference)
@@ -295,7 +294,7 @@ def whole_patch_costs(sheared: FloatMap, reference: FloatMap) -> FloatMap:
 def split_patch_costs(
     sheared: FloatMap, reference: FloatMap, edges: Edges, halves: BoolMap, beside: FloatMap, tolerance: float
 ) -> tuple[FloatMap, FloatMap]:
-    """Costs (P,) and cues (P, 3) of one candidate, as of :func:`split_costs`, by its sheared views (N, 3, H, W)."""
+    """Costs (P,) and cues (P, 3) as of :func:`split_costs`, for one candidate's sheared views (N, 3, H, W)."""
     count = len(edges.places)
     means, variances = np.empty((count, 2, 3), np.float32), np.empty((count, 2), np.float32)
     kernels.moments_of_halves(sheared, reference, edges.places, halves, means, variances)
@@ -307,25 +306,25 @@ def split_patch_costs(
 
 
 def slope(disparity: FloatMap) -> FloatMap:
-    """Length of the gradient of a disparity map without its isolated outliers, per pixel; shape (H, W), float32."""
+    """Gradient magnitude of a disparity map without isolated outliers, per pixel; shape (H, W), float32."""
     down, across = np.gradient(cv2.medianBlur(disparity, 3))
     return np.asarray(np.hypot(down, across), np.float32)
 
 
 def predicted_occlusion(slopes: FloatMap, cues: FloatMap) -> FloatMap:
-    """How much speaks for an occlusion at each pixel whose patch was split.
+    """Occlusion score of each pixel with a split patch.
 
     Parameters
     ----------
     slopes : ndarray, shape (P,), float32
-        Of the disparity, part of the range per pixel.
+        Slopes of the disparity, fraction of the range per pixel.
     cues : ndarray, shape (P, 3), float32
         Variances of the two halves, and the difference of their means.
 
     Returns
     -------
     ndarray, shape (P,), float32
-        0 or more.
+        Not negative.
     """
     one, other = cues[:, 0] + _LEAST_VARIANCE, cues[:, 1] + _LEAST_VARIANCE
     ratio = np.maximum(one, other) / np.minimum(one, other)
@@ -333,9 +332,9 @@ def predicted_occlusion(slopes: FloatMap, cues: FloatMap) -> FloatMap:
 
 
 def data_costs(before: StageMaps, labels: FloatMap) -> CostVolume:
-    """What each disparity costs: little near the one found before, and that the more narrowly the surer it is."""
+    """Costs of the disparities: low near the initial one, in a range that narrows with its confidence."""
     width = labels[-1] - labels[0]
-    # a tolerance below the distance of the labels would leave pixels between two of them without any
+    # a tolerance below the label spacing would give pixels between two labels no suitable one
     tolerance = np.maximum(1 - before.confidence, np.float32(1 / (len(labels) - 1)))
     costs = np.empty((len(labels), *before.disparity.shape), np.float16)
     for k, label in enumerate(labels):
@@ -346,7 +345,7 @@ def data_costs(before: StageMaps, labels: FloatMap) -> CostVolume:
 def smoothness_weights(
     view: FloatMap, predicted: FloatMap, parameters: OccFieldParameters
 ) -> tuple[FloatMap, FloatMap]:
-    """Cost of a jump to the next pixel in the row, and in the column; (H, W), float32, 0 at the last ones."""
+    """Weights of jumps to the next pixel in the row and in the column; (H, W), float32, 0 at the last ones."""
     across, down = (np.zeros(predicted.shape, np.float32) for _ in range(2))
     for axis, weights in ((0, down[:-1]), (1, across[:, :-1])):
         colours = np.abs(np.diff(view, axis=axis)).mean(axis=2)
@@ -357,7 +356,7 @@ def smoothness_weights(
 
 
 def _above_mean(cue: FloatMap) -> FloatMap:
-    """A cue, saturated, by how many standard deviations it exceeds its mean."""
+    """Standard deviations by which a saturated cue exceeds its mean; not negative."""
     if not cue.size:
         return cue
     saturated = np.minimum(cue, np.percentile(cue, SATURATION))

@@ -1,4 +1,4 @@
-"""How an edge of the picture splits the angular patches beside it (see :mod:`sepi.compared.occ`)."""
+"""Splitting of angular patches along nearby image edges (see :mod:`sepi.compared.occ`)."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ ORIENTATIONS = 16
 """Orientations of edges over half a turn."""
 
 LEAST_SHARE = 0.25
-"""Part of the other views that a half must hold."""
+"""Minimum share of the other views in each half."""
 
 ON_THE_LINE = 1 / 8
-"""Distance from the dividing line within which a view stands on it, part of the distance of the farthest view."""
+"""Distance within which a view counts as on the dividing line, as a fraction of the farthest view's distance."""
 
 
 class Edges(NamedTuple):
@@ -28,7 +28,7 @@ class Edges(NamedTuple):
     ----------
     near : ndarray, shape (H, W), bool
     places : ndarray, shape (P, 3), int64
-        Row, column and number of the orientation of each; the normal of the edge has ``number pi / ORIENTATIONS`` from
+        Row, column and index of the orientation; the edge's normal has the angle ``index pi / ORIENTATIONS`` from
         ``+x`` towards ``+y``.
     """
 
@@ -37,7 +37,7 @@ class Edges(NamedTuple):
 
 
 def edges_to_split(reference_view: FloatMap, parameters: CannyParameters, reach: float) -> Edges:
-    """Pixels within reach of a Canny edge, in pixels, each with the orientation of the nearest one."""
+    """Pixels within ``reach`` pixels of a Canny edge, each with the orientation of the nearest one."""
     lines = canny_edges(reference_view, parameters)
     turns = np.round(edge_angle(reference_view, parameters) * (ORIENTATIONS / np.pi)).astype(np.int64) % ORIENTATIONS
     if not lines.any():
@@ -52,17 +52,17 @@ def edges_to_split(reference_view: FloatMap, parameters: CannyParameters, reach:
 
 
 def halves_of_views(baselines: npt.NDArray[np.float64]) -> BoolMap:
-    """Views of the two halves into which an edge of each orientation splits the angular patch.
+    """The two halves of views into which an edge of each orientation splits the angular patch.
 
     Parameters
     ----------
     baselines : ndarray, shape (N, 2), float64
-        Of the views, down and across from the reference view, in view steps.
+        Row and column offset of each view from the reference view, in view steps.
 
     Returns
     -------
     ndarray, shape (ORIENTATIONS, 2, N), bool
-        The second half lies on the side to which the edge's normal points.
+        The second half is on the side to which the edge's normal points.
     """
     along = _normals() @ baselines.T
     line = ON_THE_LINE * np.abs(baselines).max(initial=0)
@@ -73,9 +73,9 @@ def halves_of_views(baselines: npt.NDArray[np.float64]) -> BoolMap:
 
 
 def colours_beside(reference_view: FloatMap, edges: Edges, radius: int) -> FloatMap:
-    """Mean colours of the two sides of the edge in a window round each pixel; shape (P, 2, 3), float32.
+    """Mean colours of the two sides of the edge in a window around each pixel; shape (P, 2, 3), float32.
 
-    The second side is that to which the edge's normal points.
+    The edge's normal points to the second side.
     """
     y, x = np.mgrid[-radius : radius + 1, -radius : radius + 1]
     colours = np.zeros((len(edges.places), 2, 3), np.float32)
