@@ -1,8 +1,8 @@
-"""The multi-label optimisation that several compared methods end with, a choice of the global optimisation.
+"""The final multi-label optimisation of several compared methods, a choice of the global optimisation.
 
-``markov_field`` takes the cost volume of the stage before and gives each pixel the candidate that minimises data costs
-and truncated linear smoothness, weaker across edges of the reference view. The methods' authors minimise such energies
-by graph cuts; here it is message passing (:mod:`sepi.compared.message_passing`, which says why).
+``markov_field`` takes the previous stage's cost volume and assigns each pixel the candidate that minimises data costs
+and truncated linear smoothness, which is weaker across edges of the reference view. The methods' authors use graph
+cuts; this implementation uses message passing (for the reason, see :mod:`sepi.compared.message_passing`).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def markov_field(
 ) -> StageMaps:
     """Candidates of least energy.
 
-    Builds on maps with a cost volume.
+    Requires maps with a cost volume.
 
     Returns
     -------

@@ -1,10 +1,10 @@
 """Labels of least energy on the pixel grid by sequential tree-reweighted message passing (TRW-S) [1]_.
 
-The energy is ``sum_p cost(p, l_p) + sum_pq w_pq min(|l_p - l_q|, truncation)`` over pixels and 4-connected neighbours:
-that of the graph cuts by which published methods regularise their cost volumes. TRW-S reaches energies as low as alpha
-expansion's or lower on such grids (compared in [2]_), tells a lower bound, has no order of labels that the result
-depends on, and needs no library: the maintained max-flow packages are either under the GPL, which would bind this
-package's users, or too slow for a graph of a million edges, a hundred times over.
+The energy is ``sum_p cost(p, l_p) + sum_pq w_pq min(|l_p - l_q|, truncation)`` over pixels and 4-connected neighbours,
+which published methods minimise by graph cuts to regularise their cost volumes. On such grids, the energies of TRW-S
+are as low as those of alpha expansion or lower (compared in [2]_); it also gives a lower bound, does not depend on the
+order of labels, and needs no library. The maintained max-flow packages are either under the GPL, which would bind this
+package's users, or too slow for a hundred graphs of a million edges.
 
 References
 ----------
@@ -36,7 +36,7 @@ def contrast_weights(guide: FloatMap, scale: float) -> tuple[FloatMap, FloatMap]
     Returns
     -------
     across, down : ndarray, shape (H, W), float32
-        Of the edge to the next pixel in the row, and in the column; 0 at the last ones.
+        Weights of the edges to the next pixel in the row and in the column; 0 at the last ones.
     """
     across, down = (np.zeros(guide.shape[:2], np.float32) for _ in range(2))
     across[:, :-1] = np.exp(-np.abs(np.diff(guide, axis=1)).mean(axis=2) / np.float32(scale))
@@ -56,9 +56,9 @@ def labels_of_least_energy(
     across, down : ndarray, shape (H, W), float32
         Weights of the edges to the next pixel in the row and in the column, not negative.
     truncation : float
-        Difference of labels from which a further one costs nothing more.
+        Label difference above which the cost is constant.
     iterations : int
-        Passes forth and back; ten or so are enough for maps.
+        Forward and backward passes; about ten are enough for maps.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""The compared methods: their variants, and in which module each of their choices of the stages lies.
+"""The compared methods: their variants, and the modules of their choices.
 
-A method's module defines ``CHOICES``, for each stage the choices that it adds. It is imported when one of them is asked
-for, so that a job loads the method that it runs and no other.
+A method's module defines ``CHOICES``: for each stage, the choices that it adds. It is imported when one of them is
+requested, so that a job loads only the method that it runs.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ METHODS: dict[str, dict[str, Any]] = {
     "acc": {"initial": "acc", **_COSTS_ALONE, "optimize": "confident_labels"},
     "occ": {"initial": "occ", "occlusion": "occ", "textureless": "none", "optimize": "occ"},
 }
-"""Variant to its choices, as :func:`sepi.variants.variant_from` reads them, in the order of the paper's tables."""
+"""Variant to its choices, in the format of :func:`sepi.variants.variant_from` and the order of the paper's tables."""
 
 LEARNED: dict[str, dict[str, Any]] = {"onnx": {"initial": "onnx", **_COSTS_ALONE, "optimize": "none"}}
-"""Variants of methods that need what the package does not bring: no report has them unless asked to."""
+"""Variants that need files which are not part of the package; reports include them only on request."""
 
 MODULES: dict[str, dict[str, str]] = {
     "initial": {
@@ -57,14 +57,14 @@ MODULES: dict[str, dict[str, str]] = {
 
 
 class StageChoices(MutableMapping[str, Choice]):
-    """The choices of a stage by name: its own, and the compared methods', whose modules are imported when looked up.
+    """The choices of a stage by name: its own and the compared methods', whose modules are imported on access.
 
     Parameters
     ----------
     stage : str
         Name of the stage.
     own : mapping of str to Choice
-        The stage's own choices; one that hands maps on is listed last.
+        The stage's own choices; one that passes maps on unchanged is listed last.
     """
 
     def __init__(self, stage: str, own: Mapping[str, Choice]) -> None:

@@ -1,43 +1,43 @@
 """The fast method of Mishiba [1]_: one-bit features of few views, interpolated costs, weighted medians.
 
-``mishiba``, a choice of the initial depth, spares computation three times. Each view becomes a map of bits, so that all
-pairs of views are compared by counting; few views, chosen before any scene is seen, stand for all; and costs are
-computed for few pixels and candidates and interpolated between. ``median_descent``, a choice of the global
-optimisation, minimises absolute differences to these disparities and between neighbours by a weighted median filter.
+``mishiba``, a choice of the initial depth, saves computation in three ways. Each view becomes a bit map, so that all
+pairs of views are compared by counting; only a few views are used, selected independently of the scene; and costs are
+computed for few pixels and candidates and interpolated. ``median_descent``, a choice of the global optimisation,
+minimises absolute differences to these disparities and between neighbours by a weighted median filter.
 
 Equations, with views ``I_i`` in grey, ``i = 1..n``, and baselines ``b_i``:
 
 - bit of view ``i`` at ``x``: ``f_i(x) = 1`` where ``(I_i - G * I_i)(x) > 0``, else 0, with a Gaussian ``G``;
 - cost of candidate ``d`` at the reference pixel ``p``: ``C(p, d) = sum over i < j of |f_i - f_j|``, the bits taken at
-  ``p - d b``. With ``m`` ones among the ``n`` bits that is ``m (n - m)``: one count takes the place of
-  ``n (n - 1) / 2`` comparisons. Here it is divided by its largest value;
+  ``p - d b``. With ``m`` ones among the ``n`` bits it is ``m (n - m)``: one count replaces ``n (n - 1) / 2``
+  comparisons. Here it is divided by its largest value;
 - interpolated costs: on a lattice of pixels, costs are fitted as linear functions of the reference view's colours in
   each window (guided filter); these functions, not the costs, are interpolated to all pixels;
 - disparity: least cost, and the parabola through it and its neighbours; confidence ``c = 1 - least / mean`` over the
   candidates;
 - energy of the refinement, with the first disparities ``D0``:
   ``E(D) = sum over p of c_p |D_p - D0_p| + sum over pairs of w_pq |D_p - D_q|`` with
-  ``w_pq = s / N exp(-|I_p - I_q|^2 / 2 sigma^2)``, ``N`` the neighbours of a pixel. With all other pixels held, the
+  ``w_pq = s / N exp(-|I_p - I_q|^2 / 2 sigma^2)``, ``N`` the neighbours of a pixel. With all other pixels fixed, the
   best ``D_p`` is the weighted median of ``D0_p`` (weight ``c_p``) and of its neighbours ``D_q`` (weight ``w_pq``).
-  All pixels take that step at once, which approximates what graph cuts would find.
+  All pixels are updated at once, which approximates the result of graph cuts.
 
 The publication's abstract states the one-bit feature, the sum over all combinations of views by a fast algorithm, the
-choice of views offline, the interpolation of the cost volume, the energy of l1 data and smoothness terms, and its
-approximate solver by a fast weighted median filter. What follows was open, since no more could be confirmed:
+offline selection of views, the interpolation of the cost volume, the energy of l1 data and smoothness terms, and its
+approximate solver by a fast weighted median filter. No more could be confirmed; the following was chosen here:
 
-- the feature: the sign of the difference to a Gaussian mean, which no view's own brightness changes. It is
-  taken after the resampling (cubic convolution), so that shifts need not be whole pixels. Views that show a pixel
-  beyond their border have no bit there;
+- the feature: the sign of the difference to a Gaussian mean, which does not depend on a view's brightness. It is taken
+  after resampling (cubic convolution), so that shifts need not be whole pixels. Views have no bit for pixels beyond
+  their border;
 - the views: the row and the column of the reference view. Their pairs have baselines in every direction, and an
-  occluder hides fewer of them than of all views. Where only the reference view and at most one other stand there, all
-  views are used; of a single row or column of views, all are;
-- the interpolation: between pixels with colours as guide, as a fast guided filter does [2]_, which is the aggregation
-  of the costs as well; between candidates by the parabola;
+  occluder hides a smaller share of them than of all views. All views are used if only the reference view and at most
+  one other are there, and for a single row or column of views;
+- the interpolation: between pixels with colours as guide, as in a fast guided filter [2]_, which also aggregates the
+  costs; between candidates by the parabola;
 - the candidates: one for each 0.3 pixels in the farthest view;
-- the energy: confidences as data weights, the window and the weights of neighbours. Noise of the reference view widens
-  the colour distance, as elsewhere in this package;
+- the energy: confidences as data weights, the window and the weights of neighbours. The scale of colour distances
+  increases with the noise of the reference view, as elsewhere in this package;
 - the fast weighted median: weights and disparities are integers, so that bisection finds it exactly, without sorting
-  and with the same result for any number of threads.
+  and independently of the number of threads.
 
 References
 ----------
@@ -62,25 +62,25 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.stage import Choice, Parameters, Progress, StageMaps, require_previous
 
 CANDIDATES = CandidateRule(usual=64, finest=0.3, coarsest=0.3)
-"""One for each 0.3 pixels in the farthest view: costs have a minimum of about a pixel's width there."""
+"""Spacing of 0.3 pixels in the farthest view, where a minimum of the costs is about one pixel wide."""
 
 GREY = np.array([0.299, 0.587, 0.114], np.float32)
-"""Shares of red, green and blue in the grey value."""
+"""Weights of red, green and blue in the grey value."""
 
 TIE = 1e-5
-"""Difference to the mean up to which a pixel is as bright as the mean but for rounding, grey values 0..1."""
+"""Tolerance for rounding errors in the comparison with the mean, grey values 0..1."""
 
 NO_COST = 1e-3
-"""What costs are raised by in the confidence, so that a surface without texture has none."""
+"""Added to costs in the confidence, so that it is 0 for textureless surfaces."""
 
 LEVELS = 1 << 16
-"""Integers over the range of the disparities in the medians."""
+"""Number of integer levels of disparity in the medians."""
 
 FULL_WEIGHT = 1 << 20
-"""Integer that stands for a weight of 1; a window's weights add up to less than 2^31."""
+"""Integer for a weight of 1; a window's weights sum to less than 2^31."""
 
 TABLE_ENTRIES = 512
-"""Of the weights by colour, up to a distance of four times the scale, where they are next to nothing."""
+"""Entries of the table of weights by colour distance, up to four times the scale, where they are negligible."""
 
 
 class MishibaParameters(CandidateParameters):
@@ -114,7 +114,7 @@ class MedianDescentParameters(Parameters):
 def mishiba(
     light_field: LightField, previous: StageMaps | None, parameters: MishibaParameters, progress: Progress
 ) -> StageMaps:
-    """Disparities of least cost of the one-bit features of few views.
+    """Disparities of least cost from one-bit features of a few views.
 
     Returns
     -------
@@ -130,14 +130,14 @@ def mishiba(
 def median_descent(
     light_field: LightField, previous: StageMaps | None, parameters: MedianDescentParameters, progress: Progress
 ) -> StageMaps:
-    """Disparities of little energy of absolute differences.
+    """Disparities of approximately least energy of absolute differences.
 
-    The confidence of the maps before weighs their disparity.
+    The disparities of the previous maps are weighted by their confidence.
 
     Returns
     -------
     StageMaps
-        With the confidence as it was, without a cost volume.
+        With unchanged confidence, without a cost volume.
     """
     before = require_previous(previous)
     guide = light_field.reference_view
@@ -157,7 +157,7 @@ def median_descent(
 
 
 def selected_views(light_field: LightField) -> BoolMap:
-    """The views in the row and in the column of the reference view; all where these are hardly any; shape (T, S)."""
+    """Views in the row and column of the reference view, or all views if these are too few; shape (T, S)."""
     t, s = light_field.reference_position
     cross = np.zeros(light_field.grid, bool)
     cross[t] = cross[:, s] = True
@@ -166,7 +166,7 @@ def selected_views(light_field: LightField) -> BoolMap:
 
 
 def details(light_field: LightField, views: BoolMap, sigma: float) -> FloatMap:
-    """Grey values less their Gaussian mean, whose signs are the features; shape (N, H, W), float32."""
+    """Grey values minus their Gaussian mean, whose signs are the features; shape (N, H, W), float32."""
     result = np.empty((int(views.sum()), *light_field.shape), np.float32)
     for n, (t, s) in enumerate(np.argwhere(views)):
         grey = as_unit_float(light_field.rgb_views[t, s]) @ GREY
@@ -188,14 +188,14 @@ def lattice_costs(light_field: LightField, disparities: FloatMap, parameters: Mi
 def least_interpolated(
     guide: FloatMap, costs: FloatMap, parameters: MishibaParameters, progress: Progress
 ) -> tuple[npt.NDArray[np.int64], FloatMap]:
-    """Candidates of least interpolated cost, and what ``keep_least`` (``kernels/mishiba.cpp``) keeps.
+    """Candidates of least interpolated cost, and the output of ``keep_least`` (``kernels/mishiba.cpp``).
 
     Parameters
     ----------
     guide : ndarray, shape (H, W, 3), float32
         Colours in 0..1.
     costs : ndarray, shape (K, h, w), float32
-        On the lattice.
+        Costs on the lattice.
     parameters : MishibaParameters
     progress : callable
 
@@ -215,34 +215,34 @@ def least_interpolated(
 
 
 def refined(disparities: FloatMap, labels: npt.NDArray[np.int64], kept: FloatMap) -> tuple[FloatMap, FloatMap]:
-    """Disparity by the parabola round the least cost, and confidence; each (H, W), float32.
+    """Disparity by the parabola around the least cost, and confidence; each (H, W), float32.
 
     Parameters
     ----------
     disparities : ndarray, shape (K,), float32
     labels, kept : ndarray
-        Of :func:`least_interpolated`.
+        Returned by :func:`least_interpolated`.
     """
     least, below, above, _, total = np.moveaxis(kept, 2, 0)
     curvature = below - 2 * least + above
     inner = (labels > 0) & (labels < len(disparities) - 1) & (curvature > 0)
     offset = np.where(inner, (below - above) / (2 * np.where(inner, curvature, 1)), 0)
     disparity = disparities[labels] + (disparities[1] - disparities[0]) * offset
-    # fitted costs may fall a little below 0
+    # fitted costs may be slightly negative
     least, mean = np.maximum(least, 0) + NO_COST, np.maximum(total / len(disparities), 0) + NO_COST
     confidence = np.clip(1 - least / mean, 0, 1)
     return disparity.astype(np.float32), confidence.astype(np.float32)
 
 
 class LatticeFit(GuidedFilter):
-    """A guided filter that hands out its linear functions of the guide's colours, to be used between its pixels."""
+    """A guided filter that returns its linear functions of the guide's colours, for use between its pixels."""
 
     def __init__(self, guide: FloatMap, radius: int, epsilon: float) -> None:
         super().__init__(guide, radius, epsilon)
         self._origin = guide[0, 0] - self._guide[0, 0]
 
     def functions(self, values: FloatMap) -> tuple[FloatMap, FloatMap]:
-        """Slopes (H, W, 3) and constants (H, W), float32: the filtered values are slopes times colours + constants."""
+        """Slopes (H, W, 3) and constants (H, W), float32; filtered values are slopes times colours + constants."""
         mean = self._box(values)
         covariance = self._box(self._guide * values[..., None]) - self._mean * mean[..., None]
         slopes = np.einsum("hwij,hwj->hwi", self._inverse, covariance)
@@ -252,13 +252,13 @@ class LatticeFit(GuidedFilter):
 
 
 def neighbour_weights(parameters: MedianDescentParameters, noise: float) -> tuple[npt.NDArray[np.int32], float]:
-    """Weight of a neighbour by squared colour distance, as integers, and the width of an entry.
+    """Table of integer weights by squared colour distance, and the width of an entry.
 
     Parameters
     ----------
     parameters : MedianDescentParameters
     noise : float
-        Expected squared colour distance by noise alone.
+        Expected squared colour distance due to noise.
 
     Returns
     -------

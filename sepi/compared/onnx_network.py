@@ -2,7 +2,7 @@
 
 ``onnx`` runs any network that takes views of a light field and gives the disparity of its reference view, on the CPU by
 ONNX Runtime [1]_. The package brings no network and no weights; docs/reproduce/compared.md says how to export one from
-PyTorch or TensorFlow. What networks expect differs, so the parameters say it:
+PyTorch or TensorFlow. The parameters describe the inputs and outputs of the network:
 
 - ``inputs``: for each input of the network, in its order, which views it takes and how their axes lie, as
   ``"VIEWS: AXES"``. Views are ``all``, ``row`` and ``column`` (through the reference view), ``diagonal`` (down to the
@@ -13,9 +13,9 @@ PyTorch or TensorFlow. What networks expect differs, so the parameters say it:
   views that the network counts from the other end;
 - ``disparity_scale`` and ``disparity_offset`` that make pixels per view step, nearer positive, of its output;
 - ``margin``: by how many pixels the output is smaller on each side (networks without padding); ``tile`` and
-  ``overlap``: a large picture goes through the network in pieces.
+  ``overlap``: for processing a large image in tiles.
 
-A network tells no confidence: that of every pixel is 1.
+Networks give no confidence: it is 1 at every pixel.
 
 References
 ----------
@@ -52,7 +52,7 @@ _GREY = np.array([0.299, 0.587, 0.114], np.float32)
 
 
 class OnnxParameters(Parameters):
-    """What a network is, and what it expects."""
+    """The network's file, inputs and outputs."""
 
     model: str | None = Field(None, description="path of the ONNX file; it must be given")
     inputs: tuple[str, ...] = Field(
@@ -101,8 +101,8 @@ def onnx(
     Raises
     ------
     SepiError
-        If ONNX Runtime is not installed, the file is not a network, or the network does not take what it is given or
-        gives another shape than the parameters say.
+        If ONNX Runtime is not installed, the file is not a network, or its inputs or outputs differ from the
+        parameters.
     """
     session = _session(parameters)
     views, reference = _chosen_views(light_field, parameters)
@@ -114,7 +114,7 @@ def onnx(
         disparity[target] = _run(session, given, window, parameters)[inner]
         progress(number / len(pieces))
     disparity = disparity * np.float32(parameters.disparity_scale) + np.float32(parameters.disparity_offset)
-    # a network counts from one column of views to the next
+    # the network's view step is between columns of views
     disparity /= np.float32(grid_steps(light_field)[1])
     return StageMaps(disparity, np.ones_like(disparity))
 
@@ -132,7 +132,7 @@ def _session(parameters: OnnxParameters) -> onnxruntime.InferenceSession:
     options = onnxruntime.SessionOptions()
     options.use_deterministic_compute = True
     options.intra_op_num_threads = thread_count()
-    # errors are told as exceptions
+    # errors are raised as exceptions
     options.log_severity_level = 4
     try:
         return onnxruntime.InferenceSession(parameters.model, options, providers=["CPUExecutionProvider"])
@@ -141,12 +141,12 @@ def _session(parameters: OnnxParameters) -> onnxruntime.InferenceSession:
 
 
 def _chosen_views(light_field: LightField, parameters: OnnxParameters) -> tuple[FloatMap, tuple[int, int]]:
-    """The views that the network takes, as it takes their colours, (t, s, H, W, c) float32, and which is the reference.
+    """The network's views in its colour scale, (t, s, H, W, c) float32, and the index of the reference view.
 
     Raises
     ------
     SepiError
-        If some of them are not there.
+        If some views are missing.
     """
     rows, columns = parameters.grid or light_field.grid
     t, s = light_field.reference_position
@@ -176,9 +176,9 @@ _Part = tuple[slice, slice]
 
 
 def _pieces(height: int, width: int, parameters: OnnxParameters) -> Iterator[tuple[_Window, _Part, _Part]]:
-    """Pieces that cover the picture: rows and columns of views, the part of the output kept, and where it goes.
+    """Tiles that cover the image: rows and columns of views, the part of the output that is kept, and its position.
 
-    All have one size, since a network may have been exported for one; beyond its border a view goes on as it ends.
+    All have the same size, since a network may have a fixed input size; views are extended by their border pixels.
     """
     margin = parameters.margin
     for (rows, inner_y, to_y), (columns, inner_x, to_x) in (
@@ -192,7 +192,7 @@ def _pieces(height: int, width: int, parameters: OnnxParameters) -> Iterator[tup
 def _spans(
     length: int, margin: int, tile: int | None, overlap: int
 ) -> Iterator[tuple[npt.NDArray[np.intp], slice, slice]]:
-    """The pieces along one axis: indices of the views' pixels, the part of the output kept, and where it goes."""
+    """Tiles along one axis: indices of the views' pixels, the part of the output that is kept, and its position."""
     if tile is None:
         yield np.clip(np.arange(-margin, length + margin), 0, length - 1), np.s_[:length], np.s_[:length]
         return
@@ -236,12 +236,12 @@ def _run(
 
 
 def _arrays(views: FloatMap, reference: tuple[int, int], inputs: tuple[str, ...]) -> list[FloatMap]:
-    """What each input of the network is given, of views (t, s, y, x, c).
+    """The network's inputs, from views (t, s, y, x, c).
 
     Raises
     ------
     SepiError
-        If the views have no such row, column or diagonal, or an axis is left out that is longer than one.
+        If the views have no such row, column or diagonal, or an omitted axis is longer than one.
     """
     from einops import EinopsError, rearrange
 
@@ -260,7 +260,7 @@ def _arrays(views: FloatMap, reference: tuple[int, int], inputs: tuple[str, ...]
 
 
 def _selected(views: FloatMap, reference: tuple[int, int], which: str) -> list[FloatMap]:
-    """The views of an input, or of as many inputs as there are views; each (t, s, y, x, c)."""
+    """The views of an input, or of one input per view for ``each``; each (t, s, y, x, c)."""
     (rows, columns), (t, s) = views.shape[:2], reference
     if which in ("diagonal", "antidiagonal"):
         if rows != columns:

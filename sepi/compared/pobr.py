@@ -1,10 +1,10 @@
 """Superpixel regularisation over partially occluded boundary regions [1]_, "POBR".
 
-The method leaves the data cost simple and repairs what it does at occlusions afterwards, by weights. A label map and
-its *label confidence* come from plain photo-consistency. Beside a nearer surface the pixels are hidden in some of the
-views, and their labels mix both surfaces; these partially occluded boundary regions are found with superpixels of the
+The method uses a simple data cost and corrects its errors at occlusions afterwards, by weights. A label map and its
+*label confidence* come from plain photo-consistency. Next to a nearer surface, pixels are hidden in some of the views
+and their labels mix both surfaces; these partially occluded boundary regions are found with superpixels of the
 reference view. There the label confidence and the *edge strength weights* are shrunk or reinforced, so that weighted
-least squares, which would otherwise smear the wrong labels, fill them in from beside, up to the edges of the view.
+least squares fill them from their surroundings up to the edges of the view, instead of spreading the wrong labels.
 
 With the disparity ``d``, candidates ``k``, colours ``I_v`` of view ``v`` of baseline ``b_v``, and reference view ``I``:
 
@@ -12,9 +12,9 @@ With the disparity ``d``, candidates ``k``, colours ``I_v`` of view ``v`` of bas
    ``d`` is the candidate of least cost, refined by a parabola, and ``c = 1 - min_k C / mean_k C``;
 2. superpixels ``S``; region ``R``: those with ``std_S(d) > tau_1``;
 3. shrinkage of the confidence: ``c' = c max(exp(-tau_0 (std_S(d) - tau_1)), q)`` within ``R``, ``c' = c`` elsewhere;
-4. edge strength ``e = |grad I|^2``; within ``R`` that of texture inside a superpixel is shrunk and that of the borders
-   between superpixels is reinforced: ``e = |step J|^2 + a |grad I|^2``, ``J`` the mean colour of each superpixel, whose
-   steps between neighbours count in full;
+4. edge strength ``e = |grad I|^2``; within ``R``, texture inside superpixels is shrunk and borders between superpixels
+   are reinforced: ``e = |step J|^2 + a |grad I|^2``, with the mean colour ``J`` of each superpixel and its full steps
+   between neighbours;
 5. weighted least squares: ``d'`` minimises
    ``sum_p c'^2 (d' - d)^2 + alpha sum_p s(p) sum_q (d'(p) - d'(q))^2`` over the 4-connected neighbours ``q``, with
    ``s = exp(-tau_2 c') / (e + f^2)``.
@@ -22,20 +22,19 @@ With the disparity ``d``, candidates ``k``, colours ``I_v`` of view ``v`` of bas
 The choice ``pobr`` of the initial stage is step 1, that of the occlusion stage steps 2 to 4, that of the global
 optimisation step 5.
 
-What was known of the publication is its abstract, and what [2]_, whose global optimisation builds on it, takes over:
-``tau_0 = 1000``, ``tau_1 = 0.2``, ``tau_2 = 1.5`` and the forms of steps 3 and 5. Not known, or left open, and chosen
-here:
+Known of the publication are its abstract, and the parts used by [2]_, whose global optimisation builds on it:
+``tau_0 = 1000``, ``tau_1 = 0.2``, ``tau_2 = 1.5`` and the forms of steps 3 and 5. The rest was chosen here:
 
-- the data cost: the mean truncated colour difference, and a guided filter that brings in little of other surfaces;
+- the data cost: the mean truncated colour difference, and a guided filter that mixes little of other surfaces;
 - the confidence: relative to the scene's best (95th percentile), squared as data weight;
-- how superpixels find the region: by the deviation of the labels in each, which [2]_ takes in a small window. SLIC
-  superpixels, as many in large views as in small ones: small objects and small views need small ones;
-- the share ``q`` that a shrunk label keeps: with the authors' ``tau_0`` the exponential is a step that leaves nothing,
-  and where both surfaces of a superpixel are well known, as with thin structures, something must stay;
+- the detection of the region: by the deviation of the labels in each superpixel, which [2]_ computes in a small window.
+  The number of SLIC superpixels does not depend on the view size: small objects and small views need small ones;
+- the share ``q`` of confidence that remains after shrinkage: with the authors' ``tau_0`` the exponential is a step to
+  0, but where both surfaces of a superpixel are well estimated, as at thin structures, some must remain;
 - the operations on the edge strength, of which only the words "shrinkage" and "reinforcement" are known, the share
-  ``a`` of texture and the floor ``f``, below which noise would hold back the smoothing.
+  ``a`` of texture and the floor ``f``, without which noise would prevent smoothing.
 
-Missing views, views off the grid and a single row or column of views need nothing special.
+Missing views, views off the grid and a single row or column of views are handled without special cases.
 
 References
 ----------
@@ -67,22 +66,22 @@ from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMap
 CANDIDATES = CandidateRule(usual=101, finest=0.02, coarsest=0.5)
 
 COMPACTNESS = 10.0
-"""Of the superpixels, SLIC's own usual value."""
+"""Compactness of the superpixels; the usual value for SLIC."""
 
 LEAST_SIZE = 3
-"""Side of a superpixel below which its labels have no deviation to speak of, pixels."""
+"""Minimum side of a superpixel in pixels; in smaller ones the labels' deviation is meaningless."""
 
 TEXTURE_SHARE = 0.1
-"""Share of a region's texture that its edge strength keeps."""
+"""Weight ``a`` of texture in the edge strength of a region."""
 
 NOISE_GAIN = 9 / 8
-"""Squared gradient by the Sobel operator, over three channels, of noise of variance 1."""
+"""Expected squared Sobel gradient of noise of variance 1, summed over three channels."""
 
 LEAST_CONFIDENCE = 3e-4
-"""Keeps the system solvable where no label is trusted."""
+"""Minimum confidence, which keeps the system solvable."""
 
 RTOL = 1e-9
-"""Relative residual at which the solver stops; pixels of low weight need it small."""
+"""Relative residual at which the solver stops; small because of pixels with low weight."""
 
 
 class PobrCostParameters(CandidateParameters):
@@ -104,7 +103,7 @@ class PobrCostParameters(CandidateParameters):
 
 
 class PobrRegionParameters(Parameters):
-    """Parameters of the partially occluded boundary regions and of what is done there."""
+    """Parameters of the partially occluded boundary regions."""
 
     superpixels: int = Field(2000, ge=1, description="number of superpixels")
     tau_0: float = Field(1000.0, ge=0, description="how sharply the label confidence falls beyond tau_1")
@@ -129,7 +128,7 @@ class PobrSmoothingParameters(Parameters):
 def pobr_cost(
     light_field: LightField, previous: StageMaps | None, parameters: PobrCostParameters, progress: Progress
 ) -> StageMaps:
-    """Labels of least photo-consistency cost, and their confidence.
+    """Labels of least photo-consistency cost and their confidence.
 
     Returns
     -------
@@ -149,7 +148,7 @@ def pobr_cost(
 
 
 def photo_consistency(sheared: FloatMap, reference: int, truncation: float) -> FloatMap:
-    """Mean truncated difference of views (N, 3, H, W) from one of them, in parts of the truncation; (H, W), 0..1."""
+    """Mean truncated difference of views (N, 3, H, W) from one of them, divided by the truncation; (H, W), 0..1."""
     total = np.zeros(sheared.shape[2:], np.float32)
     for difference in colour_differences(sheared, sheared[reference]):
         total += np.minimum(difference, truncation)
@@ -159,12 +158,12 @@ def photo_consistency(sheared: FloatMap, reference: int, truncation: float) -> F
 def pobr_regions(
     light_field: LightField, previous: StageMaps | None, parameters: PobrRegionParameters, progress: Progress
 ) -> StageMaps:
-    """Label confidence and edge strength, manipulated over partially occluded boundary regions.
+    """Label confidence and edge strength, adjusted in partially occluded boundary regions.
 
     Returns
     -------
     StageMaps
-        The same ``disparity``; ``confidence`` is the shrunk one. Adds ``occluded``, bool, the regions, and
+        The same ``disparity`` and the shrunk ``confidence``. Adds ``occluded``, bool, the regions, and
         ``edge_strength``, float32, squared gradient per pixel^2 of values in 0..1.
     """
     before = require_previous(previous)
@@ -190,7 +189,7 @@ def pobr_smoothing(
 ) -> StageMaps:
     """Disparity of least energy.
 
-    Takes the map ``edge_strength`` where the occlusion stage made one; else the gradient of the view.
+    Uses the map ``edge_strength`` of the occlusion stage if there is one, otherwise the gradient of the view.
 
     Returns
     -------
@@ -223,14 +222,14 @@ def squared_gradient(image: FloatMap) -> FloatMap:
 
 
 def squared_steps(image: FloatMap, segments: Superpixels) -> FloatMap:
-    """Squared step of the superpixels' mean colours at the pixels beside a border; 0 inside; shape (H, W), float32."""
+    """Squared step of the superpixels' mean colours at pixels next to a border, 0 inside; shape (H, W), float32."""
     means = np.stack([segments.means(channel)[segments.labels] for channel in np.moveaxis(image, 2, 0)], axis=2)
-    # the central difference at a step is half of it
+    # the central difference is half the step
     return np.asarray(4 * squared_gradient(means.astype(np.float32)), np.float32)
 
 
 def _superpixel_size(shape: tuple[int, int], number: int) -> int:
-    """Side of a superpixel where there are so many of them, pixels."""
+    """Side of a superpixel in pixels, for a number of them in an image."""
     return max(LEAST_SIZE, round(math.sqrt(shape[0] * shape[1] / number)))
 
 

@@ -1,40 +1,39 @@
-r"""Spinning parallelogram operator, a compared method: the line whose two sides differ most [1]_.
+r"""Spinning parallelogram operator, a compared method: finds the line whose two sides differ most [1]_.
 
-In an EPI, the slice of a row of views along a row of pixels, a point of disparity ``d`` leaves a line of slope ``d``. A
-parallelogram round the pixel is spun until what lies left of its middle line and what lies right of it differ most. An
-occluder changes some of the views on one side; the sides still differ, where views that are compared with each other
-would not agree. Noise changes both sides alike. The data cost is the initial choice ``spo``.
+In an EPI, the slice of a row of views along a row of pixels, a point of disparity ``d`` traces a line of slope ``d``. A
+parallelogram around the pixel is rotated until the colours left and right of its centre line differ most. An occluder
+changes some of the views on one side, but the sides still differ, whereas a comparison between views would fail. Noise
+affects both sides equally. The data cost is the initial choice ``spo``.
 
 1. *Operator.* A pixel ``i`` at the distance ``r`` from the line of candidate ``l`` has the weight
-   ``w(i) = |r| exp(-r^2 / (2 a^2))``, the derivative of a Gaussian of scale ``a``. The colours of the left half, so
-   weighted, make a histogram ``g``, those of the right half ``h``, each of sum 1.
+   ``w(i) = |r| exp(-r^2 / (2 a^2))``, the derivative of a Gaussian of scale ``a``. The weighted colours of the left
+   half form a histogram ``g``, those of the right half ``h``, each of sum 1.
 2. *Distance.* ``D(l) = 1/2 sum_b (g_b - h_b)^2 / (g_b + h_b)`` over the bins ``b``: 0 where the halves have the same
    colours, 1 where they share none. The best candidate maximises it.
-3. *Both directions.* The row of views through the reference view gives ``D_h``, the column ``D_v``. A direction counts
-   as much as its curve of distances has a peak, ``c = exp(-(mean_l D / max_l D) / (2 s^2))``, and
+3. *Both directions.* The row of views through the reference view gives ``D_h``, the column ``D_v``. A direction is
+   weighted by how distinct the peak of its distances is, ``c = exp(-(mean_l D / max_l D) / (2 s^2))``, and
    ``D(l) = c_h D_h(l) + c_v D_v(l)``.
 4. *Labels.* Every slice of the volume is smoothed by a guided filter (:mod:`sepi.compared.guided_costs`), then each
-   pixel takes its best candidate.
+   pixel selects its best candidate.
 
-The EPIs are sheared by each candidate, so that its lines become columns and a histogram of one column serves all the
-parallelograms that it lies in (``kernels/spo.cpp``).
+The EPIs are sheared by each candidate, so that its lines become columns, and the histogram of a column is shared by all
+parallelograms that contain it (``kernels/spo.cpp``).
 
-What the publication leaves open, or could not be confirmed, and what was chosen:
+Choices made here where the publication is not specific or could not be confirmed:
 
-- The numbers: the scale ``a``, the bins, the ``s`` of the confidence. The parallelogram ends three scales from its
-  line, in whole columns; no weight beyond is more than about 5 % of the largest.
-- The confidence's formula; that it also weighs pixels against each other in the filter follows from the sum above.
-- Colours: one histogram for each of the channels, and the mean of their distances. A colour counts for the two bins
-  between whose middles it lies: with hard borders, a surface of nearly one colour falls into this bin or the next by
-  noise, and halves differ whatever the candidate. Noise of several bins still parts them, which ends the method's
-  robustness to it.
-- Samples between pixels come from cubic convolution.
-- The border: beyond it a view goes on as it ends, and so do the columns.
-- The number of candidates, and the parabola that refines the winner below their sampling.
+- The numbers: the scale ``a``, the bins, the ``s`` of the confidence. The parallelogram extends three scales from its
+  line, in whole columns; weights beyond are below about 5 % of the largest.
+- The confidence's formula. Through the sum above, it also weights pixels relative to each other in the filter.
+- Colours: one histogram per channel, and the mean of their distances. A colour is shared between the two nearest bins:
+  with hard bin borders, noise would move a nearly uniform colour between two bins, and the halves would differ at every
+  candidate. The method is not robust to noise of several bins.
+- Samples between pixels: cubic convolution.
+- The border: views and columns are extended by their border pixels.
+- The number of candidates, and the parabola that refines the best one.
 - The filter's numbers: those of the publication of cost-volume filtering.
-- Views that do not stand in rows and columns: the views of the reference view's row and column of the grid are taken
-  for them and sheared by where they really stand. A direction without other views is left out; where both are, all
-  views together are sheared and split both ways.
+- Views that are not in rows and columns: the views in the reference view's row and column of the grid are used and
+  sheared by their true positions. A direction without other views is left out; if both are, all views are sheared
+  together and split both ways.
 
 References
 ----------
@@ -59,10 +58,10 @@ from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, relative_
 CANDIDATES = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=2**29)
 
 _HALF_WIDTH = 3.0
-"""Of the parallelogram, scales."""
+"""Half width of the parallelogram in scales."""
 
 _ROUNDING = 1e-4
-"""Distances up to this are rounding: the halves have the same colours."""
+"""Distances up to this are rounding errors: the halves have the same colours."""
 
 
 class SpoParameters(CandidateParameters):
@@ -86,7 +85,7 @@ class SpoParameters(CandidateParameters):
 def spo(
     light_field: LightField, previous: StageMaps | None, parameters: SpoParameters, progress: Progress
 ) -> StageMaps:
-    """Candidates whose lines have the most different sides.
+    """Candidates whose lines have the largest difference between their sides.
 
     Returns
     -------
@@ -112,7 +111,7 @@ def spo(
 
 
 def views_of_directions(light_field: LightField) -> list[tuple[BoolMap, bool]]:
-    """Views ``(T, S)`` whose EPIs are looked at, and whether those run down the picture, not along its rows."""
+    """Views ``(T, S)`` whose EPIs are used, and whether the EPIs are vertical, for each direction."""
     t, s = light_field.reference_position
     row, column = np.zeros((2, *light_field.grid), bool)
     row[t], column[:, s] = True, True
@@ -131,7 +130,7 @@ def side_distances(
     down: bool,
     progress: Progress,
 ) -> FloatMap:
-    """How much the sides of every candidate's line differ in the EPIs of one direction.
+    """Differences between the sides of each candidate's line in the EPIs of one direction.
 
     Parameters
     ----------
@@ -141,7 +140,7 @@ def side_distances(
         The candidates, pixels per view step.
     parameters : SpoParameters
     down : bool
-        The EPIs run down the picture; else along its rows.
+        Whether the EPIs are vertical; otherwise they are along image rows.
     progress : callable
 
     Returns
@@ -171,7 +170,7 @@ def column_weights(scale: float) -> FloatMap:
 
 
 def peak_weight(distances: FloatMap, peak: float) -> FloatMap:
-    """How far each pixel's curve of distances ``(K, H, W)`` stands out at its best; 0..1, shape (H, W), float32."""
+    """Distinctness of the peak of each pixel's distances ``(K, H, W)``; 0..1, shape (H, W), float32."""
     largest, mean = distances.max(axis=0), distances.mean(axis=0)
     flat = largest <= _ROUNDING
     ratio = np.where(flat, 1, mean / np.where(flat, 1, largest))
@@ -179,10 +178,10 @@ def peak_weight(distances: FloatMap, peak: float) -> FloatMap:
 
 
 def _costs(disparities: FloatMap, merged: FloatMap) -> CostVolume:
-    """Distances ``(K, H, W)``, which are lost, as costs.
+    """Convert distances ``(K, H, W)`` to costs, in place.
 
-    Each pixel's best candidate gets the cost 0, near which half precision is finest. What that adds to all candidates
-    of a pixel changes no winner, since the filter that follows is linear.
+    Each pixel's best candidate has the cost 0, near which half precision is finest. The offset is the same for all
+    candidates of a pixel and does not change the best one, since the following filter is linear.
     """
     best = merged.max(axis=0)
     np.subtract(best, merged, out=merged)

@@ -1,6 +1,6 @@
-"""Weighted median of a map in a window, its weights narrow in the guide's colours [1]_.
+"""Weighted median of a map in a window, with weights by the guide's colours [1]_.
 
-It takes outliers and rough edges out of a disparity map and makes no value that was not there.
+It removes outliers and rough edges from a disparity map without introducing new values.
 
 References
 ----------
@@ -22,16 +22,16 @@ def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float
     Parameters
     ----------
     values : ndarray, shape (H, W), float32
-        A disparity map, or another.
+        The map to filter.
     guide : ndarray, shape (H, W, 3), float32
         Colours in 0..1.
     radius : int
-        The window is ``2 radius + 1`` pixels wide; at the picture's border it is cut.
+        The window is ``2 radius + 1`` pixels wide; it is cropped at the image border.
     sigma : float
         RGB distance at which a pixel's weight falls to ``exp(-1/2)``, colours in 0..1.
     weight : ndarray, shape (H, W), float32
-        Of each pixel by itself, not negative: its confidence; ones where there is none. The pixel in the middle of a
-        window keeps its value where the window has no weight at all.
+        Additional weight of each pixel, not negative, such as its confidence; ones for none. Pixels whose window has no
+        weight keep their value.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float
 
     Examples
     --------
-    An edge of the map that lies two pixels beside that of the picture is drawn to it:
+    An edge of the map that is two pixels away from the guide's edge moves there:
 
     >>> import numpy as np
     >>> from sepi.compared.weighted_median import weighted_median
