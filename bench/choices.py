@@ -1,7 +1,7 @@
-"""Final scores with one of the method's open choices changed at a time.
+"""Final scores with one implementation choice of the method changed at a time.
 
-The paper leaves steps open; docs/method/paper.md names the choices made. This command prints the table behind them, for
-scenes with ground truth, given as folders, files or names of built-in scenes:
+The paper does not specify all steps; docs/method/paper.md lists the choices made. This command prints the table that
+supports them, for scenes with ground truth, given as folders, files or names of built-in scenes:
 ``python -m bench.choices SCENE...``
 """
 
@@ -45,7 +45,7 @@ ALTERNATIVES: dict[str, tuple[str, dict[str, Any]]] = {
     "alpha a third": ("optimize", {"alpha": 1e-6}),
     "alpha threefold": ("optimize", {"alpha": 1e-5}),
 }
-"""Label to a stage of variant ``paper`` and the parameters of it that differ."""
+"""Label to a stage of variant ``paper`` and its changed parameters."""
 
 
 def final_maps(
@@ -66,7 +66,7 @@ def final_maps(
 
 
 def opened(name: str) -> LightField:
-    """A built-in scene by its name, or a light field by its path, with its range settled."""
+    """A built-in scene by name, or a light field by path, with a disparity range."""
     light_field = render(name) if name in SCENES else read_light_field(Path(name))
     return settle_range(light_field)
 
@@ -74,7 +74,7 @@ def opened(name: str) -> LightField:
 def table(scenes: list[str]) -> str:
     """Markdown: a row per alternative, a column per scene, MSE x100 / BadPix 0.07 % on the whole map.
 
-    A cell is empty where it would be that of the first row.
+    Cells equal to the first row's are empty.
     """
     names = []
     columns = [list(ALTERNATIVES)]

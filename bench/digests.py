@@ -1,4 +1,4 @@
-"""Whether maps are the same, byte for byte, on any number of threads, with the kernels of any processor."""
+"""Checks that maps are identical, byte for byte, for any number of threads and the kernels of any processor."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 
 
 class Condition(NamedTuple):
-    """How a process computes: threads, also more than there are cores, and whether as any processor can."""
+    """How a process computes: threads, possibly more than cores, and whether with kernels for any processor."""
 
     threads: int
     baseline: bool = False
@@ -28,7 +28,7 @@ class Condition(NamedTuple):
 
 
 def digests(condition: Condition, variants: Iterable[str], scene: str, size: int, views: int) -> dict[str, str]:
-    """Digest of the maps of each variant, of a built-in scene, computed in a process of its own."""
+    """Digest of each variant's maps of a built-in scene, computed in a separate process."""
     with _environment(condition), ProcessPoolExecutor(1, get_context("spawn")) as process:
         return process.submit(_digests, condition.threads, tuple(variants), scene, size, views).result()
 
@@ -54,7 +54,7 @@ def _digests(threads: int, variants: tuple[str, ...], scene: str, size: int, vie
     from sepi.pipeline import estimate_depth
     from sepi.scenes import render
 
-    # not by sepi.threads, which takes no more than there are cores
+    # not by sepi.threads, which is limited to the number of cores
     kernels.set_thread_count(threads)
     cv2.setNumThreads(threads)
     light_field = render(scene, size=size, views=views)

@@ -1,7 +1,7 @@
-"""What is found in light fields whose views are right, and in disturbed copies of them: order of the views, range.
+"""Detection of view order and disparity range in correct light fields and in disturbed copies of them.
 
-The order of a copy is turned in every way. A verdict is *right* if it names the turn back, *wrong* if it names another
-one, and *open* if it says that it cannot tell (or not which of near and far is which).
+The view order of a copy is changed in every way. A verdict is *right* if it names the correction, *wrong* if it names
+another one, and *open* if it is undecided (or cannot tell near from far).
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ View = npt.NDArray[np.uint8]
 
 
 class Disturbance(NamedTuple):
-    """A way to disturb a light field, and what it multiplies disparities with."""
+    """A disturbance of a light field, and its factor on disparities."""
 
     change: Callable[[LightField], LightField]
     factor: float = 1.0
 
 
 def _each_view(change: Callable[[View, tuple[int, int]], View]) -> Callable[[LightField], LightField]:
-    """Change the views one by one; ``change`` gets a view of 8 bits and its baseline in views."""
+    """Change views individually; ``change`` gets an 8-bit view and its baseline in views."""
 
     def of(light_field: LightField) -> LightField:
         eight = np.rint(255 * np.clip(as_unit_float(light_field.views), 0, 1)).astype(np.uint8)
@@ -93,7 +93,7 @@ def _sixteen_bit(light_field: LightField) -> LightField:
 
 
 def _crop(light_field: LightField) -> LightField:
-    """The middle half of each side."""
+    """The central half of each side."""
     H, W = light_field.shape
     part = np.s_[:, :, H // 4 : H // 4 + max(H // 2, 2), W // 4 : W // 4 + max(W // 2, 2)]
     return replace(light_field, views=light_field.views[part], ground_truth=None, masks={})
@@ -114,7 +114,7 @@ DISTURBANCES = {
 
 
 class Verdicts(NamedTuple):
-    """What was said of one disturbed light field: how often the order was right, open and wrong, and the range."""
+    """Results for one disturbed light field: how often the order was right, open and wrong, and the range."""
 
     orders: Counter[str]
     range: DisparityRange | None
@@ -122,7 +122,7 @@ class Verdicts(NamedTuple):
 
 
 def disturbed_verdicts(light_field: LightField, turns: Iterable[str] = ORDERS) -> Iterator[tuple[str, Verdicts]]:
-    """Each disturbance of a light field whose views are in the right order, and what is found then; turned so."""
+    """Each disturbance of a light field with correct view order, and its verdicts for the orders ``turns``."""
     for name, disturbance in DISTURBANCES.items():
         changed = disturbance.change(_bare(light_field))
         spaced = settle_row_spacing(changed)
@@ -135,12 +135,12 @@ def disturbed_verdicts(light_field: LightField, turns: Iterable[str] = ORDERS) -
 
 
 def _bare(light_field: LightField) -> LightField:
-    """Without anything that is known."""
+    """The light field without its known properties."""
     return replace(light_field, disparity_range=None, ground_truth=None, masks={}, camera=None, view=None)
 
 
 def _verdict(light_field: LightField, turn: str) -> str:
-    """What is said of the light field with its grid turned."""
+    """Verdict on the light field with a changed view order."""
     (rows, columns), right = light_field.grid, change_of_order(turn, AS_GIVEN)
     numbers = ORDERS[turn](np.arange(rows * columns).reshape(rows, columns))
     views = light_field.views.reshape(rows * columns, *light_field.views.shape[2:])[numbers]
@@ -155,6 +155,6 @@ def _verdict(light_field: LightField, turn: str) -> str:
 
 
 def _same(order: str, grid: tuple[int, int]) -> set[str]:
-    """Orders that do the same to a grid: of a single row or column, several do."""
+    """Orders with the same effect on a grid; for a single row or column there are several."""
     numbers = np.arange(grid[0] * grid[1]).reshape(grid)
     return {other for other in ORDERS if np.array_equal(ORDERS[other](numbers), ORDERS[order](numbers))}

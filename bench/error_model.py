@@ -1,7 +1,7 @@
-"""Fit of the error model (:mod:`sepi.error_bars`) by maximum likelihood, and its worth on scenes that are left out.
+"""Fit of the error model (:mod:`sepi.error_bars`) by maximum likelihood, and its evaluation on left-out scenes.
 
-Every light field and variant counts the same. Powers are drawn a little towards 0, in units of how much the logarithm
-of their cue varies.
+Every light field and variant has the same weight. Powers are weakly regularised towards 0, in units of the variation of
+their cue's logarithm.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from sepi.stage import CLOSE
 FloatArray = npt.NDArray[np.float64]
 
 PULL = 1e-3
-"""Weight of the sum of the squared powers against the mean likelihood of a pixel."""
+"""Weight of the sum of squared powers relative to the mean likelihood of a pixel."""
 
 _PARTS = ("scale", "outlier_scale", "outlier", "rim")
 _CLIP = 12.0
 
 
 class Judged(NamedTuple):
-    """What a calibration is worth on a sample.
+    """Scores of a calibration on a sample.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Judged(NamedTuple):
         Share of the errors within the interval, %, and its median width, pixels per view step.
     ause, ause_smooth : float
         Area under the sparsification error curve (:func:`sepi.scoring.error_bars.ause`) by the standard deviation, and
-        by the smoothness of the map and the information of the views, which a confidence used to be.
+        by the smoothness of the map and the information of the views (the former confidence).
     """
 
     coverage: float
@@ -49,7 +49,7 @@ class Judged(NamedTuple):
 
 
 def fitted(samples: Sequence[Sample], form: Calibration) -> Calibration:
-    """The calibration of this form, that is with the same cues, that makes the errors likeliest."""
+    """The calibration with the same cues as ``form`` that maximises the likelihood of the errors."""
     names = [list(part) for part in form.parts]
     columns = [np.concatenate([_columns(one, part) for one in samples]) for part in names]
     middle, spread = _scaling(columns)
@@ -85,7 +85,7 @@ def fitted(samples: Sequence[Sample], form: Calibration) -> Calibration:
 
 
 def judged(one: Sample, calibration: Calibration) -> Judged:
-    """What a calibration is worth on a sample; its intervals are not cut at the ends of the disparity range here."""
+    """Scores of a calibration on a sample; intervals are not limited to the disparity range here."""
     bars = described(mixture_of(_pictures(one), calibration), TAIL, CLOSE)
     margin = one.step / 2
     held = (one.error <= bars.above[0] + margin) & (one.error >= -bars.below[0] - margin)
@@ -96,7 +96,7 @@ def judged(one: Sample, calibration: Calibration) -> Judged:
 
 
 def judgements(samples: Sequence[Sample], fits: Mapping[str, Calibration], other: Calibration) -> list[dict[str, str]]:
-    """A row for each light field; of the calibrations of its scenes, or the ``other``."""
+    """A row for each light field, with the calibration of its scene or ``other``."""
     rows: dict[str, dict[str, str]] = {}
     for one in samples:
         found = judged(one, fits.get(one.world, other))
@@ -108,7 +108,7 @@ def judgements(samples: Sequence[Sample], fits: Mapping[str, Calibration], other
 
 
 def pooled(samples: Sequence[Sample], calibration: Calibration) -> dict[str, str]:
-    """All samples together: mean and range of coverage, whether confidences are right, and the order of the errors."""
+    """All samples together: mean and range of coverage, reliability of confidences, and ranking of errors."""
     worth = [judged(one, calibration) for one in samples]
     ratios = np.array([one.ause / one.ause_smooth for one in worth])
     confidences = [described(mixture_of(_pictures(one), calibration), TAIL, CLOSE).probability[0] for one in samples]
@@ -126,13 +126,13 @@ def pooled(samples: Sequence[Sample], calibration: Calibration) -> dict[str, str
 
 
 def left_out(samples: Sequence[Sample], form: Calibration) -> dict[str, Calibration]:
-    """Scene to the calibration that is fitted to all others."""
+    """Scene to the calibration that is fitted to all other scenes."""
     worlds = dict.fromkeys(one.world for one in samples)
     return {world: fitted([one for one in samples if one.world != world], form) for world in worlds}
 
 
 def as_code(name: str, calibration: Calibration) -> str:
-    """The calibration as ``sepi/error_bars/calibration.py`` has it."""
+    """The calibration as code for ``sepi/error_bars/calibration.py``."""
 
     def written(part: Mapping[str, float]) -> str:
         inner = "".join(f'        "{key}": {value!r},\n' for key, value in part.items())
@@ -171,7 +171,7 @@ def _scaling(columns: Sequence[FloatArray]) -> tuple[list[FloatArray], list[Floa
 def _likelihood(
     designs: Sequence[FloatArray], powers: Sequence[FloatArray], data: _Data
 ) -> tuple[float, list[FloatArray]]:
-    """Negative logarithm of the likelihood, mean over the pixels, and its slopes by the powers."""
+    """Negative log likelihood, mean over the pixels, and its derivatives by the powers."""
     linear = [np.clip(design @ power, -_CLIP, _CLIP) for design, power in zip(designs, powers, strict=True)]
     scale, outlier_scale, outlier, rim = np.exp(linear)
     whole = 1 + outlier + rim

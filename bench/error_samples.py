@@ -1,4 +1,4 @@
-"""Pixels with what tells of their errors, and their errors: what the error model is fitted to and judged by."""
+"""Samples of pixels with cues and errors, for fitting and evaluating the error model."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from sepi.stage import REACH
 from sepi.workflow.rendered_scenes import rendered_scene
 
 PIXELS = 6000
-"""Of each map, chosen at random."""
+"""Number of random pixels per map."""
 
 CALIBRATIONS: dict[str, Calibration] = {"second_order": SECOND_ORDER, "wls": WLS}
 """Choice of the last stage to its calibration."""
@@ -33,18 +33,18 @@ CALIBRATIONS: dict[str, Calibration] = {"second_order": SECOND_ORDER, "wls": WLS
 
 @dataclass(frozen=True)
 class Sample:
-    """Pixels of a map, in view steps of which the farthest view is four away.
+    """Pixels of a map, in units in which the farthest view is four view steps away.
 
     Attributes
     ----------
     name, world, variant : str
-        Of the light field, with its noise; of the scene without that; of the map.
+        Name of the light field, including its noise; of the scene without it; of the map's variant.
     error : ndarray, shape (N,)
         Ground truth minus map.
     cues : dict of str to ndarray, shape (N,)
-        Of :mod:`sepi.error_bars.cues`.
+        Cues of :mod:`sepi.error_bars.cues`.
     step : float
-        To which ground truth is rounded.
+        Rounding step of the ground truth.
     """
 
     name: str
@@ -58,12 +58,12 @@ class Sample:
 def light_fields(
     scenes: Iterable[str], sigmas: Sequence[float], held_out: bool = False
 ) -> Iterator[tuple[str, LightField]]:
-    """Light fields of scenes and their names: built-in ones and folders with so much noise, renders in all levels.
+    """Light fields and names: built-in scenes and folders with the given noise, rendered scenes at all levels.
 
     Raises
     ------
     SepiError
-        If one is none, has no ground truth, or is held out from choosing though that is not asked for.
+        If a scene is not a light field, has no ground truth, or is held out from choosing without being requested.
     """
     for scene in scenes:
         if has_dataset(Path(scene), "turns"):
@@ -80,15 +80,15 @@ def light_fields(
 
 
 def sample(light_field: LightField, name: str, variant: str, step: float = 0.0, kept: Path | None = None) -> Sample:
-    """Pixels of a variant's map of a light field with ground truth, rounded to a step in its own view steps.
+    """Sample of a variant's map of a light field; ground truth is rounded to ``step`` in the light field's view steps.
 
-    With a folder ``kept`` they are written there, and read where they are there already.
+    With a folder ``kept``, samples are stored there and reused.
     """
     world = rendered_scene(name.partition(" +")[0]).world
     factor = REACH / light_field.reach
     file = None
     if kept is not None:
-        # of one name there may be a render and a folder
+        # a rendered scene and a folder may have the same name
         views = hashlib.sha256(repr((name, light_field.grid, light_field.shape)).encode()).hexdigest()
         file = kept / f"{variant}_{views[:16]}.npz"
     if file is not None and file.exists():

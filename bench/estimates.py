@@ -1,4 +1,4 @@
-"""How good the memory and the time are that the workflow's rules ask a cluster for, beside what their jobs took."""
+"""Compares the memory and time that the workflow's rules request with what their jobs used."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sepi.errors import SepiError
 
 
 class Job(NamedTuple):
-    """What a job took and what it had asked for: seconds and MB."""
+    """Used and requested resources of a job, seconds and MB."""
 
     rule: str
     seconds: float
@@ -22,12 +22,12 @@ class Job(NamedTuple):
 
 
 def jobs_below(folder: Path) -> list[Job]:
-    """Every job whose benchmark lies below a folder, as ``snakemake --benchmark-extended`` writes them.
+    """All jobs with a benchmark file below a folder, written by ``snakemake --benchmark-extended``.
 
     Raises
     ------
     SepiError
-        If there is none, or they do not say what was asked for.
+        If there is none, or the files lack the requested resources.
     """
     found = [job for path in sorted(folder.rglob("*.tsv")) for job in _jobs(path)]
     if not found:
@@ -46,13 +46,13 @@ def _jobs(path: Path) -> Iterable[Job]:
                 seconds, megabytes = float(row["s"]), float(row["max_rss"])
             except (KeyError, ValueError, SyntaxError) as error:
                 raise SepiError(f"{path}: not of a run with --benchmark-extended ({error})") from None
-            # Snakemake looks at a job's memory every few seconds: of shorter ones it knows only the start
+            # Snakemake samples memory every few seconds: for shorter jobs it knows only the start
             if seconds > 1 and {"runtime", "mem_mb"} <= asked.keys():
                 yield Job(row["rule_name"], seconds, megabytes, 60.0 * asked["runtime"], float(asked["mem_mb"]))
 
 
 def rows(jobs: list[Job]) -> list[dict[str, str]]:
-    """One line for each rule: its jobs, the most that one took, and the largest part of what it had asked for."""
+    """A row per rule: its jobs, the largest use, and the largest share of the request."""
     lines = []
     for rule in dict.fromkeys(job.rule for job in jobs):
         own = [job for job in jobs if job.rule == rule]
