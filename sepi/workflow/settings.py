@@ -42,7 +42,7 @@ class Report(CheckedModel):
     )
     page: bool | None = Field(
         None,
-        description=f"whether to make the page; null: only for up to {MOST_ON_PAGE} scenes, each of which adds up to 2 MB",
+        description=f"whether to make the page; null: for up to {MOST_ON_PAGE} scenes, each of which adds up to 2 MB",
     )
     partial: bool = Field(
         False,
