@@ -93,8 +93,6 @@ fuzz: $(READY)
 
 # absolute, since tests start processes elsewhere
 coverage: export COVERAGE_RCFILE := $(CURDIR)/pyproject.toml
-# a fork would lose what it has measured
-coverage: export SEPI_JOB_SERVER :=
 coverage: export COVERAGE_FILE := $(CURDIR)/build/coverage/data
 coverage: $(READY)
 	rm -rf build/coverage

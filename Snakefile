@@ -73,10 +73,6 @@ rule rendered:
         "all rendered scenes are made"
 
 
-onstart:
-    run_begins()
-
-
 onsuccess:
     run_ended_well()
 

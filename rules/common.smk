@@ -18,15 +18,16 @@ from sepi.report.plan import Plan
 from sepi.validation import require_known
 from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, keep, remember, render_modules, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
-from sepi.workflow import job_client
 from sepi.workflow.config import load_settings
 from sepi.rendered import RENDERED
 from sepi.workflow.rendered_scenes import rendered_scene
 from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
 
-# where a module's `prefix` puts things, and whether this is a module at all, while the rules are read
-MODIFIER = workflow.modifier
-IS_MODULE = MODIFIER.base_snakefile is not None
+# the folder of the Snakefile, and whether that is a module of another workflow
+FOLDER = os.path.dirname(str(workflow.current_basedir))
+IS_MODULE = FOLDER != workflow.basedir
+# where a module's `prefix` puts things, while the rules are read
+MODIFIER = workflow.modifier.path_modifier
 
 # what was read of the code by the start before
 remember(Path(".snakemake").absolute())
@@ -41,7 +42,6 @@ os.environ.update(
     {
         "SEPI_PYTHON": sys.executable,
         "SEPI_PYTHONPATH": PYTHON_PATH,
-        "SEPI_JOB_CLIENT": job_client.__file__,
         WORKFLOW_PROCESS: str(os.getpid()),
         "OPENBLAS_NUM_THREADS": "1",
     }
@@ -49,15 +49,14 @@ os.environ.update(
 
 
 def command(words):
-    """The shell command that runs a module of the package: in a fork of the job server, where there is one."""
-    client = f'${{{{{job_client.SERVER}:+-IS "$SEPI_JOB_CLIENT"}}}}'
-    return f'PYTHONPATH="$SEPI_PYTHONPATH" exec "$SEPI_PYTHON" {client} -m {words}'
+    """The shell command that runs a module of the package."""
+    return f'PYTHONPATH="$SEPI_PYTHONPATH" exec "$SEPI_PYTHON" -m {words}'
 
 
 try:
     SETTINGS = load_settings(config)
     # Snakemake would wrap what is wrong with a name in a dozen lines
-    for word in sys.argv[1:] if workflow.is_main_process and not IS_MODULE else ():
+    for word in () if IS_MODULE else sys.argv[1:]:
         SETTINGS.require_target(word)
 except SepiError as error:
     sys.exit(f"sepi: {error}")
@@ -71,7 +70,7 @@ SCENES_BY_DATASET = {name: SETTINGS.scenes_of(name) for name in SETTINGS.dataset
 
 def placed(path):
     """Where a file or folder that the rules name is: the prefix of a module is put before it."""
-    return MODIFIER.path_modifier.replace_prefix(f"{path}/").rstrip("/")
+    return MODIFIER.replace_prefix(f"{path}/").rstrip("/")
 
 
 PLAN = Plan(RESULTS, SCENES_BY_DATASET, VARIANT_LABELS, list(SETTINGS.external), bad_thresholds=SETTINGS.bad_thresholds)
@@ -112,7 +111,6 @@ def source_file(name):
 
 
 # the Snakefile, what it includes, and what that reads
-FOLDER = os.path.dirname(str(workflow.current_basedir))
 INCLUDED = re.findall(r'^include: "(.+)"$', Path(source_file("Snakefile")).read_text(), re.MULTILINE)
 PLAN_TEMPLATE = "rules/plan.json.j2"
 RULE_FILES = [source_file(name) for name in ["Snakefile", *INCLUDED, PLAN_TEMPLATE]]

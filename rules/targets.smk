@@ -97,16 +97,6 @@ def external_inputs(wildcards):
     return [own_file(file) for file in files.values() if os.path.isfile(file) and os.access(file, os.R_OK)]
 
 
-def names_like(target):
-    """Names of rules, and of files that are made, of which one may be meant by a target that nothing makes."""
-    rules = [rule.name for rule in workflow.rules]
-    scene = tuple(Path(target).parts[1:3])
-    if scene in {**SETTINGS.scenes, **SETTINGS.rendered_scenes}:
-        known = PLAN.files(*scene)
-        return [*rules, *result_files(SETTINGS.variants, [scene]), *map(str, (known.light_field, known.scores()))]
-    return [*rules, *every_file()]
-
-
 def folder_of_output(wildcards, output):
     """The folder that a job's files go into."""
     return os.path.dirname(output[0])

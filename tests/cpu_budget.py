@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from warm_python import forks_cpu_seconds
+from snakemake_runs import cpu_seconds_of_runs
 
 LOOP = 0.01
 """Seconds that the calibration loop takes on the core that the budget is in seconds of."""
@@ -47,8 +47,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def cpu_seconds() -> float:
-    """Of this process and of those that it started and that have ended, or whose forks have."""
-    return sum(os.times()[:4]) + forks_cpu_seconds()
+    """Of this process and of those that it started and that have ended."""
+    return sum(os.times()[:4]) + cpu_seconds_of_runs()
 
 
 def calibration() -> float:

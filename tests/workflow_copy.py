@@ -11,14 +11,16 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import yaml
-from warm_python import warm_python
+from snakemake_runs import run_snakemake
 
 from sepi.variants import STAGES
+from sepi.workflow.code_digest import code_digest, keep
 
 REPOSITORY = Path(__file__).parents[1]
 SIZE = 64
@@ -51,19 +53,18 @@ class Workflow:
     tree: Path
     folder: Path
     config: dict[str, Any]
-    # whether what runs to its end, and its jobs, are forks of a Python that has the libraries
-    warm: bool = True
-    # forks of which Python they are instead: one that has read the package's code, as long as that stays as it is
-    reader: str | None = None
 
-    def command(self, *targets: str, flags: tuple[str, ...] = (), python: str = sys.executable) -> list[str]:
-        """Snakemake with this configuration."""
+    def words(self, *targets: str, flags: tuple[str, ...] = ()) -> list[str]:
+        """What Snakemake is called with for this configuration."""
         self.folder.mkdir(exist_ok=True)
+        with_code_read(self.folder)
         config = self.folder / "config.yaml"
-        config.write_text(yaml.safe_dump(self.config))
-        snakefile = str(self.tree / "Snakefile")
-        words = ["-m", "snakemake", "--snakefile", snakefile, "--configfile", str(config)]
-        return [python, *words, *flags, "--", *targets]
+        config.write_text(yaml.safe_dump(self.config, sort_keys=False))
+        return ["--snakefile", str(self.tree / "Snakefile"), "--configfile", str(config), *flags, "--", *targets]
+
+    def command(self, *targets: str, flags: tuple[str, ...] = ()) -> list[str]:
+        """Snakemake with this configuration, as a program."""
+        return [sys.executable, "-m", "snakemake", *self.words(*targets, flags=flags)]
 
     @property
     def environment(self) -> dict[str, str]:
@@ -72,24 +73,12 @@ class Workflow:
 
     def run(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.CompletedProcess[str]:
         """Run Snakemake to its end; stdout holds its messages too."""
-        python = self.reader or (warm_python() if self.warm else sys.executable)
-        return subprocess.run(
-            self.command(*targets, flags=flags, python=python),
-            cwd=self.folder,
-            env=self.environment | environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            check=False,
-            timeout=1200,
-        )
+        return run_snakemake(self.words(*targets, flags=flags), self.folder, self.environment | environment)
 
-    def start(
-        self, *targets: str, flags: tuple[str, ...] = (), python: str = sys.executable, **environment: str
-    ) -> subprocess.Popen[bytes]:
+    def start(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.Popen[bytes]:
         """Run Snakemake beside the test, in a session of its own, as a terminal does."""
         return subprocess.Popen(
-            self.command(*targets, flags=flags, python=python),
+            self.command(*targets, flags=flags),
             cwd=self.folder,
             env=self.environment | environment,
             stdout=subprocess.DEVNULL,
@@ -152,6 +141,19 @@ class Workflow:
     def with_config(self, **values: Any) -> "Workflow":
         """The same workflow with other values of some keys."""
         return replace(self, config=self.config | values)
+
+
+@cache
+def _read_code() -> None:
+    files = (path.relative_to(REPOSITORY).with_suffix("") for path in (REPOSITORY / "sepi").rglob("*.py"))
+    code_digest(*(".".join(file.parts) for file in files if file.name != "__init__"))
+
+
+def with_code_read(folder: Path) -> None:
+    """Have in a folder what an earlier run there would have kept of the package's code, which takes long to read."""
+    _read_code()
+    (folder / ".snakemake").mkdir(exist_ok=True)
+    keep(folder / ".snakemake")
 
 
 def planned(stdout: str) -> dict[str, int]:

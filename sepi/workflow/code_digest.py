@@ -20,8 +20,8 @@ Snakemake sees the shell command of a rule, not the modules that the command imp
 
 No stage imports another stage, so a change in one leaves the others' digests as they are.
 
-Reading all of the code takes a second, a fifth of a start of Snakemake. So the result for each source is cached in
-Snakemake's own folder, keyed by the source itself: a changed one is read, whatever its time stamp.
+Reading all of the code takes most of a second, a fifth of a start of Snakemake. So what each source comes to is cached
+in Snakemake's own folder, keyed by the source itself: a changed one is read, whatever its time stamp.
 """
 
 from __future__ import annotations
@@ -82,8 +82,11 @@ _Code = tuple[str, list[tuple[int, str, list[str]]]]
 
 # in Snakemake's folder
 _KEPT = "sepi_code.json"
-# module to the digest of its source, and what that comes to
-_read: dict[str, tuple[str, _Code]] = {}
+# what is read by other code than this one may come to something else
+_OWN = Path(__file__).read_bytes()
+# key of a source to what it comes to: of the start before, and of this one
+_before: dict[str, _Code] = {}
+_read: dict[str, _Code] = {}
 
 
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
@@ -166,78 +169,54 @@ def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
     if file is None:
         raise ModuleNotFoundError(f"no module {module} in {root}")
     source = file.read_bytes()
-    digest = hashlib.sha256(source).hexdigest()
-    if module not in _read or _read[module][0] != digest:
-        found = _code_and_names(source, file) if file.suffix == ".py" else _code_and_headers(source, file, root)
-        _read[module] = digest, found
-    code, named = _read[module][1]
+    key = hashlib.sha256(b"\0".join((_OWN, file.suffix.encode(), source))).hexdigest()
+    if key not in _read:
+        _read[key] = _before.get(key) or (_python_code if file.suffix == ".py" else _kernel_code)(source)
+    code, named = _read[key]
+    if file.suffix != ".py":
+        return code, frozenset(_header(name, file, root) for _, name, _ in named)
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
     imports = {name for level, base, names in named for name in _imported(level, base, names, package, root)}
     return code, frozenset(name for name in imports if name.split(".")[0] == module.split(".")[0])
 
 
-def _code_and_headers(source: bytes, file: Path, root: Path) -> _Code:
-    """A digest of a C++ source without comments and layout, and the headers of the project that it includes."""
+def _kernel_code(source: bytes) -> _Code:
+    """Of a C++ source without comments and layout, and the headers of the project that it includes."""
     text = re.sub(r"//[^\n]*|/\*.*?\*/", " ", source.decode(), flags=re.DOTALL)
-    package = root / file.relative_to(root).parts[0]
-    named: list[tuple[int, str, list[str]]] = []
-    for include in re.findall(r'^#include "(.+)\.hpp"', text, re.MULTILINE):
-        # beside it, or in the package
-        near = file.parent / f"{include}{_HEADER}"
-        place = near if near.is_file() else package / f"{include}{_HEADER}"
-        named.append((0, ".".join(place.relative_to(root).with_suffix("").parts) + _HEADER, []))
-    return hashlib.sha256(" ".join(text.split()).encode()).hexdigest(), named
+    headers = re.findall(r'^#include "(.+)\.hpp"', text, re.MULTILINE)
+    return hashlib.sha256(" ".join(text.split()).encode()).hexdigest(), [(0, name, []) for name in headers]
 
 
-def _code_and_names(source: bytes, file: Path) -> _Code:
-    """A digest of the syntax tree of a source without docstrings, and what its statements import as they stand."""
-    tree = ast.parse(source, str(file))
+def _python_code(source: bytes) -> _Code:
+    """Of the syntax tree of a source without docstrings, and what its statements import."""
+    tree = ast.parse(source)
     tree.body = [node for node in tree.body if not (isinstance(node, ast.If) and ast.unparse(node.test) in _NOT_RUN)]
     named: list[tuple[int, str, list[str]]] = []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            named += [(0, alias.name, []) for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            named.append((node.level, node.module or "", [alias.name for alias in node.names]))
-        elif isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
-            node.body = node.body[1:]
-        elif isinstance(node, ast.Call):
-            node.keywords = [keyword for keyword in node.keywords if keyword.arg not in _TOLD]
-    return hashlib.sha256(_dumped(tree).encode()).hexdigest(), named
+    text = _dumped(tree, named)
+    return hashlib.sha256(text.encode()).hexdigest(), named
 
 
-def remember(folder: Path) -> None:
-    """Take over what earlier starts kept in a folder, where it is there and of this module as it is now."""
-    with suppress(OSError, ValueError, TypeError, KeyError, AttributeError):
-        kept = json.loads((folder / _KEPT).read_text(encoding="utf-8"))
-        if kept["by"] == _own_digest():
-            _read.update({module: (digest, (code, named)) for module, (digest, (code, named)) in kept["read"].items()})
+def _dumped(node: Any, named: list[tuple[int, str, list[str]]]) -> str:
+    """A syntax tree as text; what is imported is added to ``named``.
 
-
-def keep(folder: Path) -> None:
-    """Keep what was read, where the folder is there and can be written: the next start is as right without."""
-    file = folder / _KEPT
-    text = json.dumps({"by": _own_digest(), "read": _read})
-    with suppress(OSError, SepiError):
-        if folder.is_dir() and not (file.is_file() and file.read_text(encoding="utf-8") == text):
-            with atomic_path(file) as temporary:
-                temporary.write_text(text, encoding="utf-8")
-
-
-def _own_digest() -> str:
-    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
-
-
-def _dumped(node: Any) -> str:
-    """A syntax tree as text; versions of Python differ in the empty fields that they have, and ``ast.dump`` in more."""
+    Versions of Python differ in the empty fields that they have, and ``ast.dump`` in more.
+    """
     if isinstance(node, list):
-        return f"[{', '.join(map(_dumped, node))}]"
+        return f"[{', '.join([_dumped(one, named) for one in node])}]"
     if isinstance(node, ast.Constant):
         return repr(node.value)
     if not isinstance(node, ast.AST):
         return repr(node)
+    if isinstance(node, ast.Import):
+        named += [(0, alias.name, []) for alias in node.names]
+    elif isinstance(node, ast.ImportFrom):
+        named.append((node.level, node.module or "", [alias.name for alias in node.names]))
+    elif isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+        node.body = node.body[1:]
+    elif isinstance(node, ast.Call):
+        node.keywords = [keyword for keyword in node.keywords if keyword.arg not in _TOLD]
     fields = [(name, value) for name, value in ast.iter_fields(node) if value is not None and value != []]
-    return f"{type(node).__name__}({', '.join(f'{name}={_dumped(value)}' for name, value in fields)})"
+    return f"{type(node).__name__}({', '.join([f'{name}={_dumped(value, named)}' for name, value in fields])})"
 
 
 def _imported(level: int, base: str, names: list[str], package: str, root: Path) -> Iterator[str]:
@@ -248,3 +227,23 @@ def _imported(level: int, base: str, names: list[str], package: str, root: Path)
     for name in names:
         inner = f"{base}.{name}"
         yield inner if _file_of(inner, root) else base
+
+
+def _header(name: str, file: Path, root: Path) -> str:
+    """The header that a kernel or a header includes by this name: beside it, or in the package."""
+    near = file.parent / f"{name}{_HEADER}"
+    place = near if near.is_file() else root / file.relative_to(root).parts[0] / f"{name}{_HEADER}"
+    return ".".join(place.relative_to(root).with_suffix("").parts) + _HEADER
+
+
+def remember(folder: Path) -> None:
+    """Take over what the start before kept in a folder, where it is there and can be read."""
+    with suppress(OSError, ValueError, TypeError):
+        _before.update(json.loads((folder / _KEPT).read_text(encoding="utf-8")))
+
+
+def keep(folder: Path) -> None:
+    """Keep what was read, where the folder is there and can be written: the next start is as right without."""
+    if folder.is_dir() and _read != _before:
+        with suppress(OSError, SepiError), atomic_path(folder / _KEPT) as temporary:
+            temporary.write_text(json.dumps(_read), encoding="utf-8")

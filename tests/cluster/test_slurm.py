@@ -66,13 +66,13 @@ def workflow(tmp_path_factory: pytest.TempPathFactory) -> Workflow:
     for name in SCENES:
         write_hci(render("dots", size=SIZE, views=3), root / "scenes" / name)
     config = TINY | {"builtin": {"scenes": []}, "hci_root": str(root / "scenes")}
-    return Workflow(copy_of_the_project(root / "tree"), root / "cluster", config, warm=False)
+    return Workflow(copy_of_the_project(root / "tree"), root / "cluster", config)
 
 
 @pytest.fixture(scope="module")
 def local(workflow: Workflow) -> Workflow:
     """A run on this machine, without Slurm."""
-    local = replace(workflow, folder=workflow.folder.with_name("local"), warm=True)
+    local = replace(workflow, folder=workflow.folder.with_name("local"))
     result = local.run(*TARGETS)
     assert result.returncode == 0, result.stdout
     return local
@@ -129,7 +129,7 @@ def test_a_scene_is_one_submission_with_the_bytes_of_a_local_run(
     assert result.returncode == 0, result.stdout
     assert len(re.findall("has been submitted with SLURM jobid", result.stdout)) == len(SCENES)
     assert digests(workflow) == expected
-    assert "Nothing to be done" in on_slurm(replace(workflow, warm=True), *TARGETS).stdout
+    assert "Nothing to be done" in on_slurm(workflow, *TARGETS).stdout
 
 
 @pytest.mark.faults
@@ -201,6 +201,7 @@ def test_a_killed_run_goes_on_where_it_was(slurm: None, workflow: Workflow, expe
         assert queue() != []
         subprocess.run(["scancel", *(f"--name={name}" for name in set(queue()))], check=True)
         wait_for(lambda: queue() == [])
+        on_slurm(killed, *TARGETS, more=("--unlock",))
         result = on_slurm(killed, *TARGETS)
     assert result.returncode == 0, result.stdout
     assert digests(killed) == expected

@@ -2,11 +2,11 @@
 
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from numpy_docstrings import unimported
-from warm_python import warm_python
 
 RUN = Path(__file__).with_name("example_with_claims.py")
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
@@ -133,7 +133,7 @@ def test_examples_import_what_they_use() -> None:
 def test_example_runs_and_shows_what_it_says(name: str, tmp_path: Path) -> None:
     """Someone who downloads the script gets an error or a warning, or pictures that do not show what the text says."""
     environment = os.environ | {"OMP_NUM_THREADS": "1"} | {"MPLBACKEND": "agg"}
-    command = [warm_python(), str(RUN), str(GALLERY / f"{name}.py"), *CLAIMS[name]]
+    command = [sys.executable, str(RUN), str(GALLERY / f"{name}.py"), *CLAIMS[name]]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment, check=False)
     assert done.returncode == 0, done.stderr
     assert not done.stderr

@@ -31,7 +31,8 @@ def made(workflow: Workflow) -> dict[str, str]:
 
 
 def healed(disturbed: Workflow, expected: dict[str, str], target: str = TARGET, told: object = None) -> None:
-    """The documented way to go on, which is to start again, makes what an undisturbed run does, and nothing else."""
+    """The documented way to go on, to unlock the folder and start again, makes what an undisturbed run does."""
+    unlock(disturbed)
     result = disturbed.run(target)
     assert result.returncode == 0, (told, result.stdout)
     made_now = made(disturbed)
@@ -39,6 +40,12 @@ def healed(disturbed: Workflow, expected: dict[str, str], target: str = TARGET, 
     assert made_now.items() <= expected.items(), told
     assert target == PART or len(made_now) == len(expected), told
     assert not [path for path in disturbed.folder.rglob(".*") if is_temporary(path)], told
+
+
+def unlock(disturbed: Workflow) -> None:
+    """Take away the lock that a killed run leaves."""
+    result = disturbed.run("all", flags=("--unlock",))
+    assert result.returncode == 0, result.stdout
 
 
 def nothing_half_written(disturbed: Workflow, expected: dict[str, str]) -> bool:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from one_scene import PART, TARGET, healed, made
+from one_scene import PART, TARGET, healed, made, unlock
 from workflow_copy import SLOW_WRITING, Workflow, edited, files_below, wait_for
 
 from sepi.io.files import is_temporary
@@ -45,6 +45,7 @@ def victim(run: psutil.Process, kind: str) -> psutil.Process:
 def killed_runs(workflow: Workflow, target: str, kills: int) -> Iterator[str]:
     """Begin a run as often as it takes for so many to be killed; what was killed of each."""
     for number in range(kills):
+        unlock(workflow)
         process = workflow.start(target)
         time.sleep(random.uniform(0.5, LONGEST))
         kind = VICTIMS[number % len(VICTIMS)]
@@ -69,6 +70,7 @@ def test_killed_at_any_moment(undisturbed: Workflow) -> None:
         if runs % REPORT_EVERY == REPORT_EVERY - 1:
             # all that a report needs of the scene is there: what is killed now are the jobs of the report
             told = list(killed_runs(disturbed, "all", 1))
+            unlock(disturbed)
             result = disturbed.run("all")
             assert result.returncode == 0, (told, result.stdout)
             assert made(disturbed).items() >= expected.items(), told
@@ -115,7 +117,7 @@ def test_a_terminal_that_closes(undisturbed: Workflow) -> None:
 def test_the_same_on_one_thread_and_on_four(undisturbed: Workflow) -> None:
     """More cores must not be another result."""
     for cores in (1, 4):
-        other = replace(undisturbed, folder=undisturbed.folder.with_name(f"cores-{cores}"), warm=False)
+        other = replace(undisturbed, folder=undisturbed.folder.with_name(f"cores-{cores}"))
         result = other.run(PART, flags=("--cores", str(cores), "--set-threads", f"initial={cores}"))
         assert result.returncode == 0, result.stdout
         assert PART in made(other)

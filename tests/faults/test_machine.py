@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -22,7 +21,6 @@ from sepi.scenes import render, write_hci
 
 pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 
-DAY = 86_400
 # root may write where nobody may; without this right it is as any other user
 AS_A_USER = ("setpriv", "--bounding-set=-dac_override") if sys.platform == "linux" and os.geteuid() == 0 else ()
 # kilobytes of address space that all modules take, before any of them has done anything
@@ -118,7 +116,7 @@ def test_jobs_that_get_too_little_memory(undisturbed: Workflow, tmp_path: Path) 
     """One line says so, not a traceback from inside a library; and with more memory the run goes on."""
     write_hci(render("curved_occluders", size=3 * SIZE, views=9), tmp_path / "scenes" / "box")
     config = undisturbed.config | {"hci_root": str(tmp_path / "scenes")}
-    poor = replace(undisturbed, folder=tmp_path / "poor", config=config, warm=False)
+    poor = replace(undisturbed, folder=tmp_path / "poor", config=config)
     one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     imports = subprocess.run(
         [sys.executable, "-c", IMPORTS], env=os.environ | one_thread, check=True, capture_output=True, text=True
@@ -135,41 +133,3 @@ def test_jobs_that_get_too_little_memory(undisturbed: Workflow, tmp_path: Path) 
     assert not [path for path in poor.folder.rglob(".*") if is_temporary(path)]
     again = poor.run(target, flags=("--cores", "1"))
     assert again.returncode == 0, again.stdout
-
-
-@pytest.mark.faults
-def test_a_clock_that_is_set_back_during_a_run(undisturbed: Workflow) -> None:
-    """What is made then is older than what it is made of, which Snakemake refuses until the old time has come again."""
-    expected = made(undisturbed)
-    back = replace(undisturbed, folder=undisturbed.folder.with_name("back"))
-    with edited(back.tree / "sepi" / "io" / "files.py", "temporary.replace(path)", SLOW_WRITING):
-        process = back.start(PART, SLEEP="0.5")
-        wait_for(lambda: list((back.folder / "results").rglob("initial.h5")))
-        changed_times(back.folder / "results", DAY)
-        assert process.wait(timeout=60) != 0
-    healed(back, expected, PART)
-
-
-@pytest.mark.faults
-@pytest.mark.parametrize("seconds", [-DAY, DAY])
-def test_a_clock_that_is_set_between_two_runs(undisturbed: Workflow, seconds: int) -> None:
-    """Half of the work was done on a day that is yet to come, or long ago."""
-    expected = made(undisturbed)
-    jumped = replace(undisturbed, folder=undisturbed.folder.with_name(f"jumped{seconds}"))
-    half = "results/hci/box/stages/sepi/initial.h5"
-    result = jumped.run(half)
-    assert result.returncode == 0, result.stdout
-    changed_times(jumped.folder, seconds)
-    made_before = jumped.folder / half
-    time_of_it = made_before.stat().st_mtime
-    healed(jumped, expected, PART)
-    # not made again, but of no later time than now
-    assert made_before.stat().st_mtime == pytest.approx(min(time_of_it, time.time()), abs=60)
-    assert jumped.plan(PART) == {}
-
-
-def changed_times(folder: Path, seconds: int) -> None:
-    """Let files and folders be made so much later: earlier, where negative."""
-    for path in [*folder.rglob("*")]:
-        status = path.stat()
-        os.utime(path, (status.st_atime + seconds, status.st_mtime + seconds))

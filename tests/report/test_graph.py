@@ -12,7 +12,6 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from warm_python import warm_python
 
 from sepi.errors import SepiError
 from sepi.report import graph
@@ -107,12 +106,6 @@ def test_names_are_no_markup() -> None:
 
 
 @pytest.fixture
-def warm(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Snakemake is asked without waiting for its libraries."""
-    monkeypatch.setattr("sys.executable", warm_python())
-
-
-@pytest.fixture
 def edited_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the workflow with an edited config.yaml beside its Snakefile, in a folder that is worked in."""
     tree = tmp_path / "tree"
@@ -126,7 +119,6 @@ def edited_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.workflow
-@pytest.mark.usefixtures("warm")
 @pytest.mark.parametrize("external", [False, True])
 def test_the_workflows_own_graph(external: bool, edited_copy: Path) -> None:
     """Snakemake itself is asked; the four stages follow each other, and all end in the page.
@@ -146,7 +138,6 @@ def test_the_workflows_own_graph(external: bool, edited_copy: Path) -> None:
 
 
 @pytest.mark.workflow
-@pytest.mark.usefixtures("warm")
 def test_without_a_graph_the_page_says_so_and_still_comes(tmp_path: Path) -> None:
     """A version of Snakemake that draws otherwise must not cost the whole report."""
     snakefile = tmp_path / "Snakefile"

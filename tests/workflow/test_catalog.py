@@ -2,12 +2,11 @@
 
 import os
 import re
-import subprocess
 from pathlib import Path
 
 import pytest
 import yaml
-from warm_python import warm_python
+from snakemake_runs import run_snakemake
 from workflow_copy import REPOSITORY
 
 from sepi.workflow.config import Config
@@ -19,15 +18,8 @@ ALLOWED = {"Specify a conda environment or container for each rule."}
 @pytest.mark.workflow
 def test_snakemakes_linter_finds_nothing_else(tmp_path: Path) -> None:
     """It finds what makes a workflow hard to read or to run elsewhere; the catalog shows what it says."""
-    result = subprocess.run(
-        [warm_python(), "-m", "snakemake", "--snakefile", str(REPOSITORY / "Snakefile"), "--lint", "--", "all"],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
+    words = ["--snakefile", str(REPOSITORY / "Snakefile"), "--lint", "--", "all"]
+    result = run_snakemake(words, tmp_path, os.environ | {"PYTHONPATH": str(REPOSITORY)})
     checked = set(re.findall(r"^Lints for rule (\w+)", result.stdout, re.MULTILINE))
     assert {"ingest", "optimize", "page"} <= checked, result.stdout
     assert set(re.findall(r"^ +\* (.+):$", result.stdout, re.MULTILINE)) == ALLOWED, result.stdout

@@ -3,9 +3,7 @@
 import os
 import re
 import shutil
-import signal
 import subprocess
-import sys
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,10 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from warm_python import warm_python
-from workflow_copy import REPOSITORY, copy_of_the_project, wait_for
+from snakemake_runs import run_snakemake
+from workflow_copy import REPOSITORY, copy_of_the_project, with_code_read
 
-from sepi.io.files import is_temporary
 from sepi.scenes import render
 
 pytestmark = pytest.mark.workflow
@@ -50,16 +47,8 @@ class User:
 
     def run(self, *words: str) -> subprocess.CompletedProcess[str]:
         """Snakemake as the user calls it; stdout holds its messages too."""
-        return subprocess.run(
-            [warm_python(), "-m", "snakemake", "--cores", "1", *words],
-            cwd=self.folder,
-            env=self.environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            check=False,
-            timeout=300,
-        )
+        with_code_read(self.folder)
+        return run_snakemake(["--cores", "1", *words], self.folder, self.environment)
 
     def told(self) -> str:
         """The one line with which this workflow ends a run that it cannot do."""
@@ -162,41 +151,6 @@ def test_without_prefix_and_names_of_its_own(beside: Callable[..., User]) -> Non
     seen = dict(line.partition("=")[::2] for line in (plain.folder / "shown.txt").read_text().splitlines())
     assert seen["PYTHONPATH"] == str(REPOSITORY)
     assert seen["PATH"] == os.environ["PATH"]
-
-
-@pytest.mark.system
-def test_a_killed_run_is_put_away(beside: Callable[..., User]) -> None:
-    """Its lock would stop every further run of the user's workflow, and what it had begun to write would stay."""
-    rules = """rule stuck:
-    output:
-        "stuck.txt",
-    shell:
-        "touch begun; sleep 300"
-
-
-rule short:
-    output:
-        "short.txt",
-    shell:
-        "touch {output}"
-"""
-    killed = beside("sepi: {}", ("onsuccess:\n    sepi.run_ended_well()\n", rules))
-    command = [sys.executable, "-m", "snakemake", "--cores", "1"]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    process = subprocess.Popen(
-        [*command, "stuck"], cwd=killed.folder, env=killed.environment, start_new_session=True, **quiet
-    )
-    wait_for((killed.folder / "begun").exists, seconds=120)
-    begun = killed.folder / "depth/results/.map-0123456789ab.pfm"
-    assert is_temporary(begun)
-    begun.parent.mkdir(parents=True)
-    begun.touch()
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    result = killed.run("short")
-    assert result.returncode == 0, result.stdout
-    assert "sepi: the last run here was killed" in result.stdout
-    assert not begun.exists()
 
 
 class TestFromElsewhere:

@@ -4,7 +4,6 @@ import os
 import re
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -12,14 +11,11 @@ from snakemake.iocontainers import Wildcards
 from workflow_copy import REPOSITORY, TINY, Workflow
 
 from sepi.errors import SepiError
-from sepi.io.files import is_temporary
 from sepi.report.plan import TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
 from sepi.variants import HANDED_ON, STAGES
-from sepi.workflow import run_folder
 from sepi.workflow.code_digest import code_digest, ingest_modules, render_modules, stage_modules
 from sepi.workflow.datasets import Scene
-from sepi.workflow.job_client import SERVER
 from sepi.workflow.settings import MOST_ON_PAGE, Report
 
 pytestmark = pytest.mark.workflow
@@ -60,22 +56,6 @@ def of_size(size: int, folder: Path, **more: Any) -> dict[str, Any]:
     return found
 
 
-def test_jobs_of_a_cluster_are_its_own(read: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A fork of a server would run beside the cluster's limits, and its memory unseen by Snakemake."""
-    monkeypatch.delenv(SERVER, raising=False)
-    asked = read.globals["jobs_are_forks"]
-    assert asked()
-    with monkeypatch.context() as cluster:
-        settings = SimpleNamespace(common_settings=SimpleNamespace(local_exec=False))
-        cluster.setattr(read, "_executor_plugin", settings)
-        assert not asked()
-    with monkeypatch.context() as measured:
-        measured.setattr(read.output_settings, "benchmark_extended", True)
-        assert not asked()
-    monkeypatch.setenv(SERVER, "")
-    assert not asked()
-
-
 def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
     """A rule without the digest of its command would keep what earlier code made."""
     checked = set()
@@ -97,8 +77,6 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
                 modules = ("sepi.truth", "sepi.scenes")
             given = code(scene(**{rule.name: name})) if callable(code) else code
             assert given == code_digest(*modules), f"{rule.name} {name}"
-        if "--code" in rule.shellcmd:
-            assert "--code {params.code}" in rule.shellcmd
     assert {
         "ingest",
         "truth",
@@ -172,12 +150,6 @@ def test_a_wrong_scene_in_a_target_is_told(read: Any, target: str, wrong: str, m
     read.globals["SETTINGS"].require_target(target.replace(wrong, meant))
 
 
-def test_a_wrong_target_finds_what_is_near(read: Any) -> None:
-    near = read.globals["names_like"]
-    assert {"all", "reports/table1_mse.md", "reports/maps/builtin/dots"} <= {*near("al")}
-    assert "results/builtin/dots/best/disparity.pfm" in near("results/builtin/dots/best/disparty.pfm")
-
-
 def test_what_a_cluster_ended_is_tried_with_twice_as_much(read: Any) -> None:
     found = read.globals
     for stage in ("initial", "occlusion", "optimize"):
@@ -209,31 +181,6 @@ def test_minutes_are_several_times_what_was_measured() -> None:
     """Of a benchmark scene, 30 s for a million samples: 11 minutes on the machine of the measurement."""
     benchmark = Scene("hci", "cotton", None, (), 81, 512, 512)
     assert 20 < benchmark.minutes(30) < 60
-
-
-def test_a_failed_run_takes_nothing_away_where_another_may_go_on(
-    read: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A file that it finds half written is not its own where it does not hold the folder."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(run_folder, "_held", [])
-    monkeypatch.setattr(read, "_scheduler", SimpleNamespace(keepgoing=False))
-    # of the rules that were read last, which may be others'
-    monkeypatch.setitem(read.globals, "workflow", read)
-    begun = tmp_path / "results/.map-0123456789ab.pfm"
-    begun.parent.mkdir()
-    begun.touch()
-    assert is_temporary(begun)
-    read.globals["run_failed"]()
-    assert begun.exists()
-    # where it does, what its own jobs left goes
-    run_folder.take_over(Path(), [])
-    try:
-        read.globals["run_failed"]()
-    finally:
-        for held in run_folder._held:
-            held.close()
-    assert not begun.exists()
 
 
 def test_no_command_grows_with_the_number_of_scenes(tmp_path: Path) -> None:
