@@ -2,8 +2,10 @@
 
 import os
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -181,6 +183,16 @@ def test_minutes_are_several_times_what_was_measured() -> None:
     """Of a benchmark scene, 30 s for a million samples: 11 minutes on the machine of the measurement."""
     benchmark = Scene("hci", "cotton", None, (), 81, 512, 512)
     assert 20 < benchmark.minutes(30) < 60
+
+
+def test_a_full_disk_is_told(read: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """A job that found no room for its message fails without one."""
+    for free, told in ((10**7, "only 10 MB are free on this disk"), (10**12, "")):
+        monkeypatch.setattr(shutil, "disk_usage", lambda _, free=free: SimpleNamespace(free=free))
+        read.globals["run_failed"]()
+        said = capsys.readouterr().err
+        assert told in said
+        assert bool(said) == bool(told)
 
 
 def test_no_command_grows_with_the_number_of_scenes(tmp_path: Path) -> None:
