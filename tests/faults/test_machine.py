@@ -23,12 +23,11 @@ pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 
 # root may write where nobody may; without this right it is as any other user
 AS_A_USER = ("setpriv", "--bounding-set=-dac_override") if sys.platform == "linux" and os.geteuid() == 0 else ()
-# kilobytes of address space that all modules take, before any of them has done anything
+# kilobytes of address space that the stages take before any of them has done anything
 IMPORTS = """
-import pkgutil, sepi, scipy.sparse.linalg, skimage.segmentation
-for module in pkgutil.walk_packages(sepi.__path__, "sepi."):
-    if not module.name.endswith("__main__"):
-        __import__(module.name)
+import sepi.ingest, sepi.initial, sepi.occlusion, sepi.textureless, sepi.optimize
+from sepi.command import stage_command
+stage_command("initial", sepi.initial.CHOICES)
 print(next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmPeak")))
 """
 
