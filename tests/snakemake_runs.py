@@ -1,15 +1,16 @@
 """Runs of Snakemake that need not wait for its import, which takes longer than what most tests ask it.
 
-Each is a child of a process that has imported Snakemake's libraries, and none of the package. Not for tests of how a
-run begins or is killed.
+Each is a child of a process that has imported Snakemake's libraries, and none of the package.
 """
 
 import multiprocessing
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
 _LIBRARIES = ("pytest", "snakemake.cli", "snakemake.report", "pulp", "psutil", "jinja2", "requests", "h5py", "click")
@@ -21,17 +22,30 @@ _context.set_forkserver_preload([*_LIBRARIES])
 
 
 def run_snakemake(
-    words: Sequence[str], folder: Path, environment: Mapping[str, str]
+    words: Sequence[str], folder: Path, environment: Mapping[str, str], python: str = sys.executable
 ) -> subprocess.CompletedProcess[str]:
-    """Run Snakemake to its end; stdout holds its messages too."""
+    """Run Snakemake to its end, its jobs by this Python; stdout holds its messages too."""
     with tempfile.TemporaryDirectory() as name:
         out, taken = Path(name, "out"), Path(name, "taken")
-        process = _context.Process(target=_run, args=(list(words), str(folder), dict(environment), out, taken))
-        process.start()
+        process = begin_snakemake(words, folder, environment, out, taken, python)
         process.join(_SECONDS)
         assert process.exitcode is not None, f"still running after {_SECONDS} s"
         _taken.append(float(taken.read_text(encoding="utf-8")))
         return subprocess.CompletedProcess(words, process.exitcode, out.read_text(encoding="utf-8"))
+
+
+def begin_snakemake(
+    words: Sequence[str],
+    folder: Path,
+    environment: Mapping[str, str],
+    out: Path,
+    taken: Path,
+    python: str = sys.executable,
+) -> ForkServerProcess:
+    """Begin a run in a session of its own, as a terminal does; files for its messages and its CPU seconds."""
+    process = _context.Process(target=_run, args=(list(words), str(folder), dict(environment), out, taken, python))
+    process.start()
+    return process
 
 
 def cpu_seconds_of_runs() -> float:
@@ -39,7 +53,10 @@ def cpu_seconds_of_runs() -> float:
     return sum(_taken)
 
 
-def _run(words: list[str], folder: str, environment: dict[str, str], out: Path, taken: Path) -> None:
+def _run(words: list[str], folder: str, environment: dict[str, str], out: Path, taken: Path, python: str) -> None:
+    os.setsid()
+    # a background process of a shell ignores it
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     os.environ.clear()
     os.environ.update(environment)
     os.chdir(folder)
@@ -47,7 +64,7 @@ def _run(words: list[str], folder: str, environment: dict[str, str], out: Path, 
     for number in (1, 2):
         os.dup2(file, number)
     sys.path[:0] = ["", *filter(None, environment.get("PYTHONPATH", "").split(os.pathsep))]
-    sys.argv = ["snakemake", *words]
+    sys.argv, sys.executable = ["snakemake", *words], python
     from snakemake.cli import main
 
     try:

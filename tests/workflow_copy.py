@@ -71,9 +71,11 @@ class Workflow:
         """Environment in which the copy of the package is the one imported."""
         return os.environ | {"PYTHONPATH": str(self.tree)}
 
-    def run(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.CompletedProcess[str]:
-        """Run Snakemake to its end; stdout holds its messages too."""
-        return run_snakemake(self.words(*targets, flags=flags), self.folder, self.environment | environment)
+    def run(
+        self, *targets: str, flags: tuple[str, ...] = (), python: str = sys.executable, **environment: str
+    ) -> subprocess.CompletedProcess[str]:
+        """Run Snakemake to its end, jobs by some Python; stdout holds its messages too."""
+        return run_snakemake(self.words(*targets, flags=flags), self.folder, self.environment | environment, python)
 
     def start(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.Popen[bytes]:
         """Run Snakemake beside the test, in a session of its own, as a terminal does."""
