@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import logging
 import os
-import threading
 import warnings
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -20,8 +20,9 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.io.exr import exr_pixels
 from sepi.io.files import atomic_path, reading
-from sepi.io.picture_headers import Header, read_header
-from sepi.io.tiff import plain_pixels, unturned
+from sepi.io.picture_headers import Header, pillow_class, read_header
+from sepi.io.pnm import pnm_pixels
+from sepi.io.tiff import open_tiff, page_pixels
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
 from sepi.threads import available_cores
 
@@ -32,9 +33,10 @@ SUFFIXES = frozenset(f".{end}" for end in _ENDS)
 """Ends of names, in small letters, of the pictures that can be read."""
 
 _MAX_BYTES = 2**32
-_USUAL_BYTES = 2**24
 _SILENT = logging.NullHandler()
-_CODECS = {"PNG": "png", "GIF": "gif", "JPEG 2000": "jpeg2k", "AVIF": "avif"}
+_CODECS = {"PNG": "png", "GIF": "gif", "JPEG 2000": "jpeg2k", "AVIF": "avif", "WebP": "webp"}
+_PLUGINS = {"JPEG": "Jpeg", "BMP": "Bmp"}
+_LAST_CHUNK = b"IEND" + zlib.crc32(b"IEND").to_bytes(4, "big")
 
 
 def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
@@ -71,25 +73,20 @@ def _read(path: Path, any_floats: bool = False) -> Pixels:
     return image
 
 
-class _Held(io.BytesIO):
-    """What a file holds, and its name, by which OpenEXR opens it."""
-
-    def __init__(self, data: bytes, name: str) -> None:
-        super().__init__(data)
-        self.name = name
-
-
 def _pixels(path: Path) -> Pixels:
     with _opened(path) as file:
-        # usually all of it, at once: each of many small reads would let go of Python's lock, for which others wait
-        usual = os.fstat(file.fileno()).st_size <= _USUAL_BYTES
-        data = file.read() if usual else b""
-        header = read_header(path, _Held(data, file.name) if usual else file, whole=True)
-        if not usual:
-            file.seek(0)
-            data = file.read()
-    image = _decoded(path, data, header)
-    return _stretched(path, image, header.white) if header.white else image
+        # all of it at once: each of many small reads would let go of Python's lock, for which others wait
+        data = file.read()
+    header = read_header(path, io.BytesIO(data))
+    with reading(path, header.kind):
+        image = _decoded(path, data, header.kind)
+        if image.shape[:2] != (header.height, header.width):
+            raise SepiError(f"damaged {header.kind}: its pixels are not those of its header")
+        if image.dtype not in (np.uint8, np.uint16, np.float32):
+            raise SepiError(f"pixels of type {image.dtype}; expected 8 or 16 bit without sign, or float32")
+    channels = image[:, :, None] if image.ndim == 2 else image
+    # grey with transparency may be decoded to colours
+    return np.ascontiguousarray(channels[:, :, : 1 if header.grey else 3])
 
 
 def read_views(
@@ -223,80 +220,31 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
             yield file
 
 
-def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
-    """Pixels of a picture, in the order RGB."""
-    if header.kind in _CODECS:
-        return _by_imagecodecs(path, data, header)
-    if header.kind == "JPEG":
-        usual = _by_pillow(path, data, header)
-        if usual is not None:
-            return usual
-    with reading(path, header.kind):
-        if header.kind == "OpenEXR":
-            return exr_pixels(str(path))
-        if header.plain:
-            return plain_pixels(data)
-        if header.kind == "TIFF":
-            data = unturned(data)
-    # OpenCV wants something behind the last digit of a PNM
-    data += b"\n" if header.white else b""
-    try:
-        with _silent_opencv():
-            image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        image = None
-    if image is None or image.shape[:2] != (header.height, header.width):
-        raise SepiError(f"{path}: damaged {header.kind}, perhaps cut off: its pixels cannot be decoded")
-    if image.dtype not in (np.uint8, np.uint16, np.float32):
-        raise SepiError(f"{path}: pixels of type {image.dtype}; expected 8 or 16 bit without sign, or float32")
-    if header.mixed_alpha and image.shape[2:] == (4,) and image[:, :, 3].min() < 255:
-        raise SepiError(f"{path}: a TIFF with transparent pixels, whose colours cannot be told; save it without alpha")
-    channels = image[:, :, None] if image.ndim == 2 else image[:, :, 2::-1]
-    # grey with transparency is decoded to colours
-    return np.ascontiguousarray(channels[:, :, :1] if header.grey else channels)
-
-
-def _by_imagecodecs(path: Path, data: bytes, header: Header) -> Pixels:
-    """Pixels of a PNG of any sort, in two thirds of Pillow's time, and of rarer kinds; what is damaged is told."""
+def _decoded(path: Path, data: bytes, kind: str) -> Pixels:
+    """Pixels (H, W) or (H, W, C) in the order RGB; damage is told, and nothing is printed about it."""
+    if kind == "OpenEXR":
+        return exr_pixels(str(path))
+    if kind == "PNM":
+        return pnm_pixels(data)
+    if kind == "TIFF":
+        with open_tiff(io.BytesIO(data)) as pictures:
+            return page_pixels(pictures.pages[0].aspage())
+    if (kind == "PNG" and _LAST_CHUNK not in data) or (
+        kind == "BMP" and int.from_bytes(data[2:6], "little") > len(data)
+    ):
+        raise ValueError("its end is missing")
+    if kind in _PLUGINS:
+        with pillow_class(_PLUGINS[kind])(io.BytesIO(data)) as image:
+            return np.asarray(image.convert("L" if image.mode == "L" else "RGB"))
     import imagecodecs
 
     # what it warns of leaves the pixels as they are
     logging.getLogger("imagecodecs").addHandler(_SILENT)
-    with reading(path, header.kind):
-        try:
-            image: Pixels = getattr(imagecodecs, f"{_CODECS[header.kind]}_decode")(data)
-        except RuntimeError as error:
-            raise ValueError(f"its pixels cannot be decoded: {error}") from error
-    values = image[:, :, None] if image.ndim == 2 else image
-    return np.ascontiguousarray(values[:, :, :1] if header.grey else values[:, :, :3])
-
-
-def _by_pillow(path: Path, data: bytes, header: Header) -> Pixels | None:
-    """Pixels of a JPEG; None for colours for printing.
-
-    They are those that OpenCV gives, in the same time, but damage is told and nothing is printed about it: the library
-    below OpenCV has its own way to the terminal.
-    """
-    from PIL.JpegImagePlugin import JpegImageFile
-
-    with reading(path, header.kind), JpegImageFile(io.BytesIO(data)) as image:
-        try:
-            if image.mode not in ("L", "RGB"):
-                # whether all of it is there: OpenCV fills with grey what is missing
-                image.load()
-                return None
-            values = np.asarray(image)
-        except OSError as error:
-            raise SepiError("damaged JPEG, perhaps cut off: its pixels cannot be decoded") from error
-        return np.ascontiguousarray(values if values.ndim == 3 else values[:, :, None])
-
-
-def _stretched(path: Path, values: Pixels, white: int) -> Pixels:
-    """Values of a PGM or PPM, which OpenCV leaves as they are, over the whole range of their type."""
-    full = np.iinfo(values.dtype).max  # type: ignore[type-var]
-    if values.max() > white:
-        raise SepiError(f"{path}: damaged PNM: a value of {values.max()}, but white is {white}")
-    return values if white == full else np.rint(values * (full / white)).astype(values.dtype)
+    try:
+        pixels: Pixels = getattr(imagecodecs, f"{_CODECS[kind]}_decode")(data)
+    except RuntimeError as error:
+        raise ValueError(f"its pixels cannot be decoded: {error}") from error
+    return pixels
 
 
 def _require_memory(folder: Path, view: Pixels, count: int) -> None:
@@ -310,30 +258,6 @@ def _require_memory(folder: Path, view: Pixels, count: int) -> None:
             f"{folder}: {count} views of {_described(view)} take {view.nbytes * count / 1e9:.1f} GB, more than the "
             f"{there / 1e9:.1f} GB of memory; use fewer (--central) or smaller ones"
         )
-
-
-_silence = threading.Lock()
-_silenced = 0
-_level = 0
-
-
-@contextmanager
-def _silent_opencv() -> Iterator[None]:
-    """Keep OpenCV from printing about pictures that this module reports itself; threads may overlap."""
-    global _silenced, _level
-    logging = cv2.utils.logging
-    with _silence:
-        if _silenced == 0:
-            _level = logging.getLogLevel()
-            logging.setLogLevel(logging.LOG_LEVEL_SILENT)
-        _silenced += 1
-    try:
-        yield
-    finally:
-        with _silence:
-            _silenced -= 1
-            if _silenced == 0:
-                logging.setLogLevel(_level)
 
 
 def _described(image: Pixels) -> str:

@@ -1,9 +1,12 @@
-"""Pixels of TIFFs as they are stored, whatever a camera's orientation says of them."""
+"""Pictures in a TIFF, with their pixels as they are stored, whatever a camera's orientation says of them."""
 
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING, Any, Literal
+import logging
+import math
+import struct
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,29 +14,78 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 
 if TYPE_CHECKING:
-    from tifffile import TiffPage
+    from tifffile import TiffFile, TiffPage
 
-# those that tifffile unpacks by itself, and no more than their files say
-_COMPRESSIONS = (1, 8, 32946, 32773)
-_PREDICTORS = (1, 2)
-_ORIENTATION = 274
+TIFF_SIGNATURES = (b"II*\0", b"II+\0", b"MM\0*", b"MM\0+")
+"""First bytes of a TIFF."""
+
+# none, LZW, deflate and PackBits, which unpack to no more than the tags say, and JPEG, which is looked at
+_COMPRESSIONS = (1, 5, 8, 32946, 32773, _JPEG := 7)
+_KINDS = ("u1", "u2", "i1", "i2", "f2", "f4")
+_WHITE_IS_ZERO, _PALETTE, _YCBCR = 0, 3, 6
+# pixels in a tile
+_LARGEST_TILE = 2**24
+# tags that say what the pixels are, but for those without which nothing is read
+_FORM_TAGS = frozenset((258, 259, 262, 317, 320, 338, 339))
+_SILENT = logging.NullHandler()
 
 
-def is_plain(page: Any) -> bool:
-    """Whether tifffile reads the pixels of one of its pages by itself: grey or RGB, not packed in a rarer way."""
-    return page.compression in _COMPRESSIONS and page.predictor in _PREDICTORS and page.photometric in (0, 1, 2)
-
-
-def plain_pixels(data: bytes) -> npt.NDArray[Any]:
-    """Pixels of the first picture of a TIFF that is plain and whole, as :func:`page_pixels` has them."""
+def open_tiff(file: IO[bytes]) -> TiffFile:
+    """A file as tifffile reads it, without a word on the terminal."""
     import tifffile
 
-    with tifffile.TiffFile(io.BytesIO(data)) as pictures:
-        return page_pixels(pictures.pages[0].aspage())
+    # what it complains of is raised here
+    logging.getLogger("tifffile").addHandler(_SILENT)
+    return tifffile.TiffFile(file)
+
+
+def tiff_form(page: Any, size: int) -> tuple[int, int, int, bool]:
+    """Height, width and bytes of a pixel of a page, and whether it is grey.
+
+    Parameters
+    ----------
+    page : TiffPage
+    size : int
+        Bytes of the file.
+
+    Raises
+    ------
+    SepiError
+        If the page is damaged, or of a form that would be decoded to other values than it holds.
+    """
+    if _FORM_TAGS & (_codes(page) - {tag.code for tag in page.tags}):
+        raise SepiError("damaged TIFF: what its pixels are is cut off")
+    bits, samples, photometric, dtype = page.bitspersample, page.samplesperpixel, page.photometric, page.dtype
+    if dtype is None or dtype.str[1:] not in _KINDS or bits != 8 * dtype.itemsize:
+        form = {"f": " float", "i": " signed"}.get(dtype.kind if dtype is not None else "", "")
+        raise SepiError(f"a TIFF of {bits} bit{form} samples; expected 8 or 16 bit, or 32 bit float")
+    if samples not in (1, 3, 4):
+        raise SepiError(f"a TIFF of {samples} samples a pixel; expected grey, RGB or RGBA")
+    if page.compression not in _COMPRESSIONS or page.predictor not in (1, 2, 3):
+        raise SepiError("a TIFF that is packed in a rarer way; save it uncompressed")
+    known = [1, 2, *[_WHITE_IS_ZERO] * (dtype.kind != "f"), *[_PALETTE] * (bits == 8 and samples == 1)]
+    if photometric not in (*known, *[_YCBCR] * (page.compression == _JPEG)):
+        raise SepiError("a TIFF that is neither grey nor RGB; save it as one of these")
+    height, width, counts = page.imagelength, page.imagewidth, page.databytecounts
+    if not all(isinstance(number, int) for number in (height, width, page.tilelength, page.tilewidth)):
+        # several of them: a product with one would be a list as long as the other says
+        raise SepiError("damaged TIFF: its height and width are not one number each")
+    if page.imagedepth != 1:
+        raise SepiError("a TIFF of a volume; save each of its pictures as one")
+    if 0 in counts or len(counts) < math.prod(page.chunked):
+        # a decoder would take what is missing for black
+        raise SepiError("damaged TIFF: parts of its pixels are missing")
+    if max(start + count for start, count in zip(page.dataoffsets, counts, strict=True)) > size:
+        raise SepiError(f"damaged TIFF: the file is cut off after {size} bytes")
+    if page.compression == 1 and sum(counts) < width * height * samples * bits // 8:
+        raise SepiError(f"damaged TIFF: {sum(counts)} bytes of pixels for {width}x{height} of {samples} x {bits} bit")
+    if page.is_tiled and page.tilewidth * page.tilelength > _LARGEST_TILE:
+        raise SepiError("damaged TIFF: tiles larger than any program writes")
+    return height, width, samples * bits // 8, samples == 1 and photometric in (0, 1)
 
 
 def page_pixels(page: TiffPage) -> npt.NDArray[Any]:
-    """Pixels of a page that is plain and whole, of an open file.
+    """Pixels of a page of an open file, whose form was looked at.
 
     Returns
     -------
@@ -45,30 +97,40 @@ def page_pixels(page: TiffPage) -> npt.NDArray[Any]:
     SepiError
         If there are numbers below zero among integers.
     """
-    import tifffile
-
+    if page.compression == _JPEG:
+        _require_no_larger(page)
     stored = page.asarray(squeeze=False, maxworkers=1)
     # planes, depth, height, width, samples: colours are either of the ends
     values = np.moveaxis(stored[:, 0, :, :, 0], 0, 2) if len(stored) > 1 else stored[0, 0]
+    if page.photometric == _PALETTE:
+        values = (np.asarray(page.colormap).T[values[:, :, 0]] >> 8).astype(np.uint8)
     values = values[:, :, : 3 if values.shape[2] > 2 else 1]
     kind, size = values.dtype.kind, values.dtype.itemsize
     if kind == "i" and values.min() < 0:
         raise SepiError(f"a TIFF with a sign, and a pixel of {values.min()}; expected none below 0")
     values = values.astype(np.float32 if kind == "f" else f"u{size}")
-    if page.photometric == tifffile.PHOTOMETRIC.MINISWHITE:
+    if page.photometric == _WHITE_IS_ZERO:
         # of numbers with a sign, white is the largest of them
         values = np.iinfo(stored.dtype).max - values
     return np.ascontiguousarray(values)
 
 
-def unturned(data: bytes) -> bytes:
-    """A TIFF that says that its rows and columns are as stored: OpenCV would turn them."""
-    import tifffile
+def _codes(page: Any) -> set[int]:
+    """Codes of the tags of a page, also of those that cannot be read."""
+    form, file = page.parent.tiff, page.parent.filehandle
+    file.seek(page.offset)
+    (count,) = struct.unpack(form.tagnoformat, file.read(form.tagnosize))
+    entries = file.read(count * form.tagsize)
+    return {struct.unpack_from(f"{form.byteorder}H", entries, at)[0] for at in range(0, len(entries), form.tagsize)}
 
-    with tifffile.TiffFile(io.BytesIO(data)) as pictures:
-        tag = pictures.pages[0].aspage().tags.get(_ORIENTATION)
-        order: Literal["big", "little"] = "big" if pictures.byteorder == ">" else "little"
-    if tag is None or tag.value == 1:
-        return data
-    start, count = tag.valueoffset, tag.valuebytecount
-    return data[:start] + (1).to_bytes(count, order) + data[start + count :]
+
+def _require_no_larger(page: Any) -> None:
+    """Raise where a JPEG in a page has more pixels than its place: the decoder would take memory for them."""
+    from PIL.JpegImagePlugin import JpegImageFile
+
+    file = page.parent.filehandle
+    for start, count in zip(page.dataoffsets, page.databytecounts, strict=True):
+        file.seek(start)
+        with JpegImageFile(io.BytesIO(file.read(count))) as picture:
+            if picture.width * picture.height > math.prod(page.chunks):
+                raise SepiError(f"damaged TIFF: a JPEG of {picture.width}x{picture.height} pixels in a part of it")

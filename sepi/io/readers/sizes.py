@@ -52,8 +52,7 @@ def size_of(files: Sequence[Path]) -> Size:
             header = picture_header(pictures[0])
             return Size(len(pictures), header.height, header.width, header.pixel_bytes)
         if pictures and tiff_stack.matches(pictures[0]):
-            pages = tiff_stack.headers(pictures[0])
-            return Size(len(pages), pages[0].height, pages[0].width, pages[0].pixel_bytes)
+            return Size(*tiff_stack.form_of(pictures[0]))
         if pictures:
             return _of_lenslets(pictures[0])
     except SepiError:

@@ -15,19 +15,18 @@ from typing import Any
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.files import reading
-from sepi.io.picture_headers import TIFF_SIGNATURES, Header, open_tiff, tiff_page
+from sepi.io.files import DEFLATE_RATIO, naming, reading
 from sepi.io.readers.arrays import Array, light_field_from_array
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import MAX_VIEWS
-from sepi.io.tiff import page_pixels
+from sepi.io.tiff import TIFF_SIGNATURES, open_tiff, page_pixels, tiff_form
 from sepi.lightfield import LightField
 
 _SUFFIXES = (".tif", ".tiff")
 _KIND = "TIFF stack"
 _RGB = 3
-# bytes that one of a file can become, and what all pages of a small one may take
-_MOST, _SMALL = 1100, 2**24
+# bytes that all pages of a small file may take
+_SMALL = 2**24
 
 
 def matches(path: Path) -> bool:
@@ -52,16 +51,16 @@ def matches(path: Path) -> bool:
         return True
 
 
-def headers(path: Path) -> list[Header]:
-    """What the pages are, all alike; no pixels are read."""
+def form_of(path: Path) -> tuple[int, int, int, int]:
+    """Number of pages, all alike, height, width and bytes of a pixel; no pixels are read."""
     with reading(path, _KIND), path.open("rb") as file, open_tiff(file) as pictures:
-        return _headers(pictures, path.stat().st_size)
+        return _form(pictures, path.stat().st_size)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
     """Read a stack; its grid is that of the options, else that of the file, else it is yet to be found."""
     with reading(path, _KIND), path.open("rb") as file, open_tiff(file) as pictures:
-        count = len(_headers(pictures, path.stat().st_size))
+        count = _form(pictures, path.stat().st_size)[0]
         first = page_pixels(pictures.pages[0].aspage())
         stack: Array = np.empty((count, *first.shape), first.dtype)
         for number, page in enumerate(pictures.pages):
@@ -94,19 +93,19 @@ def _is_whole(pictures: Any) -> bool:
     return bool(file.read(form.offsetsize) == bytes(form.offsetsize))
 
 
-def _headers(pictures: Any, size: int) -> list[Header]:
+def _form(pictures: Any, size: int) -> tuple[int, int, int, int]:
     if not _is_whole(pictures):
         raise SepiError(f"damaged TIFF: pages behind the {len(pictures.pages)}. are cut off")
-    found: list[Header] = []
+    count = len(pictures.pages)
+    if count > MAX_VIEWS:
+        raise SepiError(f"more than {MAX_VIEWS} pages")
+    forms = []
     for number, page in enumerate(pictures.pages, 1):
-        header, kind = tiff_page(page.aspage(), size), page.aspage().dtype
-        if not header.plain:
-            raise SepiError(f"page {number} is packed in a rarer way; save the stack uncompressed")
-        if found and (header, kind) != (found[0], pictures.pages[0].aspage().dtype):
-            raise SepiError(f"page {number} is unlike the first; all views must be alike")
-        found.append(header)
-        if len(found) > MAX_VIEWS:
-            raise SepiError(f"more than {MAX_VIEWS} pages")
-    if len(found) * found[0].height * found[0].width * found[0].pixel_bytes > size * _MOST + _SMALL:
-        raise SepiError(f"damaged TIFF: {len(found)} pages of {found[0].width}x{found[0].height} in {size} bytes")
-    return found
+        with naming(f"page {number}"):
+            forms.append((tiff_form(page.aspage(), size), page.aspage().dtype))
+    if unlike := [number for number, form in enumerate(forms, 1) if form != forms[0]]:
+        raise SepiError(f"page {unlike[0]} is unlike the first; all views must be alike")
+    height, width, pixel_bytes, _ = forms[0][0]
+    if count * height * width * pixel_bytes > size * DEFLATE_RATIO + _SMALL:
+        raise SepiError(f"damaged TIFF: {count} pages of {width}x{height} in {size} bytes")
+    return count, height, width, pixel_bytes
