@@ -102,7 +102,7 @@ class Scene:
         if self.is_rendered:
             return "sepi.rendered.exposure"
         # of an unknown format: ingest will say what is wrong
-        return format_of.__module__ if self._format is None else self._format.read.__module__
+        return format_of.__module__ if self._format is None else self._format.reader.__name__
 
     @property
     def truth(self) -> tuple[Path, ...]:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import h5py
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import is_disparity
 from sepi.io.files import naming
-from sepi.io.hdf5 import has_dataset, read_light_field
+from sepi.io.hdf5 import has_dataset
 from sepi.io.images import SUFFIXES
-from sepi.io.integrity import is_own
 from sepi.io.readers import (
     calibrated,
     eslf,
@@ -29,9 +29,10 @@ from sepi.io.readers import (
     mosaic,
     numpy_files,
     open_lf,
+    own_files,
     tiff_stack,
 )
-from sepi.io.readers.arrays import rearrange, with_white
+from sepi.io.readers.arrays import with_white
 from sepi.io.readers.named_arrays import no_light_field
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.row_folders import has_rows
@@ -39,38 +40,50 @@ from sepi.lightfield import LightField, Truth
 from sepi.validation import require_known
 
 
-@dataclass(frozen=True)
-class Format:
+class Reader(Protocol):
+    """A module of this folder that reads one format.
+
+    It may have ``read_views``, which does what ``read`` does but for ground truth and masks, ``read_truth``, which
+    reads these alone, and ``truth_files``, the files with them: the light field's own where it may hold them.
+    """
+
+    def matches(self, path: Path) -> bool:
+        """Whether a path looks like this format; quick, and never raises."""
+
+    def read(self, path: Path, options: ReadOptions) -> LightField:
+        """Read a light field as its files have it.
+
+        Raises
+        ------
+        SepiError
+            If they are damaged, contradict each other or do not fit the options.
+        """
+
+
+class Format(NamedTuple):
     """One format of light fields.
 
     Attributes
     ----------
     name, description : str
         For messages.
-    matches : callable
-        Whether a path looks like this format; quick, and never raises.
-    read : callable
-        Reads a light field as its files have it, or raises :class:`SepiError` where they are damaged, contradict each
-        other or do not fit the options.
+    reader : Reader
     options : tuple of str
         What of :class:`ReadOptions` only some formats have a use for, and this one does.
     scales : bool
         Whether it reads values of any scale, and asks the options for their white.
-    read_views, read_truth : callable or None
-        What ``read`` does but for ground truth and masks, and these alone, where they have files of their own.
-    truth_files : callable
-        The files with ground truth and masks; the light field's own where it may hold them.
     """
 
     name: str
     description: str
-    matches: Callable[[Path], bool]
-    read: Callable[[Path, ReadOptions], LightField]
+    reader: Any
     options: tuple[str, ...] = ()
-    scales: bool = False
-    read_views: Callable[[Path, ReadOptions], LightField] | None = None
-    read_truth: Callable[[Path, ReadOptions], Truth] | None = None
-    truth_files: Callable[[Path], Sequence[Path]] = lambda path: ()
+    scales: bool = True
+
+    def truth_files(self, path: Path) -> Sequence[Path]:
+        """The files with ground truth and masks."""
+        find: Callable[[Path], Sequence[Path]] = getattr(self.reader, "truth_files", lambda path: ())
+        return find(path)
 
 
 # light fields that a message names, and levels of folders in which it looks for them
@@ -84,80 +97,34 @@ _POSES = ("poses_bounds.npy", "cameras.json", "cameras_sphere.npz")
 _RAW = frozenset({".lfr", ".lfp", ".raw"})
 
 _ARRAY_OPTIONS = ("grid", "axes", "variable")
+_CAMERAS = "COLMAP model, transforms.json, cameras.csv or cameras.yaml"
+# those that only some formats have a use for
+_SOME = ("grid", "pattern", "axes", "variable", "images", "reference", "follow_links")
 
 FORMATS = {
     # before the other folders: its pictures may have any names
-    "exported": Format(
-        "exported folder",
-        "written by 'sepi export'",
-        exported.matches,
-        exported.read,
-        ("follow_links",),
-        True,
-        truth_files=exported.truth_files,
-    ),
+    "exported": Format("exported folder", "written by 'sepi export'", exported, ("follow_links",)),
     # before folders of pictures, which may lie beside
-    "cameras": Format(
-        "calibrated cameras",
-        "COLMAP model, transforms.json, cameras.csv or cameras.yaml",
-        calibrated.matches,
-        calibrated.read,
-        ("images", "reference"),
-    ),
-    "hci": Format(
-        "HCI folder",
-        "input_Cam000.png, ...",
-        hci.matches,
-        hci.read,
-        ("grid", "follow_links"),
-        True,
-        read_views=hci.read_views,
-        read_truth=hci.read_truth,
-        truth_files=hci.truth_files,
-    ),
+    "cameras": Format("calibrated cameras", _CAMERAS, calibrated, ("images", "reference"), scales=False),
+    "hci": Format("HCI folder", "input_Cam000.png, ...", hci, ("grid", "follow_links")),
     "images": Format(
-        "folder of views",
-        "a numbered picture for each",
-        image_folder.matches,
-        image_folder.read,
-        ("grid", "pattern", "follow_links"),
-        True,
+        "folder of views", "a numbered picture for each", image_folder, ("grid", "pattern", "follow_links")
     ),
-    "mosaic": Format("mosaic of views", "NAME_qs8x6a0.75.png", mosaic.matches, mosaic.read, ("grid",), True),
-    "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",), True),
-    "tiff-stack": Format("TIFF stack", "a page for each view", tiff_stack.matches, tiff_stack.read, ("grid",), True),
+    "mosaic": Format("mosaic of views", "NAME_qs8x6a0.75.png", mosaic, ("grid",)),
+    "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf, ("grid",)),
+    "tiff-stack": Format("TIFF stack", "a page for each view", tiff_stack, ("grid",)),
     # before the other kinds of HDF5: MATLAB's is told by its header or ending
-    "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS, True),
-    "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read, _ARRAY_OPTIONS, True),
+    "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab, _ARRAY_OPTIONS),
+    "numpy": Format("NumPy file", ".npy or .npz", numpy_files, _ARRAY_OPTIONS),
     # before the other kinds with something called LF
-    "openlf": Format("OpenLF HDF5", "with a group LF", open_lf.matches, open_lf.read, scales=True),
-    "hci-2013": Format(
-        "HCI 2013 HDF5",
-        "with LF (T, S, H, W, 3)",
-        hci_2013.matches,
-        hci_2013.read,
-        scales=True,
-        truth_files=lambda path: [path],
-    ),
+    "openlf": Format("OpenLF HDF5", "with a group LF", open_lf),
+    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci_2013),
     # behind those whose arrays have names of their own
-    "hdf5": Format(
-        "HDF5 file", "with an array of all views", hdf5_arrays.matches, hdf5_arrays.read, _ARRAY_OPTIONS, True
-    ),
+    "hdf5": Format("HDF5 file", "with an array of all views", hdf5_arrays, _ARRAY_OPTIONS),
     # last, so that it gets what is too damaged to tell
-    "sepi": Format(
-        "sepi HDF5",
-        "written by this package",
-        lambda path: has_dataset(path, "views", is_own, if_damaged=True),
-        lambda path, options: rearrange(_own(path), options),
-        truth_files=lambda path: [path],
-    ),
+    "sepi": Format("sepi HDF5", "written by this package", own_files, scales=False),
 }
 """Word for ``--format`` to format; the first that matches reads."""
-
-
-def _own(path: Path) -> LightField:
-    light_field = read_light_field(path)
-    return light_field if light_field.source else replace(light_field, source=str(path))
 
 
 def format_of(path: Path, file_format: str | None = None) -> Format:
@@ -181,7 +148,7 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
     if file_format is not None:
         return FORMATS[file_format]
     for known in FORMATS.values():
-        if known.matches(path) and path.name not in _POSES:
+        if known.reader.matches(path) and path.name not in _POSES:
             return known
     poses = next((one for one in (path, *map(path.joinpath, _POSES)) if one.name in _POSES and one.is_file()), None)
     if poses is not None:
@@ -220,7 +187,8 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None, *, tr
     known = format_of(path, file_format)
     _require_used(path, known, options)
     with naming(path):
-        light_field = (known.read if truth else known.read_views or known.read)(path, options)
+        reader = known.reader
+        light_field: LightField = (reader.read if truth else getattr(reader, "read_views", reader.read))(path, options)
         if not truth:
             light_field = replace(light_field, ground_truth=None, masks={})
         if options.white is not None and not known.scales:
@@ -233,16 +201,17 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None, *, tr
 def read_truth(path: Path, options: ReadOptions, file_format: str | None = None) -> Truth:
     """Ground truth and masks of the light field that :func:`read` reads without them."""
     known = format_of(path, file_format)
-    if known.read_truth is None:
+    if not hasattr(known.reader, "read_truth"):
         light_field = read(path, options, file_format)
         return light_field.ground_truth, light_field.masks
     with naming(path):
-        return known.read_truth(path, options)
+        truth: Truth = known.reader.read_truth(path, options)
+        return truth
 
 
 def _require_used(path: Path, known: Format, options: ReadOptions) -> None:
     """Raise where an option is given that a format has no use for: the user would think that it did something."""
-    for name in ("grid", "pattern", "axes", "variable", "images", "reference", "follow_links"):
+    for name in _SOME:
         if getattr(options, name) not in (None, False) and name not in known.options:
             others = ", ".join(other.name for other in FORMATS.values() if name in other.options)
             flag = "--" + name.replace("_", "-")
@@ -301,7 +270,7 @@ def _inside(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
             continue
         # tables of numbers are none, such as poses
         table = entry.suffix.lower() in (".npy", ".npz") and is_disparity(entry)
-        if not table and any(known.matches(entry) for known in FORMATS.values()):
+        if not table and any(known.reader.matches(entry) for known in FORMATS.values()):
             yield entry
         elif depth and entry.is_dir() and not entry.is_symlink():
             yield from _inside(entry, depth - 1)

@@ -29,7 +29,7 @@ from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import name_of, naming, reading
 from sepi.io.images import picture_header, read_picture
 from sepi.io.pfm import read_pfm
-from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers, position_of
+from sepi.io.readers.options import ReadOptions, arrange_numbers, position_of
 from sepi.io.readers.view_files import read_grid
 from sepi.lightfield import BoolMap, DisparityRange, LightField, Truth
 from sepi.models import validated
@@ -80,19 +80,19 @@ def read(path: Path, options: ReadOptions) -> LightField:
     LightField
         With the scene's own disparity range, ground truth and masks where the folder has them.
     """
-    return _read(path, options, with_truth=True)
-
-
-def read_views(path: Path, options: ReadOptions) -> LightField:
-    """Read a folder but for its ground truth and masks, on which nothing else depends then."""
-    return _read(path, options, with_truth=False)
+    light_field = read_views(path, options)
+    of = _view_of_truth(path, options)
+    if of is None or not light_field.present[of] or options.view not in (None, of) or not truth_files(path):
+        return light_field
+    ground_truth, masks = _truth_of(path, light_field.shape)
+    return replace(light_field, view=of, ground_truth=ground_truth, masks=masks)
 
 
 def read_truth(path: Path, options: ReadOptions) -> Truth:
     """Ground truth and masks of a folder alone, where they are of the reference view of :func:`read_views`."""
     files, grid = _views_in(path, options, _parameters_of(path))
     numbers = arrange_numbers(str(path), grid, replace(options, exclude=()))
-    of, reference = _view_of_truth(numbers, grid), options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
+    of, reference = _view_of_truth(path, options), options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
     if of == reference:
         header = picture_header(next(iter(files.values())))
         return _truth_of(path, (header.height, header.width))
@@ -108,7 +108,8 @@ def truth_files(folder: Path) -> list[Path]:
     return sorted(path for name in (TRUTH, "mask_*.png") for path in folder.glob(name) if path.is_file())
 
 
-def _read(path: Path, options: ReadOptions, with_truth: bool) -> LightField:
+def read_views(path: Path, options: ReadOptions) -> LightField:
+    """Read a folder but for its ground truth and masks, on which nothing else depends then."""
     file = path / PARAMETERS
     parameters = _parameters_of(path)
     with naming(file):
@@ -116,7 +117,7 @@ def _read(path: Path, options: ReadOptions, with_truth: bool) -> LightField:
         limits = parameters.pair("disp_min", "disp_max")
         disparity_range = None if limits is None else DisparityRange(*limits, "parameters")
     files, grid = _views_in(path, options, parameters)
-    views, present, numbers, names = read_grid(path, files, grid, options)
+    views, present, _, names = read_grid(path, files, grid, options)
     shape = views.shape[2], views.shape[3]
     whole = shape if options.part is None else options.part[1::-1]
     if given_shape not in (None, whole):
@@ -129,18 +130,13 @@ def _read(path: Path, options: ReadOptions, with_truth: bool) -> LightField:
     camera = parameters.model_dump(include=set(_CAMERA))
     with naming(file):
         known_camera = None if None in camera.values() else camera_from(**camera, shape=shape, crop_of=options.part)
-    of = _view_of_truth(numbers, grid)
-    has_truth = with_truth and of is not None and options.view in (None, of) and bool(truth_files(path))
-    ground_truth, masks = _truth_of(path, shape) if has_truth else (None, {})
     return LightField(
         views=views,
         name=parameters.scene or str(name_of(path)),
         source=str(path),
         present=present,
-        view=of if has_truth else options.view,
+        view=options.view,
         disparity_range=disparity_range,
-        ground_truth=ground_truth,
-        masks=masks,
         camera=known_camera,
         # one number for both directions: rows are as far apart as columns
         settled=parameters.baseline_mm is not None,
@@ -163,8 +159,10 @@ def _views_in(path: Path, options: ReadOptions, parameters: _Parameters) -> tupl
     return files, grid
 
 
-def _view_of_truth(numbers: Numbers, grid: tuple[int, int]) -> tuple[int, int] | None:
+def _view_of_truth(path: Path, options: ReadOptions) -> tuple[int, int] | None:
     """Where the centre view of the folder's own grid stands, to which ground truth and masks belong."""
+    _, grid = _views_in(path, options, _parameters_of(path))
+    numbers = arrange_numbers(str(path), grid, replace(options, exclude=()))
     return position_of(numbers, grid[0] // 2 * grid[1] + grid[1] // 2)
 
 

@@ -74,6 +74,11 @@ def read(path: Path, options: ReadOptions) -> LightField:
     return replace(light_field, camera=camera, ground_truth=ground_truth)
 
 
+def truth_files(path: Path) -> list[Path]:
+    """The file itself, which may hold depth."""
+    return [path]
+
+
 def _is_layout(shape: tuple[int, ...]) -> bool:
     return len(shape) == len("TSHWC") and shape[4] in (1, 3)
 

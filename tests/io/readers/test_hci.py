@@ -180,7 +180,7 @@ BAD_FOLDERS: dict[str, tuple[Callable[[Path], object], str, str]] = {
         "cannot be read",
     ),
     "truncated PNG": (lambda f: cut(f / "input_Cam003.png"), "input_Cam003.png", "not a PNG, or damaged"),
-    "damaged PNG": (lambda f: flip(f / "input_Cam003.png"), "input_Cam003.png", "checksum"),
+    "damaged PNG": (lambda f: flip(f / "input_Cam003.png"), "input_Cam003.png", "not a PNG, or damaged"),
     "other size": (lambda f: put(f / "input_Cam004.png", pixels(4)[1:]), "input_Cam004.png", "16x11"),
     "range the wrong way round": (config(disp_min="3"), "parameters.cfg", "MIN < MAX"),
     "range of no width": (config(disp_min="2"), "parameters.cfg", "MIN < MAX"),
