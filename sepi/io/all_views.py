@@ -15,13 +15,13 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.interrupts import interruptibly
-from sepi.io.disparity_maps import read_disparity
-from sepi.io.error_bars import read_error_bars
+from sepi.io.disparity_maps import read_disparity, read_error_bars
 from sepi.io.hdf5 import (
     UNITS,
     Attribute,
     attribute,
     create_hdf5,
+    float_maps,
     has_dataset,
     open_hdf5,
     read_camera,
@@ -175,20 +175,16 @@ def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result
         baseline = read_dataset(file_path, file["baselines"])[position]
         down, across = (baseline + attribute(file, "from_centre")).tolist()
         rig = read_rig(file)
-        disparity, confidence, extended, picture = (
-            read_dataset(file_path, file[name], position) for name in ("disparity", "confidence", _MARK, "picture")
-        )
-        bars = {name: read_dataset(file_path, file[name], position) for name in ERROR_BARS if name in file}
+        maps = float_maps(file_path, file, position)
+        extended, picture = (read_dataset(file_path, file[name], position) for name in (_MARK, "picture"))
         return Result(
             scene=str(attribute(file, "scene")),
             picture=picture,
-            disparity=disparity.astype(np.float32),
-            confidence=confidence.astype(np.float32),
-            unknown=extended.astype(bool) | (confidence == 0),
+            unknown=extended.astype(bool) | (maps["confidence"] == 0),
             camera=read_camera(file),
             from_centre=(down, across),
             rig=None if rig is None else rig.seen_from(baseline),
-            **{name: values.astype(np.float32) for name, values in bars.items()},
+            **maps,
         )
 
 

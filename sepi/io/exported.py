@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.files import atomic_files, atomic_folder, atomic_path
+from sepi.io.files import atomic_path, filled_folder, remove_files
 from sepi.io.float_pictures import write_tiff
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import SUFFIXES, write_png
 from sepi.io.pfm import write_pfm
-from sepi.io.readers.exported import MANIFEST, read_manifest
+from sepi.io.readers.exported import MANIFEST, Manifest, read_manifest
 from sepi.io.result_files import require_target
 from sepi.lightfield import LightField
 
@@ -77,27 +79,23 @@ def write_exported(path: Path, light_field: LightField, *, force: bool = False) 
     if path.suffix.lower() in HDF5:
         write_light_field(path, light_field)
         return
-    # the folder itself may be a link to where there is room
-    target = path.resolve()
-    existing = target.is_dir() and any(target.iterdir())
-    before = _earlier_files(target) if existing else set()
-    with atomic_files(target) if existing else atomic_folder(target) as temporary:
+    before = _earlier_files(path)
+    with filled_folder(path) as temporary:
         made = _write_folder(temporary, light_field)
-    for name in before - made:
-        with suppress(OSError):
-            (target / name).unlink(missing_ok=True)
+    remove_files(path, before - made)
 
 
 def _write_folder(folder: Path, light_field: LightField) -> set[str]:
     digits = max(2, len(str(max(light_field.grid) - 1)))
+    places: dict[tuple[int, ...], str]
+    places = {(t, s): f"row_{t:0{digits}}_col_{s:0{digits}}" for t, s in np.argwhere(light_field.present).tolist()}
     suffix = "tif" if light_field.views.dtype == np.float32 else "png"
-    names: list[list[str | None]] = [[None] * light_field.grid[1] for _ in range(light_field.grid[0])]
-    for t, s in np.argwhere(light_field.present).tolist():
-        names[t][s] = name = f"row_{t:0{digits}}_col_{s:0{digits}}.{suffix}"
-        view = light_field.views[t, s]
+    views = {place: f"{name}.{suffix}" for place, name in places.items()}
+    for place, name in views.items():
+        view = light_field.views[place]
         pixels = view[..., 0] if view.shape[2] == 1 else view
         if suffix == "tif":
-            write_tiff(folder / name, pixels.astype(np.float32), f"view {t},{s}")
+            write_tiff(folder / name, pixels.astype(np.float32), f"view {','.join(map(str, place))}")
         else:
             write_png(folder / name, pixels.astype(view.dtype.newbyteorder("=")))
     if light_field.ground_truth is not None:
@@ -105,37 +103,42 @@ def _write_folder(folder: Path, light_field: LightField) -> set[str]:
     masks = {name: f"mask_{name}.png" for name in sorted(light_field.masks)}
     for name, file in masks.items():
         write_png(folder / file, light_field.masks[name])
-    missing: list[list[str | None]] | None = None
+    hidden = {}
     if light_field.missing is not None:
-        missing = [[None] * light_field.grid[1] for _ in range(light_field.grid[0])]
-        for t, s in np.argwhere(light_field.present & light_field.missing.any(axis=(2, 3))).tolist():
-            missing[t][s] = name = f"missing_row_{t:0{digits}}_col_{s:0{digits}}.png"
-            write_png(folder / name, light_field.missing[t, s])
-    known, camera, positions = light_field.disparity_range, light_field.camera, light_field.positions
-    values = {
-        "name": light_field.name,
-        "views": names,
-        "view": light_field.view,
-        "row_spacing": float(light_field.row_spacing),
-        "positions": None
-        if positions is None
-        else [[place if np.isfinite(place).all() else None for place in row] for row in positions.tolist()],
-        "missing": missing,
-        "disparity_range": None if known is None else asdict(known),
-        "camera": None if camera is None else asdict(camera),
-        "ground_truth": None if light_field.ground_truth is None else _TRUTH,
-        "masks": masks,
-        "notes": light_field.notes,
-    }
+        hidden = {place: f"missing_{name}.png" for place, name in places.items() if light_field.missing[place].any()}
+        for place, name in hidden.items():
+            write_png(folder / name, light_field.missing[place])
+    known = Manifest(
+        name=light_field.name,
+        views=_in_rows(light_field.grid, views),
+        view=light_field.view,
+        row_spacing=float(light_field.row_spacing),
+        positions=None if light_field.positions is None else _in_rows(light_field.grid, _finite(light_field.positions)),
+        missing=None if light_field.missing is None else _in_rows(light_field.grid, hidden),
+        disparity_range=light_field.disparity_range,
+        camera=light_field.camera,
+        ground_truth=None if light_field.ground_truth is None else _TRUTH,
+        masks=masks,
+        notes=light_field.notes,
+    )
     # a line for each key
-    lines = [f"  {json.dumps(key)}: {json.dumps(value, default=_plain)}" for key, value in values.items()]
+    lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in known.model_dump(mode="json").items()]
     with atomic_path(folder / MANIFEST) as temporary:
         temporary.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="ascii")
     return {path.name for path in folder.iterdir()}
 
 
-def _plain(number: np.generic) -> object:
-    return number.item()
+def _in_rows(grid: tuple[int, int], values: Mapping[tuple[int, ...], Any]) -> list[list[Any]]:
+    """A value for each place of a grid, row by row; None where there is none."""
+    return [[values.get((t, s)) for s in range(grid[1])] for t in range(grid[0])]
+
+
+def _finite(positions: npt.NDArray[np.float64]) -> dict[tuple[int, ...], tuple[float, ...]]:
+    return {
+        place: tuple(positions[place].tolist())
+        for place in np.ndindex(positions.shape[:2])
+        if np.isfinite(positions[place]).all()
+    }
 
 
 def _earlier_files(folder: Path) -> set[str]:

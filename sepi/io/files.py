@@ -11,7 +11,7 @@ import os
 import re
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -132,6 +132,30 @@ def atomic_files(folder: Path) -> Iterator[Path]:
         yield temporary
         for path in sorted(temporary.iterdir(), key=lambda path: path.stat().st_mtime_ns):
             path.replace(folder / path.name)
+
+
+@contextmanager
+def filled_folder(folder: Path) -> Iterator[Path]:
+    """Give a temporary folder to fill: it becomes ``folder``, or its files are moved there where others are already.
+
+    Raises
+    ------
+    SepiError
+        As :func:`atomic_folder` and :func:`atomic_files`.
+    """
+    # the folder itself may be a link to where there is room
+    target = folder.resolve()
+    with atomic_files(target) if target.is_dir() and any(target.iterdir()) else atomic_folder(target) as temporary:
+        yield temporary
+
+
+def remove_files(folder: Path, names: Iterable[str]) -> None:
+    """Remove files that an earlier run wrote, as far as they are there."""
+    for name in names:
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise SepiError(f"{folder / name}: an earlier run's file cannot be removed ({error.strerror})") from error
 
 
 @contextmanager

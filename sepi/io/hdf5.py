@@ -21,7 +21,6 @@ import numpy.typing as npt
 from sepi.camera import Camera, numbers_of
 from sepi.errors import SepiError, printable
 from sepi.interrupts import no_interrupt_lost
-from sepi.io import apart
 from sepi.io.files import PatientFile, atomic_path, reading
 from sepi.io.integrity import BLOCK, digest_block, fixed_text, is_own, members, require_held, require_sound
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
@@ -30,9 +29,6 @@ from sepi.stage import ERROR_BARS, CostVolume, StageMaps
 from sepi.validation import require_known, require_path
 
 Attribute = str | float | int | tuple[float, ...]
-
-# seconds of processor that an attribute may take
-_PATIENCE = 1
 
 RIG = "rig"
 """Dataset of a light field, or attribute of a result: where rectified cameras stood, as JSON."""
@@ -156,6 +152,12 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
         put_truth(file, (light_field.ground_truth, light_field.masks))
 
 
+def float_maps(path: Path, file: h5py.File, part: Any = ...) -> dict[str, npt.NDArray[np.float32]]:
+    """Disparity, confidence and error bars, or a part of each, as far as a file has them."""
+    names = ("disparity", "confidence", *ERROR_BARS)
+    return {name: read_dataset(path, file[name], part).astype(np.float32) for name in names if name in file}
+
+
 def put_truth(file: h5py.File, truth: Truth) -> None:
     """Write what scores are made with, as far as there is any."""
     ground_truth, masks = truth
@@ -237,12 +239,13 @@ def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
     KeyError
         If there is none.
     SepiError
-        If HDF5 hangs on it, or crashes, as it does on text of variable length in damaged files.
+        If it is text of variable length, in a file of another program.
     """
-    # our own files were looked at when they were opened
-    doubtful = holder.attrs.get_id(key).dtype.hasobject and not is_own(holder)
-    if doubtful and apart.outcome(lambda: holder.attrs[key], _PATIENCE) is None:
-        raise SepiError(f"damaged HDF5 file: its attribute '{printable(key)}' cannot be read")
+    # HDF5 may hang on such, or crash, where the file is damaged; our own files were looked at when they were opened
+    if holder.attrs.get_id(key).dtype.hasobject and not is_own(holder):
+        raise SepiError(
+            f"attribute '{printable(key)}': expected numbers, or text of fixed length, which is safe to read"
+        )
     value = holder.attrs[key]
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
 

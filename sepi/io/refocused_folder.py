@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.files import atomic_files, atomic_folder, atomic_path
+from sepi.io.files import atomic_path, filled_folder, remove_files
 from sepi.io.images import write_png
 from sepi.lightfield import FloatMap, full_scale
 
@@ -106,20 +106,17 @@ def write_refocused(
         If the folder is a file, cannot be written or holds others' files of these names, or an animation cannot be
         written with this Pillow.
     """
-    # the folder itself may be a link to where there is room
-    target = folder.resolve()
-    existing = target.is_dir() and any(target.iterdir())
-    before = _earlier_files(target / INDEX)
+    before = _earlier_files(folder / INDEX)
     made = [
         *([] if sharp is None else [ALL_IN_FOCUS]),
         *stack_names(len(foci)),
         *([ANIMATION] if animated else []),
         INDEX,
     ]
-    others = [name for name in made if name not in before and os.path.lexists(target / name)]
+    others = [name for name in made if name not in before and os.path.lexists(folder / name)]
     if others:
         raise SepiError(f"{folder}: {others[0]} there was not written by 'sepi refocus'; choose another folder")
-    with atomic_files(target) if existing else atomic_folder(target) as temporary:
+    with filled_folder(folder) as temporary:
         rows = [] if sharp is None else [[ALL_IN_FOCUS, "", "", "", ""]]
         if sharp is not None:
             write_png(temporary / ALL_IN_FOCUS, _levels(sharp, dtype))
@@ -133,7 +130,7 @@ def write_refocused(
             _write_animation(temporary / ANIMATION, frames)
             rows.append([ANIMATION, "", "", "", ""])
         _write_index(temporary / INDEX, rows)
-    _remove_others(target, before, made)
+    remove_files(folder, set(before).difference(made))
     return tuple(made)
 
 
@@ -176,15 +173,3 @@ def _earlier_files(index: Path) -> list[str]:
         if rows and tuple(rows[0]) == COLUMNS:
             return [INDEX, *(row[0] for row in rows[1:] if row and _MADE.fullmatch(row[0]))]
     return []
-
-
-def _remove_others(folder: Path, before: Collection[str], made: Collection[str]) -> None:
-    """Remove what an earlier run wrote and this one does not make."""
-    for name in before:
-        if name not in made:
-            try:
-                (folder / name).unlink(missing_ok=True)
-            except OSError as error:
-                raise SepiError(
-                    f"{folder / name}: an earlier run's file cannot be removed ({error.strerror})"
-                ) from error

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection
 from contextlib import nullcontext, suppress
 from pathlib import Path
 
 import numpy as np
 
 from sepi.errors import SepiError
+from sepi.io.files import remove_files
 from sepi.io.origin import RESULT, read_origin
 from sepi.lightfield import LightField
 
@@ -124,12 +124,3 @@ def names_of_others(light_field: LightField, *, with_sigma: bool = False) -> tup
     places = [(int(t), int(s)) for t, s in np.argwhere(light_field.present)]
     others = [place for place in places if place != light_field.reference_position]
     return tuple(name for place in others for name in names_as_taken(place, with_sigma=with_sigma))
-
-
-def remove_files(folder: Path, names: Collection[str]) -> None:
-    """Remove files of an earlier result, as far as they are there."""
-    for name in names:
-        try:
-            (folder / name).unlink(missing_ok=True)
-        except OSError as error:
-            raise SepiError(f"{folder / name}: an earlier run's file cannot be removed ({error.strerror})") from error

@@ -18,11 +18,12 @@ import numpy.typing as npt
 from sepi.camera import Camera, warn_of_infinity
 from sepi.errors import SepiError
 from sepi.io.error_bar_files import bars_in_metres, names_of_error_bars, write_error_bars
-from sepi.io.files import atomic_files, atomic_folder, atomic_path
+from sepi.io.files import atomic_path, filled_folder, remove_files
 from sepi.io.hdf5 import (
     Attribute,
     attribute,
     create_hdf5,
+    float_maps,
     open_hdf5,
     put_maps,
     read_camera,
@@ -36,11 +37,11 @@ from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import result_attributes
-from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, names_as_taken, remove_files, require_own
+from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, names_as_taken, require_own
 from sepi.io.sound_maps import UNKNOWN, sound_maps
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.rig import Rig
-from sepi.stage import ERROR_BARS, StageMaps
+from sepi.stage import StageMaps
 from sepi.threads import available_cores
 from sepi.validation import described, is_finite, require_path, require_type
 
@@ -187,12 +188,9 @@ def write_result(
     if light_field.camera is not None:
         warn_of_infinity(folder, light_field.camera, maps.disparity, maps.sigma, maps.mask(UNKNOWN))
     earlier = require_own(folder, light_field, force=force)
-    # the folder itself may be a link to where there is room
-    target = folder.resolve()
-    existing = target.is_dir() and any(target.iterdir())
-    with atomic_files(target) if existing else atomic_folder(target) as temporary:
+    with filled_folder(folder) as temporary:
         names = _write_files(temporary, light_field, maps, attributes or {}, seconds, beside)
-    remove_files(target, earlier.difference(names))
+    remove_files(folder, earlier.difference(names))
     return names
 
 
@@ -229,11 +227,8 @@ def read_result(path: str | Path) -> Result:
     path = require_path("result", path)
     path = path / RESULT if path.is_dir() else path
     with open_hdf5(path, "result of 'sepi depth'") as file:
-        picture, disparity, confidence = (
-            read_dataset(path, file[name]) for name in ("view", "disparity", "confidence")
-        )
-        unknown = read_dataset(path, file[UNKNOWN]) if UNKNOWN in file else np.zeros(disparity.shape, bool)
-        bars = {name: read_dataset(path, file[name]).astype(np.float32) for name in ERROR_BARS if name in file}
+        picture, maps = read_dataset(path, file["view"]), float_maps(path, file)
+        unknown = read_dataset(path, file[UNKNOWN]) if UNKNOWN in file else np.zeros(maps["disparity"].shape)
         (t, s), (rows, columns) = (map(int, attribute(file, name)) for name in ("view_position", "grid"))
         # results of earlier versions: rows as far apart as columns, no view off the grid
         told = attribute(file, "from_centre") if "from_centre" in file.attrs else (t - rows // 2, s - columns // 2)
@@ -241,20 +236,10 @@ def read_result(path: str | Path) -> Result:
         scene = str(attribute(file, "scene")) if "scene" in file.attrs else ""
         camera = read_camera(file)
         rig = read_rig(file)
-    shapes = {values.shape for values in (disparity, confidence, unknown, *bars.values())}
-    if shapes != {picture.shape[:2]} or picture.shape[2:] not in ((1,), (3,)):
-        raise SepiError(f"{path}: damaged: view {picture.shape} and disparity {disparity.shape} do not fit together")
-    return Result(
-        scene=scene,
-        picture=picture,
-        disparity=disparity.astype(np.float32),
-        confidence=confidence.astype(np.float32),
-        unknown=unknown.astype(bool),
-        camera=camera,
-        from_centre=(down, across),
-        rig=rig,
-        **bars,
-    )
+    shapes = {name: values.shape for name, values in (*maps.items(), (UNKNOWN, unknown))}
+    if set(shapes.values()) != {picture.shape[:2]} or picture.shape[2:] not in ((1,), (3,)):
+        raise SepiError(f"{path}: damaged: view {picture.shape} and maps {shapes} do not fit together")
+    return Result(scene, picture, **maps, unknown=unknown > 0, camera=camera, from_centre=(down, across), rig=rig)
 
 
 def _write_files(

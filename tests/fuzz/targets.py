@@ -10,8 +10,7 @@ from executions import Target
 from mutations import MAT, PNG
 
 from sepi.errors import SepiError
-from sepi.io.disparity_maps import TruthFile, is_disparity, read_disparity
-from sepi.io.error_bars import read_error_bars
+from sepi.io.disparity_maps import TruthFile, is_disparity, read_disparity, read_error_bars
 from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field as read_own
 from sepi.io.hdf5 import read_stage
