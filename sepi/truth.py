@@ -52,7 +52,9 @@ def main(
 
         truth = scene_truth(builtin, size, views)
     if own is not None:
-        truth = own.read(None if light_field is None else read_light_field(light_field).shape), truth[1]
+        known = None if light_field is None else read_light_field(light_field)
+        part = reading.options.part if known is None or known.rig is None else None
+        truth = own.read(None if known is None else known.shape, part), truth[1]
     write_truth(output, truth)
 
 

@@ -47,7 +47,7 @@ def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, own: Trut
     view = reading.options.view
     maps = read_disparity_at(a, view), read_disparity_at(b, view)
     require_one_view(a, b, reading)
-    values, light_field = read_ground_truth(ground_truth, a, reading, own)
+    values, light_field = read_ground_truth(ground_truth, a, reading, own, maps[0].shape)
     for path, other in ((b, maps[1]), (own.path if own else ground_truth, values), (ground_truth, light_field)):
         if other is not None and other.shape != maps[0].shape:
             raise SepiError(f"{path}: is {other.shape}, but {a} is {maps[0].shape} (height, width)")

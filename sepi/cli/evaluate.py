@@ -70,6 +70,8 @@ def evaluate(
     --truth FILE is ground truth for a scene without any, or alone: a file as above, or a grey picture of 8 or 16 bit
     with --truth-scale K (disparity = level * K, 0 is unknown).
 
+    Whole-image ground truth is cropped like the views, as given by --crop-of or by the result.
+
     There are two protocols: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side. With --offset,
     the crop's pixels are scored, and the border is that of the ground truth, not of the crop.
 
@@ -95,7 +97,9 @@ def evaluate(
     if source is None:
         raise click.UsageError("expected GROUND_TRUTH, a SCENE, or --truth FILE")
     disparity = read_disparity_at(estimate, reading.options.view)
-    values, light_field = read_ground_truth(ground_truth, estimate, reading, own)
+    values, light_field = read_ground_truth(
+        ground_truth, estimate, reading, own, None if offset is not None else disparity.shape
+    )
     if values is None:
         view = "" if light_field is None else ",".join(map(str, light_field.reference_position))
         raise SepiError(f"{source}: no ground truth for view {view}")

@@ -59,7 +59,8 @@ def export(
     if geometry is not None:
         light_field = replace(light_field, camera=geometry(shape=light_field.shape), rig=None)
     if own is not None:
-        light_field = replace(light_field, ground_truth=own.read(light_field.shape))
+        part = reading.options.part if light_field.rig is None else None
+        light_field = replace(light_field, ground_truth=own.read(light_field.shape, part))
     # notes on assumptions and flags do not apply to what is read from OUT
     note = f"exported from {light_field_path}"
     light_field = replace(settle_range(light_field), source="", reading="", notes=(note,))

@@ -12,7 +12,7 @@ from sepi.cli.input_options import Reading
 from sepi.errors import SepiError
 
 if TYPE_CHECKING:
-    from sepi.camera import Camera
+    from sepi.camera import Camera, Part
     from sepi.cli.input_options import Geometry
     from sepi.io.disparity_maps import TruthFile
     from sepi.io.origin import Origin
@@ -32,9 +32,12 @@ def require_one_view(estimate: Path, other: Path, reading: Reading) -> None:
 
 
 def read_ground_truth(
-    path: Path | None, estimate: Path, reading: Reading, own: TruthFile | None = None
+    path: Path | None, estimate: Path, reading: Reading, own: TruthFile | None, shape: tuple[int, int] | None
 ) -> tuple[FloatMap | None, LightField | None]:
     """The ground truth for an estimate (``own`` if given), and the light field if ``path`` is one.
+
+    That of the whole picture is cut to an estimate of this ``shape``, where the flags or the estimate say how its views
+    were cut.
 
     Raises
     ------
@@ -43,22 +46,36 @@ def read_ground_truth(
     """
     from sepi.io.all_views import read_disparity_at
     from sepi.io.disparity_maps import is_disparity
+    from sepi.io.readers.options import cut_like_views
 
+    part = _part_of(estimate, reading)
     if path is None:
         if own is None:
             return None, None
         _require_view_of(estimate, reading)
-        return own.read(), None
+        truth = own.read()
+        return truth if shape is None else cut_like_views(truth, shape, part), None
     if is_disparity(path):
         if own is not None:
             raise click.UsageError(f"{path} and --truth FILE are both ground truth; give one of them")
         values = read_disparity_at(path, reading.options.view)
         require_one_view(estimate, path, reading)
-        return values, None
+        return values if shape is None else cut_like_views(values, shape, part), None
     light_field = read_light_field_of(path, estimate, reading, check_order=False)
     if own is not None:
-        light_field = replace(light_field, ground_truth=own.read(light_field.shape))
+        part = part if light_field.rig is None else None
+        light_field = replace(light_field, ground_truth=own.read(light_field.shape, part))
     return light_field.ground_truth, light_field
+
+
+def _part_of(estimate: Path, reading: Reading) -> Part | None:
+    """Where the estimate's views were cut out, as the flags or the estimate say; None if they are no part."""
+    from sepi.io.all_views import read_origin_at
+
+    origin = read_origin_at(estimate, reading.options.view)
+    if origin is None:
+        return reading.options.part
+    return None if origin.rectified else reading.options.part or origin.options.part
 
 
 def _require_view_of(estimate: Path, reading: Reading) -> None:

@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sepi.camera import Part
 from sepi.errors import SepiError
 from sepi.io.hdf5 import float_maps, has_dataset, open_hdf5, read_dataset
 from sepi.io.images import picture_header, png_texts, read_picture
 from sepi.io.pfm import read_pfm
 from sepi.io.readers.numpy_files import array_shapes, read_named
+from sepi.io.readers.options import cut_like_views
 from sepi.lightfield import FloatMap, full_scale
 from sepi.stage import ERROR_BARS, StageMaps
 from sepi.validation import described, is_finite, require_path
@@ -145,8 +147,10 @@ class TruthFile:
     path: Path
     scale: float | None = None
 
-    def read(self, shape: tuple[int, int] | None = None) -> FloatMap:
+    def read(self, shape: tuple[int, int] | None = None, part: Part | None = None) -> FloatMap:
         """Disparity in pixels per view step, (H, W) float32, top row first; NaN where it is unknown.
+
+        Of the whole picture it is cut as views of a ``shape`` were, where ``part`` says how.
 
         Raises
         ------
@@ -155,6 +159,7 @@ class TruthFile:
         """
         path = map_file(self.path)
         stored = _stored(path, self.scale is not None)
+        stored = stored if shape is None else cut_like_views(stored, shape, part)
         truth = _scaled(stored, self.scale)
         known = np.isfinite(truth) if stored.dtype.kind == "f" else stored != 0
         if shape not in (None, truth.shape):

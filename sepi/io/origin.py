@@ -45,6 +45,8 @@ class Origin:
         :func:`digest_of` the light field; empty in results of earlier versions.
     picture : ndarray, shape (H, W, C), or None
         The view.
+    rectified : bool
+        Whether the views are not as cameras took them.
     files : tuple of str
         Names of the files that were written with it; empty in results of earlier versions.
     """
@@ -58,6 +60,7 @@ class Origin:
     file_format: str | None
     digest: str
     picture: npt.NDArray[np.generic] | None
+    rectified: bool
     files: tuple[str, ...]
 
     def is_of(self, light_field: LightField) -> bool:
@@ -151,6 +154,7 @@ def read_origin(path: Path) -> Origin | None:
             file_format=file_format,
             digest=str(known.get(DIGEST, "")),
             picture=read_dataset(path, file["view"]) if "view" in file else None,
+            rectified=RIG in known,
             files=tuple(str(known.get("files", "")).split()),
         )
 

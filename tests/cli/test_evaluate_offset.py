@@ -2,6 +2,8 @@
 
 import json
 import math
+import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,14 @@ from error_lines import error_of
 from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.io.pfm import write_pfm
+from sepi.io.readers.options import ReadOptions
+from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
+from sepi.reading import read_light_field
 from sepi.scenes import render, write_hci
 from sepi.scoring.crops import in_frame
 from sepi.scoring.scores import PROTOCOLS, region_masks, score, score_regions
+from sepi.stage import StageMaps
 
 OFFSET, SIZE = (9, 17), (40, 33)
 PLACE = np.s_[9:49, 17:50]
@@ -130,3 +136,36 @@ def test_an_offset_is_two_whole_numbers(files: Path, text: str) -> None:
 def test_a_negative_offset_is_refused_in_python_too() -> None:
     with pytest.raises(SepiError, match="row -1 "):
         in_frame(np.zeros((4, 4), np.float32), (-1, 0), (8, 8))
+
+
+def test_ground_truth_of_the_whole_picture_is_cut_as_the_views_were(
+    files: Path, light_field: LightField, estimate: np.ndarray
+) -> None:
+    """Who crops the views has the truth of the whole picture still: in the folder, as a file, or with the map alone."""
+    assert light_field.ground_truth is not None
+    (top, left), (height, width) = OFFSET, SIZE
+    masks = {name: mask[PLACE] for name, mask in light_field.masks.items()}
+    views = light_field.views[:, :, top : top + height, left : left + width]
+    write_hci(replace(light_field, views=views, ground_truth=light_field.ground_truth[PLACE], masks=masks), Path("cut"))
+    expected = json.loads(evaluate("crop.npy", "cut", "--json").stdout)
+    for name in ("parameters.cfg", "gt_disp_lowres.pfm", *(f"mask_{name}.png" for name in masks)):
+        shutil.copy(f"scene/{name}", f"cut/{name}")
+    part = f"64x64+{left}+{top}"
+    assert json.loads(evaluate("crop.npy", "cut", "--json", "--crop-of", part).stdout) == expected
+    # a result says itself how its views were cut
+    maps = StageMaps(estimate[PLACE], np.ones(SIZE, np.float32))
+    write_result("depth", read_light_field("cut", options=ReadOptions(crop_of=part)), maps)
+    for words in (
+        ("crop.npy", "truth.pfm", "--crop-of", part),
+        ("crop.npy", "--truth", "truth.pfm", "--crop-of", part),
+        ("depth", "truth.pfm"),
+        ("depth", "cut"),
+        ("depth", "cut", "--truth", "truth.pfm"),
+    ):
+        found = json.loads(evaluate(*words, "--json").stdout)
+        assert same(found["paper"]["all"], expected["paper"]["all"]), words
+    # nothing is cut by guess
+    for wrong, size in ((f"64x63+{left}+{top}", (64, 64)), ("64x64+40+40", (24, 24))):
+        told = evaluate("crop.npy", "truth.pfm", "--crop-of", wrong)
+        assert (told.exit_code, told.stderr.count("\n")) == (1, 1)
+        assert f"ground truth is {size}, the estimate {SIZE}" in told.stderr

@@ -24,14 +24,14 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, PositiveInt
 
-from sepi.camera import camera_from
+from sepi.camera import Part, camera_from
 from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import name_of, naming, reading
 from sepi.io.images import picture_header, read_picture
 from sepi.io.pfm import read_pfm
-from sepi.io.readers.options import ReadOptions, arrange_numbers, position_of
+from sepi.io.readers.options import ReadOptions, arrange_numbers, cut_like_views, position_of
 from sepi.io.readers.view_files import read_grid
-from sepi.lightfield import BoolMap, DisparityRange, LightField, Truth
+from sepi.lightfield import DisparityRange, LightField, Truth
 from sepi.models import validated
 
 PARAMETERS = "parameters.cfg"
@@ -84,7 +84,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     of = _view_of_truth(path, options)
     if of is None or not light_field.present[of] or options.view not in (None, of) or not truth_files(path):
         return light_field
-    ground_truth, masks = _truth_of(path, light_field.shape)
+    ground_truth, masks = _truth_of(path, light_field.shape, options.part)
     return replace(light_field, view=of, ground_truth=ground_truth, masks=masks)
 
 
@@ -95,7 +95,7 @@ def read_truth(path: Path, options: ReadOptions) -> Truth:
     of, reference = _view_of_truth(path, options), options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
     if of == reference:
         header = picture_header(next(iter(files.values())))
-        return _truth_of(path, (header.height, header.width))
+        return _truth_of(path, (header.height, header.width), options.part)
     if of is not None and options.view is None and truth_files(path):
         known, made = (f"{t},{s}" for t, s in (of, reference))
         told = f"{path}: its ground truth is of view {known}, the depth of view {made}; --view {known} scores it"
@@ -166,12 +166,25 @@ def _view_of_truth(path: Path, options: ReadOptions) -> tuple[int, int] | None:
     return position_of(numbers, grid[0] // 2 * grid[1] + grid[1] // 2)
 
 
-def _truth_of(folder: Path, shape: tuple[int, int]) -> Truth:
+def _truth_of(folder: Path, shape: tuple[int, int], part: Part | None) -> Truth:
+    """What is known of views of a shape; what is of the whole picture is cut as they were."""
     path = folder / TRUTH
-    ground_truth = read_pfm(path) if path.is_file() else None
+    ground_truth = cut_like_views(read_pfm(path), shape, part) if path.is_file() else None
     if ground_truth is not None and ground_truth.shape != shape:
         raise SepiError(f"{path}: ground truth is {ground_truth.shape}, the views are {shape} (height, width)")
-    return ground_truth, _read_masks(folder, shape)
+    masks = {}
+    for path in sorted(folder.glob("mask_*.png")):
+        name, header = path.stem.removeprefix("mask_"), picture_header(path)
+        if (header.height, header.width) in (shape, None if part is None else part[1::-1]):
+            picture = read_picture(path)
+            values, highest = (cut_like_views(of(picture, axis=2), shape, part) for of in (np.min, np.max))
+            # white on black; anything else is not a region
+            if values.shape == shape and (values == highest).all() and np.isin(values, (0, picture.max())).all():
+                masks[name] = values > 0
+                continue
+        if name in _EVALUATED:
+            raise SepiError(f"{path}: expected a black and white picture of the views' size {shape} (height, width)")
+    return ground_truth, masks
 
 
 def _numbered_views(folder: Path) -> dict[int, Path]:
@@ -220,19 +233,3 @@ def _parameters_of(folder: Path) -> _Parameters:
     values = {key: value for section in parser.sections() for key, value in parser.items(section)}
     used = {key: values[key] for key in _Parameters.model_fields if key in values}
     return validated(_Parameters, used, f"{path}: parameters")
-
-
-def _read_masks(folder: Path, shape: tuple[int, int]) -> dict[str, BoolMap]:
-    masks = {}
-    for path in sorted(folder.glob("mask_*.png")):
-        name = path.stem.removeprefix("mask_")
-        header = picture_header(path)
-        if (header.height, header.width) == shape:
-            values = read_picture(path)
-            # white on black; anything else is not a region
-            if np.array_equal(values.min(2), values.max(2)) and np.isin(values, (0, values.max())).all():
-                masks[name] = values[:, :, 0] > 0
-                continue
-        if name in _EVALUATED:
-            raise SepiError(f"{path}: expected a black and white picture of the views' size {shape} (height, width)")
-    return masks

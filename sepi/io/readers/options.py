@@ -26,7 +26,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import NoneType
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +38,7 @@ from sepi.models import AS_PAIR
 from sepi.validation import described, is_finite, require_known, require_type, whole_pair
 
 Numbers = npt.NDArray[np.int64]
+Map = npt.NDArray[Any]
 
 Index = Annotated[int, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -164,6 +165,17 @@ class ReadOptions:
         """What ``crop_of`` says, as :func:`sepi.camera.camera_from` takes it."""
         found = _PART.fullmatch(self.crop_of or "")
         return None if found is None else (int(found[1]), int(found[2]), int(found[3]), int(found[4]))
+
+
+def cut_like_views(values: Map, shape: tuple[int, int], part: Part | None) -> Map:
+    """A map of the whole picture cut as views of this ``shape`` were, which :attr:`ReadOptions.part` says; else itself.
+
+    It stays as it is where it has another size than the whole picture.
+    """
+    if part is None or values.shape == shape or values.shape != part[1::-1]:
+        return values
+    left, top = part[2:]
+    return values[top : top + shape[0], left : left + shape[1]]
 
 
 def arrange_numbers(
