@@ -232,9 +232,7 @@ def _given_range(path: Path, bounds: tuple[float, float]) -> DisparityRange:
     try:
         minimum, maximum = bounds
     except (TypeError, ValueError) as error:
-        raise SepiError(
-            f"{path}: disparity_range: expected (minimum, maximum) in pixels per view step, got {described(bounds)}"
-        ) from error
+        raise SepiError(f"{path}: disparity_range: expected (minimum, maximum), got {described(bounds)}") from error
     return DisparityRange(minimum, maximum, "given")
 
 

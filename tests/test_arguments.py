@@ -106,7 +106,7 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "no path": (read(None), "light field: expected the path of a file or folder, got None"),
     "options as mapping": (read(options={"view": (0, 0)}), "anywhere: options: expected sepi.ReadOptions"),
     "range of three": (read(disparity_range=(1, 2, 3)), r"disparity_range: expected \(minimum, maximum\)"),
-    "range of one": (read(disparity_range=3), r"disparity_range: expected \(minimum, maximum\) .* got 3"),
+    "range of one": (read(disparity_range=3), r"disparity_range: expected \(minimum, maximum\), got 3"),
     "depth of a path": (depth("dots"), "light field: expected a LightField, .*, got 'dots'"),
     "depth by no variant": (depth(SCENE, None), "variant: expected the name of a variant or a Variant, got None"),
     "parameters as number": (depth(SCENE, "paper", {"initial": 3}), "parameters: initial: expected parameters"),

@@ -243,9 +243,7 @@ def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
     """
     # HDF5 may hang on such, or crash, where the file is damaged; our own files were looked at when they were opened
     if holder.attrs.get_id(key).dtype.hasobject and not is_own(holder):
-        raise SepiError(
-            f"attribute '{printable(key)}': expected numbers, or text of fixed length, which is safe to read"
-        )
+        raise SepiError(f"attribute '{printable(key)}': expected numbers, or text of fixed length")
     value = holder.attrs[key]
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
 

@@ -81,10 +81,7 @@ def read_header(path: Path, file: IO[bytes]) -> Header:
     with reading(path, kind):
         header = Header(kind, *_KINDS[kind][1](file, path, size))
         if not 1 <= header.height * header.width <= min(MAX_PIXELS, _PIXELS_PER_BYTE * size + _SMALL):
-            raise SepiError(
-                f"{header.width}x{header.height} pixels cannot be in a {kind} of {size} bytes, or are more than "
-                f"the {MAX_PIXELS} that are read"
-            )
+            raise SepiError(f"{header.width}x{header.height} pixels cannot be in a {kind} of {size} bytes, or too many")
     return header
 
 

@@ -51,11 +51,9 @@ def sound_maps(light_field: LightField, maps: StageMaps) -> StageMaps:
             raise SepiError(f"{name}: map '{key}': expected a name of letters, digits, '-' and '_'")
     if np.isnan(maps.confidence).all():
         raise SepiError(f"{name}: confidence must lie within 0..1, got NaN everywhere")
-    if ((maps.confidence < 0) | (maps.confidence > 1)).any():
-        raise SepiError(
-            f"{name}: confidence must lie within 0..1, got {np.nanmin(maps.confidence):g} to "
-            f"{np.nanmax(maps.confidence):g}"
-        )
+    known = maps.confidence
+    if ((known < 0) | (known > 1)).any():
+        raise SepiError(f"{name}: confidence must lie within 0..1, got {np.nanmin(known):g} to {np.nanmax(known):g}")
     _require_error_bars(name, maps)
     single = {key: values.astype(np.float32, copy=False) for key, values in maps.all().items() if key in numbers}
     return maps.updated(**single)

@@ -246,9 +246,7 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
     if 0 in array.shape:
         raise SepiError(f"{source}: the array is empty: {array.shape}")
     if size.setdefault("C", 1) not in _COLOURS:
-        raise SepiError(
-            f"{source}: the axis of colours (axes {' '.join(letters)}) has size {size['C']}; expected 1, 3 or 4"
-        )
+        raise SepiError(f"{source}: the axis of colours (axes {letters}) has size {size['C']}; expected 1, 3 or 4")
     notes = ["4th channel (transparency or weight) left out"] if size["C"] == 4 else []
     if "N" in letters and grid is None:
         grid = 1, size["N"]

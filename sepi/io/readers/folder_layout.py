@@ -122,8 +122,7 @@ def _by_row_and_column(folder: Path, named: ViewNumbers, numbers: Numbers, optio
         _require_plausible(folder, grid, numbers)
     if spread[0] // step >= grid[0] or spread[1] // step >= grid[1]:
         raise SepiError(
-            f"{folder}: the names have rows {top} to {max(rows)} and columns {left} to {max(columns)}, which the "
-            f"{grid[0]}x{grid[1]} grid that --grid gives does not hold"
+            f"{folder}: rows {top} to {max(rows)}, columns {left} to {max(columns)}; --grid has {grid[0]}x{grid[1]}"
         )
     notes = []
     if named.said:
@@ -164,10 +163,7 @@ def _by_number(folder: Path, named: ViewNumbers, numbers: Numbers, grid: tuple[i
         return _sorted(folder, numbers, grid)
     if not fits:
         name = max(numbers, key=lambda name: numbers[name])
-        raise SepiError(
-            f"{folder / name}: beyond the {count} views of the {grid[0]}x{grid[1]} grid that --grid gives, numbered "
-            f"from {base}"
-        )
+        raise SepiError(f"{folder / name}: beyond the {grid[0]}x{grid[1]} views of --grid, numbered from {base}")
     notes = [
         f"views are numbered {lowest} to {highest}{_like(named)}, taken row by row; --order transpose if by columns"
     ]

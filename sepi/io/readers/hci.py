@@ -152,10 +152,7 @@ def _views_in(path: Path, options: ReadOptions, parameters: _Parameters) -> tupl
     grid = options.grid or given or _square_grid(path, files)
     if max(files) >= grid[0] * grid[1]:
         source = "--grid" if options.grid else PARAMETERS
-        raise SepiError(
-            f"{files[max(files)]}: beyond the {grid[0] * grid[1]} views of the {grid[0]}x{grid[1]} grid that {source} "
-            "gives"
-        )
+        raise SepiError(f"{files[max(files)]}: beyond the {grid[0]}x{grid[1]} grid that {source} gives")
     return files, grid
 
 

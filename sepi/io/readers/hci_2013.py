@@ -52,9 +52,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     """
     with open_hdf5(path, "file of the first HCI benchmark") as file:
         if isinstance(file.get(VIEWS), h5py.Group):
-            raise SepiError(
-                f"{path}: '{VIEWS}' is a group, not the array of the first HCI benchmark; see --format openlf"
-            )
+            raise SepiError(f"{path}: '{VIEWS}' is a group, not an array; see --format openlf")
         views = read_dataset(path, file[VIEWS])
         shape = views.shape
         if not _is_layout(shape):
@@ -114,10 +112,7 @@ def _read_depth(path: Path, file: h5py.File, shape: tuple[int, ...], view: tuple
         return _as_numbers(read_dataset(path, dataset)) if view == centre else None
     if dataset.shape == shape[:4]:
         return _as_numbers(read_dataset(path, dataset, view))
-    raise SepiError(
-        f"{path}: '{DEPTH}' has shape {dataset.shape}; expected {shape[:4]} like the views, or {shape[2:4]} for the "
-        "centre view"
-    )
+    raise SepiError(f"{path}: '{DEPTH}' has shape {dataset.shape}; expected {shape[:4]}, or the centre view's")
 
 
 def _as_numbers(depth: npt.NDArray[Any]) -> DepthMap:

@@ -127,9 +127,7 @@ def _numbers_of(named: ViewNumbers, names: Iterable[str]) -> Numbers:
 def _require_no_place(folder: Path, named: ViewNumbers, name: str, why: str, options: ReadOptions) -> None:
     """Raise where a picture that is unlike the views is needed as one."""
     if name in widened(folder, named, named.numbers, _numbers_of(named, [name]), options).positions:
-        raise SepiError(
-            f"{folder / name}: {why}; all views must be alike, so replace it, or leave it out with --exclude {name}"
-        )
+        raise SepiError(f"{folder / name}: {why}; all views must be alike; replace it, or pass --exclude {name}")
 
 
 def _with_positions(

@@ -97,6 +97,4 @@ def _require_room(path: Path, info: zipfile.ZipInfo) -> None:
     """Raise unless a member of an archive can be as large as the archive says."""
     held = min(info.compress_size, path.stat().st_size)
     if info.file_size > held * (1 if info.compress_type == zipfile.ZIP_STORED else DEFLATE_RATIO):
-        raise SepiError(
-            f"damaged NumPy file: {printable(info.filename)} of {info.file_size} bytes cannot lie in {held}"
-        )
+        raise SepiError(f"damaged NumPy file: {printable(info.filename)}: {info.file_size} bytes cannot lie in {held}")

@@ -242,10 +242,7 @@ def _central(source: str, numbers: Numbers, side: int) -> Numbers:
     # around the centre view, as the light field's convention has it; an even grid has one row more before it than after
     top, left = T // 2 - side // 2, S // 2 - side // 2
     if side < 1 or side % 2 == 0 or top < 0 or left < 0 or top + side > T or left + side > S:
-        raise SepiError(
-            f"{source}: the central {side}x{side} views were asked for; expected an odd number that fits the grid of "
-            f"{T}x{S} views"
-        )
+        raise SepiError(f"{source}: the central {side}x{side} views of {T}x{S}; expected an odd number that fits")
     return numbers[top : top + side, left : left + side]
 
 
@@ -257,16 +254,11 @@ def _excluded(source: str, view: str, numbers: Numbers, names: Mapping[str, int]
         return int(numbers[position])
     if view not in names:
         found = f" (found: {', '.join(sorted(names)[:3])}, ...)" if names else ""
-        raise SepiError(
-            f"{source}: view '{view}' to exclude: expected a position ROW,COLUMN or the name of a view's file{found}"
-        )
+        raise SepiError(f"{source}: view '{view}' to exclude: expected a position ROW,COLUMN or a view's file{found}")
     return names[view]
 
 
 def _require_inside(source: str, numbers: Numbers, position: tuple[int, int]) -> None:
     T, S = numbers.shape
     if not (0 <= position[0] < T and 0 <= position[1] < S):
-        raise SepiError(
-            f"{source}: view {position[0]},{position[1]} lies outside the grid; rows go from 0 to {T - 1}, "
-            f"columns from 0 to {S - 1}"
-        )
+        raise SepiError(f"{source}: view {position[0]},{position[1]} lies outside the grid of {T}x{S}, counted from 0")

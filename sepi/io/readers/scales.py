@@ -116,7 +116,4 @@ def _range_of(source: str, position: tuple[int, int], view: npt.NDArray[np.gener
     if np.isnan(view).all():
         return None
     at = f"{position[0]},{position[1]}"
-    raise SepiError(
-        f"{source}: view {at} holds values that are not finite (NaN or infinite); mend it, or leave it out with "
-        f"--exclude {at}"
-    )
+    raise SepiError(f"{source}: view {at} holds NaN or infinite values; mend it, or leave it out with --exclude {at}")

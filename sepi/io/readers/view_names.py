@@ -119,10 +119,7 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
             f"--pattern, such as {group.suggestion()}"
         )
     if not counted.columns:
-        raise SepiError(
-            f"{source}: no number in the names counts the views ({', '.join(names[:3])}); give --pattern, such as "
-            f"{EXAMPLES}"
-        )
+        raise SepiError(f"{source}: no number in the names counts the views; give --pattern, such as {EXAMPLES}")
     columns, said = group.row_first(counted.columns)
     numbers = {name: group.numbers_of(name, columns) or () for name in group.names}
     numbers_of: Callable[[str], tuple[int, ...] | None] = functools.partial(group.numbers_of, columns=columns)

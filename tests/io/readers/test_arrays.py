@@ -335,7 +335,7 @@ def test_nan_in_a_view_names_it_and_excluding_it_mends_it() -> None:
     views = grid_of(np.float64)
     views[0, 2, 3, 3, 1] = np.nan
     views[2, 0, 0, 0, 0] = np.inf
-    assert "view 0,2 holds values that are not finite" in refused(views)
+    assert "view 0,2 holds NaN or infinite values" in refused(views)
     assert "--exclude 0,2" in refused(views)
     assert "--exclude 2,0" in refused(views, exclude=("0,2",))
     light_field = taken(views, exclude=("0,2", "2,0"))

@@ -133,7 +133,7 @@ BAD: dict[str, tuple[tuple[int, int], ReadOptions, str]] = {
     "no grid": ((100, 100), ReadOptions(grid=(0, 14)), "a grid of 2 to 10000 views"),
     "one view": ((100, 100), ReadOptions(grid=(1, 1)), "a grid of 2 to 10000 views"),
     "even middle": ((100, 100), ReadOptions(central=14), "odd number"),
-    "middle too large": ((100, 100), ReadOptions(central=15), "fits the grid of 14x14"),
+    "middle too large": ((100, 100), ReadOptions(central=15), "15x15 views of 14x14; expected an odd number"),
     "view outside": ((100, 100), ReadOptions(view=(9, 0)), "outside the grid"),
     "reference view left out": ((100, 100), ReadOptions(exclude=("4,4",)), "centre view"),
     "view left out": ((100, 100), ReadOptions(exclude=("1,2",), view=(1, 2)), "missing"),

@@ -144,7 +144,7 @@ def test_no_memory_on_the_word_of_a_shape(tmp_path: Path, name: str) -> None:
 def test_a_group_or_nothing_in_place_of_the_views(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "group.h5", "w") as file:
         file["LF/inner"] = LF
-    assert "'LF' is a group, not the array" in refused(tmp_path / "group.h5")
+    assert "'LF' is a group, not an array" in refused(tmp_path / "group.h5")
     with h5py.File(tmp_path / "none.h5", "w") as file:
         file["other"] = LF
     assert "not a file of the first HCI benchmark" in refused(tmp_path / "none.h5")

@@ -93,7 +93,7 @@ def test_another_group_is_not_called_damaged(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["LF/pictures"] = VIEWS
     np.testing.assert_array_equal(read(tmp_path / "a.h5", ReadOptions()).views, VIEWS)
-    with pytest.raises(SepiError, match="'LF' is a group, not the array"):
+    with pytest.raises(SepiError, match="'LF' is a group, not an array"):
         read(tmp_path / "a.h5", ReadOptions(), "hci-2013")
     with h5py.File(tmp_path / "b.h5", "w") as file:
         file["LF"] = VIEWS
