@@ -17,6 +17,7 @@ from sepi.errors import SepiError
 from sepi.interrupts import interruptibly
 from sepi.io.disparity_maps import read_disparity, read_error_bars
 from sepi.io.hdf5 import (
+    PACKED,
     UNITS,
     Attribute,
     attribute,
@@ -24,6 +25,7 @@ from sepi.io.hdf5 import (
     float_maps,
     has_dataset,
     open_hdf5,
+    put,
     read_camera,
     read_dataset,
     read_rig,
@@ -72,12 +74,10 @@ def write_all_views(
     """
     with create_hdf5(path) as file:
         present = light_field.present
-        file.create_dataset("present", data=present)
-        file.create_dataset("baselines", data=np.where(present[..., None], light_field.baselines, np.nan))
-        file["baselines"].attrs["axes"] = "t s (down, across)"
-        file["baselines"].attrs["units"] = "view steps"
-        for key, value in attributes.items():
-            file.attrs[key] = value
+        baselines = np.where(present[..., None], light_field.baselines, np.nan)
+        put(file, "present", present)
+        put(file, "baselines", baselines, axes="t s (down, across)")
+        file.attrs.update(attributes)
         file.attrs["view_position"] = light_field.reference_position
         for position, maps in interruptibly(views):
             for name, values in {**maps, "picture": light_field.views[position]}.items():
@@ -201,8 +201,8 @@ def _position(path: Path, file: h5py.File, view: View | None) -> View:
 def _dataset(file: h5py.File, name: str, grid: tuple[int, int], values: npt.NDArray[Any]) -> h5py.Dataset:
     """The dataset for such values of each view, made where it is not there yet; missing views take no room in it."""
     if name not in file:
-        # as in stage files: masks shrink to almost nothing, float maps hardly
-        packed = {"compression": "gzip", "compression_opts": 1} if values.dtype.itemsize < 4 else {}
+        # as in stage files
+        packed = PACKED if values.dtype.itemsize < 4 else {}
         shape, chunks = (*grid, *values.shape), (1, 1, *values.shape)
         file.create_dataset(name, shape, values.dtype, chunks=chunks, fillvalue=_MISSING.get(name), **packed)
         file[name].attrs["axes"] = "t s y x" if values.ndim == 2 else "t s y x channel"

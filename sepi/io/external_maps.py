@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.io.disparity_maps import SUFFIXES, map_file
-from sepi.io.hdf5 import UNITS, attribute, create_hdf5, open_hdf5, read_dataset
+from sepi.io.hdf5 import attribute, create_hdf5, open_hdf5, put, read_dataset
 from sepi.io.integrity import members
 from sepi.io.scores import Evaluation, evaluation_in, put_evaluation, scores_in
 from sepi.lightfield import FloatMap
@@ -91,11 +91,9 @@ def write_external(path: Path, maps: Mapping[str, ExternalMap]) -> None:
         methods = file.create_group(_METHODS, track_order=True)
         for name, external in maps.items():
             group = methods.create_group(name)
-            for key in _ATTRIBUTES:
-                group.attrs[key] = getattr(external, key)
+            group.attrs.update({key: getattr(external, key) for key in _ATTRIBUTES})
             if external.disparity is not None:
-                group.create_dataset("disparity", data=external.disparity)
-                group["disparity"].attrs["units"] = UNITS["disparity"]
+                put(group, "disparity", external.disparity)
             put_evaluation(group, external.evaluation)
 
 

@@ -40,35 +40,44 @@ _STEPS, _METRES = "pixels per view step", "metres"
 UNITS = {
     **dict.fromkeys(("disparity", *ERROR_BARS), _STEPS),
     "confidence": "0..1",
+    "candidates": _STEPS,
+    "ground_truth": _STEPS,
+    "error": _STEPS,
+    "positions": "view steps",
+    "baselines": "view steps",
     **dict.fromkeys(("depth", "depth_sigma", "nearest", "farthest"), _METRES),
 }
-"""Units of maps, by their names."""
+"""Units of arrays, by their names."""
+
+PACKED = {"compression": "gzip", "compression_opts": 1}
+"""How arrays that shrink to almost nothing are stored, for h5py."""
 
 
 def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:
     """Write a stage's maps and the attributes that say what made them."""
     with create_hdf5(path) as file:
         put_maps(file, maps)
-        for key, value in attributes.items():
-            file.attrs[key] = value
+        file.attrs.update(attributes)
+
+
+def put(group: h5py.Group, name: str, values: npt.NDArray[Any], **attributes: Any) -> h5py.Dataset:
+    """Write an array with its units; small integers and masks are packed, since float maps hardly compress."""
+    dataset = group.create_dataset(name, data=values, **(PACKED if values.dtype.itemsize < 4 else {}))
+    dataset.attrs.update(({"units": UNITS[name]} if name in UNITS else {}) | attributes)
+    return dataset
 
 
 def put_maps(file: h5py.File, maps: StageMaps) -> None:
     """Write a stage's maps."""
     # in the order in which they are read back: the file does not tell whether they came from one
     for name, values in sorted(maps.all().items()):
-        # small integers and masks shrink to almost nothing; float maps hardly compress
-        compression = {"compression": "gzip", "compression_opts": 1} if values.dtype.itemsize < 4 else {}
-        dataset = file.create_dataset(name, data=values, **compression)
-        if name in UNITS:
-            dataset.attrs["units"] = UNITS[name]
+        dataset = put(file, name, values)
         if name == "view_subset":
             dataset.attrs["names"] = [fixed_text(subset) for subset in maps.subset_names]
     if maps.cost_volume is not None:
         # half precision hardly compresses
         file.create_dataset(_COSTS, data=maps.cost_volume.costs)
-        file.create_dataset(_CANDIDATES, data=maps.cost_volume.disparities)
-        file[_CANDIDATES].attrs["units"] = UNITS["disparity"]
+        put(file, _CANDIDATES, maps.cost_volume.disparities)
 
 
 def read_stage(path: Path) -> StageMaps:
@@ -119,34 +128,25 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
     """
     path = require_path("light field to write", path)
     require_light_field(light_field)
-    known = light_field.disparity_range
+    known, rig = light_field.disparity_range, light_field.rig
     with create_hdf5(path) as file:
         # gzip would cost 1.8 s and save half of 64 MB for a benchmark scene: not worth it for an intermediate file
-        file.create_dataset("views", data=light_field.views)
-        file["views"].attrs["axes"] = "t s y x channel"
-        file.create_dataset("present", data=light_field.present)
+        file.create_dataset("views", data=light_field.views).attrs["axes"] = "t s y x channel"
+        put(file, "present", light_field.present)
         if light_field.missing is not None:
-            file.create_dataset("missing", data=light_field.missing, compression="gzip", compression_opts=1)
-        # what jobs on this file need: told without reading it
-        file.attrs["reach"] = light_field.reach
-        file.attrs["name"] = fixed_text(light_field.name)
-        file.attrs["source"] = fixed_text(light_field.source)
-        if light_field.reading:
-            file.attrs["reading"] = fixed_text(light_field.reading)
-        if known is not None:
-            file.attrs["disparity_range"] = (known.minimum, known.maximum)
-            file.attrs["disparity_range_source"] = fixed_text(known.source)
-        if light_field.view is not None:
-            file.attrs["view"] = light_field.view
-        file.attrs["row_spacing"] = light_field.row_spacing
+            put(file, "missing", light_field.missing)
         if light_field.positions is not None:
-            file.create_dataset("positions", data=light_field.positions)
-            file["positions"].attrs["axes"] = "t s (down, across)"
-            file["positions"].attrs["units"] = "view steps"
-        if light_field.camera is not None:
-            file.attrs["camera"] = numbers_of(light_field.camera)
-        if light_field.rig is not None:
-            file.create_dataset(RIG, data=np.frombuffer(light_field.rig.to_text().encode(), np.uint8))
+            put(file, "positions", light_field.positions, axes="t s (down, across)")
+        if rig is not None:
+            put(file, RIG, np.frombuffer(rig.to_text().encode(), np.uint8))
+        texts = {"name": light_field.name, "source": light_field.source, "reading": light_field.reading or None}
+        # the reach is what jobs on this file need: told without reading it
+        numbers: dict[str, Any] = {"reach": light_field.reach, "row_spacing": light_field.row_spacing}
+        numbers |= {"view": light_field.view, "camera": light_field.camera and numbers_of(light_field.camera)}
+        if known is not None:
+            numbers["disparity_range"], texts["disparity_range_source"] = (known.minimum, known.maximum), known.source
+        file.attrs.update({key: value for key, value in numbers.items() if value is not None})
+        file.attrs.update({key: fixed_text(text) for key, text in texts.items() if text is not None})
         if light_field.notes:
             file.attrs["notes"] = [fixed_text(note) for note in light_field.notes]
         put_truth(file, (light_field.ground_truth, light_field.masks))
@@ -162,10 +162,9 @@ def put_truth(file: h5py.File, truth: Truth) -> None:
     """Write what scores are made with, as far as there is any."""
     ground_truth, masks = truth
     if ground_truth is not None:
-        file.create_dataset("ground_truth", data=ground_truth)
-        file["ground_truth"].attrs["units"] = UNITS["disparity"]
+        put(file, "ground_truth", ground_truth)
     for name, mask in sorted(masks.items()):
-        file.create_dataset(f"masks/{name}", data=mask, compression="gzip", compression_opts=1)
+        put(file, f"masks/{name}", mask)
 
 
 def truth_in(path: Path, file: h5py.File) -> Truth:
@@ -193,30 +192,30 @@ def read_light_field(path: Path) -> LightField:
             raise SepiError(f"{path}: light of a path-traced scene, no light field; give the scene's folder beside it")
         known_arrays = ("views", "present", "missing", "positions", RIG)
         arrays = {name: read_dataset(path, file[name]) for name in known_arrays if name in file}
+        known = {key: attribute(file, key) for key in file.attrs}
         ground_truth, masks = truth_in(path, file)
-        known = None
-        if "disparity_range" in file.attrs:
-            minimum, maximum = map(float, attribute(file, "disparity_range"))
-            known = DisparityRange(minimum, maximum, _text(file, "disparity_range_source"))
-            require_known("disparity range", [known.source], RANGE_SOURCES)
-        view = attribute(file, "view") if "view" in file.attrs else None
-        positions, missing = arrays.get("positions"), arrays.get("missing")
+        searched = None
+        if "disparity_range" in known:
+            low, high = map(float, known["disparity_range"])
+            searched = DisparityRange(low, high, str(known["disparity_range_source"]))
+            require_known("disparity range", [searched.source], RANGE_SOURCES)
+        positions, missing, view = arrays.get("positions"), arrays.get("missing"), known.get("view")
         return LightField(
             views=arrays["views"],
-            name=_text(file, "name"),
-            source=_text(file, "source"),
+            name=str(known["name"]),
+            source=str(known["source"]),
             present=arrays["present"].astype(bool),
             view=None if view is None else (int(view[0]), int(view[1])),
-            row_spacing=float(attribute(file, "row_spacing")) if "row_spacing" in file.attrs else 1.0,
-            settled="row_spacing" in file.attrs,
+            row_spacing=float(known.get("row_spacing", 1.0)),
+            settled="row_spacing" in known,
             positions=None if positions is None else positions.astype(np.float64),
             camera=read_camera(file),
-            notes=tuple(_text(file, "notes").split("\0")) if "notes" in file.attrs else (),
-            disparity_range=known,
+            notes=tuple(note.decode("utf-8", "replace") for note in known.get("notes", ())),
+            disparity_range=searched,
             ground_truth=ground_truth,
             masks=masks,
             rig=Rig.from_text(arrays[RIG].tobytes().decode("utf-8", "replace")) if RIG in arrays else None,
-            reading=_text(file, "reading") if "reading" in file.attrs else "",
+            reading=str(known.get("reading", "")),
             missing=None if missing is None else missing.astype(bool),
         )
 
@@ -292,11 +291,3 @@ def create_hdf5(path: Path) -> Iterator[h5py.File]:
             block = digest_block(written)
             written.seek(0)
             written.write(block)
-
-
-def _text(file: h5py.File, key: str) -> str:
-    """Text of an attribute; several texts are joined by NUL."""
-    kind = file.attrs.get_id(key).get_type()
-    if not isinstance(kind, h5py.h5t.TypeStringID) or kind.is_variable_str():
-        raise SepiError(f"not a light field of this package: attribute '{key}' is no text of fixed length")
-    return "\0".join(value.decode("utf-8", "replace") for value in np.ravel(file.attrs[key]).tolist())

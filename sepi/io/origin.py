@@ -65,19 +65,15 @@ class Origin:
 
     def is_of(self, light_field: LightField) -> bool:
         """Whether it is a result of this light field, perhaps as another view, read otherwise, or since changed."""
-        where = light_field.source
-        return (
-            (where != "" and (self.source, self.scene) == (where, light_field.name))
-            or self._shows(light_field)
-            or self.digest == digest_of(light_field)
-        )
+        named = light_field.source != "" and (self.source, self.scene) == (light_field.source, light_field.name)
+        return named or self._shows(light_field) or self.digest == digest_of(light_field)
 
     def difference(self, light_field: LightField) -> str | None:
         """What is other in a light field that should be the very one that the result was made from; None: nothing."""
-        (t, s), (rows, columns) = light_field.reference_position, light_field.grid
-        if (self.view, self.grid) != ((t, s), (rows, columns)):
-            (t0, s0), (own_rows, own_columns) = self.view, self.grid
-            return f"depth of view {t0},{s0} of {own_rows}x{own_columns} views, not of view {t},{s} of {rows}x{columns}"
+        places = (self.view, self.grid), (light_field.reference_position, light_field.grid)
+        if places[0] != places[1]:
+            own, other = (f"{t},{s} of {rows}x{columns}" for (t, s), (rows, columns) in places)
+            return f"depth of view {own} views, not of view {other}"
         if self.digest != digest_of(light_field) if self.digest else not self._shows(light_field):
             return "depth of another light field, or of its views in another order or without some of them"
         if self.row_spacing is not None and not np.isclose(self.row_spacing, light_field.row_spacing):
@@ -91,9 +87,8 @@ class Origin:
         return not np.array_equal(self.picture, other.picture)
 
     def _shows(self, light_field: LightField) -> bool:
-        return self.picture is not None and np.array_equal(
-            self.picture, light_field.views[light_field.reference_position]
-        )
+        view = light_field.views[light_field.reference_position]
+        return self.picture is not None and np.array_equal(self.picture, view)
 
 
 DIGEST = "light_field"
@@ -143,13 +138,12 @@ def read_origin(path: Path) -> Origin | None:
             return None
         (t, s), (rows, columns) = (map(int, known[name]) for name in ("view_position", "grid"))
         options, file_format = _reading(path, str(known.get("reading", "")))
-        on_grid = known.get("positions") == "grid"
         return Origin(
             scene=str(known.get("scene", "")),
             source=str(known.get("source", "")),
             view=(t, s),
             grid=(rows, columns),
-            row_spacing=float(known["row_spacing"]) if on_grid else None,
+            row_spacing=float(known["row_spacing"]) if known.get("positions") == "grid" else None,
             options=options,
             file_format=file_format,
             digest=str(known.get(DIGEST, "")),

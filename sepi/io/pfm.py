@@ -53,7 +53,7 @@ def read_pfm(path: str | Path) -> FloatMap:
         width, height, scale = int(header[2]), int(header[3]), float(header[4])
         body = memoryview(data)[header.end() :]
         if not scale or not 0 < 4 * width * height == len(body):
-            raise SepiError(f"damaged PFM: {len(body)} bytes for {width}x{height} pixels, and scale {scale:g}")
+            raise SepiError(f"damaged PFM: expected {4 * width * height} bytes after the header, got {len(body)}")
         values = np.frombuffer(body, "<f4" if scale < 0 else ">f4").reshape(height, width)
         return values[::-1].astype(np.float32)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,13 +13,10 @@ from sepi.io.files import atomic_path, reading
 from sepi.validation import require_path, require_type
 
 _POINT = np.dtype([("position", "<f4", 3), ("colour", "u1", 3)])
-# words of the format for numbers
-_NUMBERS = {
-    **dict.fromkeys(("char", "int8"), "i1"), **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "i2"), **dict.fromkeys(("ushort", "uint16"), "u2"),
-    **dict.fromkeys(("int", "int32"), "i4"), **dict.fromkeys(("uint", "uint32"), "u4"),
-    **dict.fromkeys(("float", "float32"), "f4"), **dict.fromkeys(("double", "float64"), "f8"),
-}  # fmt: skip
+# words of the format for numbers, where NumPy has others
+_WORDS = ("char i1", "uchar u1", "short i2", "ushort u2", "int i4", "uint u4", "float f4", "double f8")
+_NUMBERS = dict(word.split() for word in _WORDS)
+_ORDERS: dict[str, Literal["<", ">"]] = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _LONGEST_HEADER = 2**16
 _PROPERTIES = (*(f"float {axis}" for axis in "xyz"), *(f"uchar {colour}" for colour in ("red", "green", "blue")))
 
@@ -100,28 +97,22 @@ def read_positions(path: Path) -> npt.NDArray[np.float64]:
     Raises
     ------
     SepiError
-        If it is damaged, or a vertex has lists.
+        If it is damaged, its first element is another, or a vertex has lists.
     """
     with reading(path, "PLY file"):
         data = path.read_bytes()
-        end = data.find(b"end_header", 0, _LONGEST_HEADER)
-        words = [line.split() for line in data[: max(0, end)].decode("ascii", "replace").splitlines()]
-        kind = next((line[1] for line in words if line[:1] == ["format"]), "")
-        elements = [n for n, line in enumerate(words) if line[:1] == ["element"]]
-        if (
-            end < 0
-            or not elements
-            or words[elements[0]][1] != "vertex"
-            or kind not in ("ascii", "binary_little_endian")
-        ):
-            raise SepiError("not a PLY file of points, as text or of little-endian numbers")
-        last = elements[1] if len(elements) > 1 else len(words)
-        properties = [line[1:] for line in words[elements[0] + 1 : last] if line[:1] == ["property"]]
-        point = np.dtype([(name, f"<{_NUMBERS[word]}") for word, name in properties])
-        count, begin = int(words[elements[0]][2]), data.index(b"\n", end) + 1
+        end = data.index(b"end_header", 0, _LONGEST_HEADER)
+        begin = data.index(b"\n", end) + 1
+        lines = [line.split() for line in data[:end].decode("ascii", "replace").splitlines()]
+        kind = next(line[1] for line in lines if line[:1] == ["format"])
+        first, *others = [n for n, line in enumerate(lines) if line[:1] == ["element"]]
+        if lines[first][1] != "vertex":
+            raise SepiError("not a PLY file of points: its first element is no vertex")
+        count, properties = int(lines[first][2]), lines[first + 1 : others[0] if others else None]
+        names = [(line[2], _NUMBERS.get(line[1], line[1])) for line in properties if line[:1] == ["property"]]
         if kind == "ascii":
             rows = [tuple(map(float, line.split())) for line in data[begin:].splitlines()[:count]]
-            values = np.array(rows, [(name, "f8") for _, name in properties])
+            values = np.array(rows, [(name, "f8") for name, _ in names])
         else:
-            values = np.frombuffer(data, point, count, begin)
+            values = np.frombuffer(data, np.dtype(names).newbyteorder(_ORDERS[kind]), count, begin)
         return np.column_stack([values[axis].astype(np.float64) for axis in "xyz"])

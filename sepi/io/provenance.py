@@ -55,12 +55,11 @@ def result_attributes(light_field: LightField, maps: StageMaps, digest: str | No
     digest : str, optional
         As in :func:`sepi.io.origin.origin_attributes`.
     """
-    made_by, range_of = maps.made_by, light_field
-    made: dict[str, Attribute] = {}
-    if made_by is not None:
-        range_of = light_field.with_range(made_by.disparity_range)
-        made = {"variant": made_by.variant, "made_from": json.dumps(made_by.history, sort_keys=True)}
-    return {**scene_attributes(range_of), **made, **origin_attributes(light_field, digest)}
+    made_by, origin = maps.made_by, origin_attributes(light_field, digest)
+    if made_by is None:
+        return {**scene_attributes(light_field), **origin}
+    made = {"variant": made_by.variant, "made_from": json.dumps(made_by.history, sort_keys=True)}
+    return {**scene_attributes(light_field.with_range(made_by.disparity_range)), **made, **origin}
 
 
 def history_of(path: Path | None) -> list[Entry]:

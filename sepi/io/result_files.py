@@ -14,15 +14,8 @@ from sepi.io.files import remove_files
 from sepi.io.origin import RESULT, read_origin
 from sepi.lightfield import LightField
 
-RESULT_FILES = (
-    "disparity.pfm",
-    "disparity.npy",
-    "disparity_16bit.png",
-    "disparity.png",
-    "confidence.png",
-    "points.ply",
-    RESULT,
-)
+_MAPS = ("disparity.pfm", "disparity.npy", "disparity_16bit.png", "disparity.png", "confidence.png")
+RESULT_FILES = (*_MAPS, "points.ply", RESULT)
 """What :func:`write_result` always writes; masks, depth and error bars come with what it is given."""
 
 RUNTIME = "runtime.txt"

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, open_hdf5, read_dataset
+from sepi.io.hdf5 import Attribute, attribute, create_hdf5, open_hdf5, put, read_dataset
 from sepi.io.integrity import members
 from sepi.lightfield import BoolMap, FloatMap
 
@@ -94,20 +94,17 @@ def write_scores(path: Path, maps: Mapping[str, Evaluation], attributes: Mapping
     """
     with create_hdf5(path) as file:
         file.attrs["ground_truth"] = any(found.error is not None for found in maps.values())
-        for key, value in attributes.items():
-            file.attrs[key] = value
+        file.attrs.update(attributes)
         groups = file.create_group(_MAPS, track_order=True)
-        first: h5py.Group | None = None
+        shared: Mapping[str, h5py.Dataset] = {}
         for name, evaluation in maps.items():
             # HDF5 would take a slash for a group of groups; no label of a choice has a colon
             group = groups.create_group(name.replace("/", ":"))
-            if first is None:
-                put_evaluation(group, evaluation)
-                first = group
-            else:
-                put_evaluation(group, replace(evaluation, regions={}))
-                for region in sorted(evaluation.regions):
-                    group[f"regions/{region}"] = first[f"regions/{region}"]
+            own = {region: mask for region, mask in evaluation.regions.items() if region not in shared}
+            put_evaluation(group, replace(evaluation, regions=own))
+            for region in sorted(shared.keys() & evaluation.regions.keys()):
+                group[f"regions/{region}"] = shared[region]
+            shared = shared or dict(members(group.get("regions", {})))
 
 
 def read_scores(path: Path, names: Collection[str] | None = None) -> dict[str, AllScores]:
@@ -154,16 +151,13 @@ def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
     if evaluation.scores:
         # some thousand attributes in groups of their own would take seconds to read
         text = json.dumps(evaluation.scores, sort_keys=True)
-        group.create_dataset(_SCORES, data=np.frombuffer(text.encode(), np.uint8))
+        put(group, _SCORES, np.frombuffer(text.encode(), np.uint8))
     if evaluation.error is not None:
-        group.create_dataset("error", data=evaluation.error)
-        group["error"].attrs["units"] = UNITS["disparity"]
+        put(group, "error", evaluation.error)
     if evaluation.reliability is not None:
-        group.create_dataset(_RELIABILITY, data=evaluation.reliability)
-        group[_RELIABILITY].attrs["axes"] = "(pixels, said, found) said_tenth"
+        put(group, _RELIABILITY, evaluation.reliability, axes="(pixels, said, found) said_tenth")
     for name, mask in sorted(evaluation.regions.items()):
-        dataset = group.create_dataset(f"regions/{name}", data=mask, compression="gzip", compression_opts=1)
-        dataset.attrs["source"] = evaluation.region_sources[name]
+        put(group, f"regions/{name}", mask, source=evaluation.region_sources[name])
 
 
 def scores_in(group: h5py.Group) -> AllScores:
