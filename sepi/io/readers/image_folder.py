@@ -26,6 +26,7 @@ from sepi.io.readers.row_folders import files_in, has_rows, numbered, view_files
 from sepi.io.readers.view_files import read_grid
 from sepi.io.readers.view_names import (
     ViewNumbers,
+    decimals_in,
     infer_view_numbers,
     pair_view_numbers,
     parse_view_numbers,
@@ -85,7 +86,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
         arranged=layout.arranged,
         files=names,
     )
-    return _with_positions(light_field, named, layout, numbers) if layout.arranged else light_field
+    return _with_positions(light_field, layout, numbers) if layout.arranged else light_field
 
 
 def _views(folder: Path, names: Sequence[str], options: ReadOptions) -> tuple[ViewNumbers, dict[str, str]]:
@@ -130,16 +131,12 @@ def _require_no_place(folder: Path, named: ViewNumbers, name: str, why: str, opt
         raise SepiError(f"{folder / name}: {why}; all views must be alike; replace it, or pass --exclude {name}")
 
 
-def _with_positions(
-    light_field: LightField, named: ViewNumbers, layout: Layout, numbers: npt.NDArray[np.int64]
-) -> LightField:
+def _with_positions(light_field: LightField, layout: Layout, numbers: npt.NDArray[np.int64]) -> LightField:
     """The light field with the positions of its cameras where two decimal numbers of the names fit its grid."""
-    at = {position: named.decimals.get(name, ()) for name, position in layout.positions.items()}
-    count = min(map(len, at.values()))
-    given = np.full((layout.grid[0] * layout.grid[1], count), np.nan)
-    for position, decimals in at.items():
-        given[position] = decimals
-    for pair in combinations(range(count), 2):
+    decimals = decimals_in(list(layout.positions))
+    given = np.full((layout.grid[0] * layout.grid[1], len(decimals[0])), np.nan)
+    given[list(layout.positions.values())] = decimals
+    for pair in combinations(range(given.shape[1]), 2):
         found = positions_from_cameras(given[numbers][..., pair], light_field.present)
         if found is not None:
             positions, row_spacing, directions = found

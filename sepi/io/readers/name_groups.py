@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from os.path import commonprefix
+from typing import TypeVar
 
 from sepi.errors import SepiError
 from sepi.io.readers.view_counts import Counting, Values, counting, origin
@@ -19,9 +19,13 @@ CAMERAS = ("cam", "camera")
 MAX_DIGITS = 18
 """Of a number in a name."""
 
+DECIMAL = r"(?P<decimal>[+-]*+(?<![0-9.])[0-9]++\.[0-9]++(?![0-9.]))"
+"""Regular expression of a decimal number in a name, with the signs before it."""
+
+Number = TypeVar("Number", int, float)
+
 # decimals of a decimal number that counts views
 _FINE = 6
-_FINEST = 10**_FINE
 # part of the largest group of names from which on another group is as likely the views
 _RIVAL = 0.5
 # last word before a number, what says which number it is, and what says that it is no place
@@ -48,23 +52,18 @@ class NameGroup:
 
     def __init__(self, source: str, names: Sequence[str], form: re.Pattern[str], decimals_count: bool) -> None:
         self._form, self._decimals_count = form, decimals_count
-        cut = {name: self._cut(name) for name in names}
         groups: dict[tuple[str, ...], list[str]] = defaultdict(list)
         for name in names:
-            if cut[name].numbers or cut[name].decimals:
-                groups[cut[name].texts].append(name)
+            texts, numbers = self._cut(name)
+            if numbers or _MARK in texts[0]:
+                groups[texts].append(name)
         self.names = _largest(source, groups)
-        self._texts = cut[self.names[0]].texts
-        cuts = [cut[name] for name in self.names]
-        self._hyphens = _separators([[signs for signs, _ in name.numbers] for name in cuts])
-        # where some names have a decimal number and others a whole one, they do not say where cameras stood
-        self._decimals_alike = len({tuple("." in text for _, text in name.numbers) for name in cuts}) == 1
-        decimals = [[signs for signs, _ in name.decimals] for name in cuts] if self._decimals_alike else []
-        self._decimal_hyphens = _separators(decimals)
-        # decimals that count do so in steps of their own
-        self._origins = [(0, 1)] * len(cuts[0].numbers)
+        self._texts, self._first = self._cut(self.names[0])
+        self._hyphens = separators([sign for sign, _ in self._cut(name)[1]] for name in self.names)
+        self._origins = [(0, 1)] * len(self._first)
         self.columns = self._values()
         if decimals_count:
+            # decimals that count do so in steps of their own
             self._origins = [origin(values) for values in self.columns]
             self.columns = self._values()
         self._words = [word[1].lower() if (word := _WORD.search(text)) else "" for text in self._texts[:-2]]
@@ -106,20 +105,11 @@ class NameGroup:
 
     def numbers_of(self, name: str, columns: Sequence[int]) -> tuple[int, ...] | None:
         """Some of the numbers of a name; None where it is unlike those of the group."""
-        cut = self._cut(name)
-        if cut.texts != self._texts:
+        texts, numbers = self._cut(name)
+        if texts != self._texts:
             return None
-        values = (_signed(*cut.numbers[at], self._hyphens[at]) for at in columns)
-        return tuple(
-            (value - self._origins[at][0]) // self._origins[at][1] for value, at in zip(values, columns, strict=True)
-        )
-
-    def decimals_of(self, name: str) -> tuple[float, ...]:
-        """The decimal numbers of one of the group's names; none where not all names have them in the same places."""
-        if not self._decimals_alike:
-            return ()
-        decimals = zip(self._cut(name).decimals, self._decimal_hyphens, strict=True)
-        return tuple(-float(text) if _is_minus(signs, hyphen) else float(text) for (signs, text), hyphen in decimals)
+        values = {at: signed(*numbers[at], self._hyphens[at], _whole) for at in columns}
+        return tuple((value - self._origins[at][0]) // self._origins[at][1] for at, value in values.items())
 
     def row_first(self, columns: tuple[int, ...]) -> tuple[tuple[int, ...], bool]:
         """Row and column in that order, and whether the words before them say so: ``x3_y7``, ``c3r7``."""
@@ -128,15 +118,14 @@ class NameGroup:
 
     def pattern(self, columns: Sequence[int], fixed: bool = False) -> str:
         """The pattern that takes these numbers; others that differ are free, or ``fixed`` as in the first name."""
-        words = ("{row}", "{column}") if len(columns) == 2 else ("{number}",)
-        fields = dict(zip(columns, words, strict=True))
-        parts = []
-        for at, (signs, text) in enumerate(self._cut(self.names[0]).numbers):
+        fields = dict(zip(columns, ("{row}", "{column}") if len(columns) == 2 else ("{number}",), strict=True))
+        parts = [self._texts[0]]
+        for at, number in enumerate(self._first):
             free = not fixed and len(set(self.columns[at])) > 1
-            parts.append(self._hyphens[at] + fields[at] if at in fields else "*" if free else signs + text)
+            parts.append(self._hyphens[at] + fields[at] if at in fields else "*" if free else "".join(number))
             parts.append(self._texts[at + 1])
         ending = self.names[0].rpartition(".")[2] if self._texts[-1] else ""
-        return (self._texts[0] + "".join(parts) + ("." + ending if ending else "")).replace(_MARK, "*")
+        return ("".join(parts) + ("." + ending if ending else "")).replace(_MARK, "*")
 
     def suggestion(self) -> str:
         """A pattern in quotes: of the first number of which each picture has another, else of the last two places."""
@@ -145,37 +134,26 @@ class NameGroup:
         columns = single[:1] or self.row_first(tuple(varying[-2:]))[0]
         return f"'{self.pattern(columns, fixed=not single)}'"
 
-    def _cut(self, name: str) -> _Cut:
+    def _cut(self, name: str) -> tuple[tuple[str, ...], list[tuple[str, str]]]:
+        """The texts between the numbers of a name, and the numbers, each with what stands before it of + and -."""
         stem, dot, suffix = name.rpartition(".")
         if not dot:
             stem, suffix = name, ""
-        texts, numbers, decimals, at = [""], [], [], 0
+        texts: list[str] = [""]
+        numbers, at = [], 0
         for match in self._form.finditer(stem):
-            text = match[0].lstrip("+-")
-            signs = match[0][: -len(text)]
             texts[-1] += stem[at : match.start()]
-            at = match.end()
-            if match.lastgroup == "decimal":
-                decimals.append((signs, text))
+            at, digits = match.end(), match[0].lstrip("+-")
             if match.lastgroup == "decimal" and not self._decimals_count:
                 # names with other decimals are alike
                 texts[-1] += _MARK
-            elif len(text) > MAX_DIGITS:
+            elif len(digits) > MAX_DIGITS:
                 texts[-1] += match[0]
             else:
-                numbers.append((signs, text))
+                numbers.append((match[0][: -len(digits)], digits))
                 texts.append("")
         texts[-1] += stem[at:]
-        return _Cut((*texts, suffix.lower()), tuple(numbers), tuple(decimals))
-
-
-@dataclass(frozen=True)
-class _Cut:
-    """A name cut into the text between its numbers and, each with what stands before it of + and -, its numbers."""
-
-    texts: tuple[str, ...]
-    numbers: tuple[tuple[str, str], ...]
-    decimals: tuple[tuple[str, str], ...]
+        return (*texts, suffix.lower()), numbers
 
 
 def _largest(source: str, groups: Mapping[tuple[str, ...], list[str]]) -> list[str]:
@@ -191,7 +169,7 @@ def _largest(source: str, groups: Mapping[tuple[str, ...], list[str]]) -> list[s
     return ranked[0]
 
 
-def _separators(signs: Sequence[Sequence[str]]) -> list[str]:
+def separators(signs: Iterable[Sequence[str]]) -> list[str]:
     """Of the signs before each number, those that all names have: hyphens, where no sign is a plus."""
     columns = [list(column) for column in zip(*signs, strict=True)]
     signed = any("+" in sign for column in columns for sign in column)
@@ -199,12 +177,12 @@ def _separators(signs: Sequence[Sequence[str]]) -> list[str]:
     return [commonprefix([sign[:-1] for sign in column] if signed else column) for column in columns]  # noqa: RUF071
 
 
-def _is_minus(signs: str, separator: str) -> bool:
-    return "-" in signs[len(separator) :]
+def signed(signs: str, text: str, separator: str, convert: Callable[[str], Number]) -> Number:
+    """A number, negative where there is a minus behind the separator."""
+    return -convert(text) if "-" in signs[len(separator) :] else convert(text)
 
 
-def _signed(signs: str, text: str, separator: str) -> int:
+def _whole(text: str) -> int:
     # the digits of a decimal that counts, as those of all others of its place in thousandths of thousandths
     whole, _, part = text.partition(".")
-    value = int(whole) * _FINEST + int(part.ljust(_FINE, "0")[:_FINE]) if part else int(whole)
-    return -value if _is_minus(signs, separator) else value
+    return int(whole) * 10**_FINE + int(part.ljust(_FINE, "0")[:_FINE]) if part else int(whole)

@@ -5,24 +5,23 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 
 from sepi.errors import SepiError
-from sepi.io.readers.name_groups import EXAMPLES, MAX_DIGITS, NameGroup
+from sepi.io.readers.name_groups import DECIMAL, EXAMPLES, MAX_DIGITS, NameGroup, separators, signed
 from sepi.io.readers.view_counts import Counting, Kind, fill
 
 _FIELDS = ("row", "column", "number")
 # names of the two views of a pair
 _PAIRS = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("l", "r"), ("L", "R"))
-_DECIMAL = r"(?P<decimal>[+-]*+(?<![0-9.])[0-9]++\.[0-9]++(?![0-9.]))|"
 _INTEGER = r"(?P<integer>[+-]*+[0-9]++)"
 # ways to find the numbers, and whether decimals may count: camera positions beside numbers that count, names such as
 # 03.07.png, and names with nothing but positions such as 0.5_1.0.png
 _FORMS = (
-    (re.compile(_DECIMAL + _INTEGER), False),
+    (re.compile(f"{DECIMAL}|{_INTEGER}"), False),
     (re.compile(_INTEGER), False),
-    (re.compile(_DECIMAL + _INTEGER), True),
+    (re.compile(f"{DECIMAL}|{_INTEGER}"), True),
 )
 
 
@@ -40,8 +39,6 @@ class ViewNumbers:
         Names that were left out.
     kind : Kind
         What the numbers are.
-    decimals : dict of str to tuple of float
-        Name to the decimal numbers in it.
     pattern : str
         What gives the same numbers; empty where the names only sort, or a pattern was given.
     said : bool
@@ -52,7 +49,6 @@ class ViewNumbers:
     numbers_of: Callable[[str], tuple[int, ...] | None]
     unmatched: tuple[str, ...] = ()
     kind: Kind = Kind.COUNT
-    decimals: dict[str, tuple[float, ...]] = field(default_factory=dict)
     pattern: str = ""
     said: bool = False
 
@@ -134,10 +130,25 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
         numbers_of,
         tuple(name for name in names if name not in kept),
         counted.kind,
-        {name: group.decimals_of(name) for name in group.names},
         "" if counted.kind is Kind.SORT else group.pattern(columns),
         said,
     )
+
+
+def decimals_in(names: Sequence[str]) -> list[tuple[float, ...]]:
+    """The decimal numbers in each of some names; none where not all names have as many."""
+    found = [
+        [
+            (text[: -len(digits)], digits)
+            for text in re.findall(DECIMAL, name.rpartition(".")[0])
+            if (digits := text.lstrip("+-"))
+        ]
+        for name in names
+    ]
+    if len(set(map(len, found))) != 1:
+        return [()] * len(names)
+    hyphens = separators([sign for sign, _ in row] for row in found)
+    return [tuple(signed(*number, hyphen, float) for number, hyphen in zip(row, hyphens, strict=True)) for row in found]
 
 
 def sorted_view_numbers(names: Iterable[str]) -> ViewNumbers:
