@@ -9,6 +9,7 @@ stage's own maps, and attributes that say what made them; where a later stage is
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -245,6 +246,22 @@ def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
         raise SepiError(f"attribute '{printable(key)}': expected numbers, or text of fixed length")
     value = holder.attrs[key]
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+
+
+def number_of(holder: h5py.Group, key: str) -> float:
+    """An attribute that is a number, or an array or text of one; NaN where there is none.
+
+    Raises
+    ------
+    SepiError
+        If it is something else.
+    """
+    given = attribute(holder, key) if key in holder.attrs else math.nan
+    try:
+        (value,) = np.ravel(given).astype(float)
+        return float(value)
+    except (TypeError, ValueError) as error:
+        raise SepiError(f"expected the attribute '{key}' to be a number, got {given!r}") from error
 
 
 def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDArray[Any]:

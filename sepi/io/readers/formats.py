@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from types import ModuleType
+from typing import NamedTuple
 
 import h5py
 
@@ -40,26 +41,6 @@ from sepi.lightfield import LightField, Truth
 from sepi.validation import require_known
 
 
-class Reader(Protocol):
-    """A module of this folder that reads one format.
-
-    It may have ``read_views``, which does what ``read`` does but for ground truth and masks, ``read_truth``, which
-    reads these alone, and ``truth_files``, the files with them: the light field's own where it may hold them.
-    """
-
-    def matches(self, path: Path) -> bool:
-        """Whether a path looks like this format; quick, and never raises."""
-
-    def read(self, path: Path, options: ReadOptions) -> LightField:
-        """Read a light field as its files have it.
-
-        Raises
-        ------
-        SepiError
-            If they are damaged, contradict each other or do not fit the options.
-        """
-
-
 class Format(NamedTuple):
     """One format of light fields.
 
@@ -67,7 +48,10 @@ class Format(NamedTuple):
     ----------
     name, description : str
         For messages.
-    reader : Reader
+    reader : module
+        ``matches(path)`` says whether a path looks like this format, quickly, and never raises; ``read(path, options)``
+        reads a light field as its files have it. It may have ``read_views``, which does so but for ground truth and
+        masks, ``read_truth``, which reads these alone, and ``truth_files``, the files with them.
     options : tuple of str
         What of :class:`ReadOptions` only some formats have a use for, and this one does.
     scales : bool
@@ -76,14 +60,14 @@ class Format(NamedTuple):
 
     name: str
     description: str
-    reader: Any
+    reader: ModuleType
     options: tuple[str, ...] = ()
     scales: bool = True
 
     def truth_files(self, path: Path) -> Sequence[Path]:
         """The files with ground truth and masks."""
-        find: Callable[[Path], Sequence[Path]] = getattr(self.reader, "truth_files", lambda path: ())
-        return find(path)
+        files: Sequence[Path] = self.reader.truth_files(path) if hasattr(self.reader, "truth_files") else ()
+        return files
 
 
 # light fields that a message names, and levels of folders in which it looks for them
@@ -159,9 +143,10 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
     inner = list(islice(_inside(path), _LISTED + 1)) if path.is_dir() and not _is_result(path) else []
     if inner:
         found = f", such as {inner[0]}" if len(inner) == 1 else f": {', '.join(map(str, inner[:_LISTED]))}"
-        more = ", ..." if len(inner) > _LISTED else ""
-        rows = "; if they are the rows of one, pass --format images" if _may_be_rows(path) else ""
-        raise SepiError(f"{path}: a folder of light fields; give one of them{found}{more}{rows}")
+        found += ", ..." if len(inner) > _LISTED else ""
+        with suppress(OSError):
+            found += "; if they are the rows of one, pass --format images" * has_rows(path, surely=False)
+        raise SepiError(f"{path}: a folder of light fields; give one of them{found}")
     expected = ", ".join(f"{known.name} ({known.description})" for known in FORMATS.values())
     raise SepiError(f"{path}: {_what_else(path)}; expected {expected}")
 
@@ -244,33 +229,16 @@ def _is_result(path: Path) -> bool:
     return has_dataset(path / "result.h5" if path.is_dir() else path, "disparity")
 
 
-def _is_empty(path: Path) -> bool:
-    """Whether a file has no bytes; what a system gives in place of them may be waited for without end."""
-    try:
-        return path.is_file() and path.stat().st_size == 0
-    except OSError:
-        return True
-
-
-def _may_be_rows(folder: Path) -> bool:
-    try:
-        return has_rows(folder, surely=False)
-    except OSError:
-        return False
-
-
 def _inside(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
-    """The light fields in a folder, and in folders of it."""
-    try:
-        entries = sorted(folder.iterdir())
-    except OSError:
-        return
-    for entry in entries:
-        if entry.name.startswith(".") or _is_empty(entry):
-            continue
-        # tables of numbers are none, such as poses
-        table = entry.suffix.lower() in (".npy", ".npz") and is_disparity(entry)
-        if not table and any(known.reader.matches(entry) for known in FORMATS.values()):
-            yield entry
-        elif depth and entry.is_dir() and not entry.is_symlink():
-            yield from _inside(entry, depth - 1)
+    """The light fields in a folder, and in folders of it, as far as they may be read."""
+    with suppress(OSError):
+        for entry in sorted(folder.iterdir()):
+            # a file without bytes may be waited for without end: of some a system gives others
+            if entry.name.startswith(".") or (entry.is_file() and not entry.stat().st_size):
+                continue
+            # tables of numbers are none, such as poses
+            table = entry.suffix.lower() in (".npy", ".npz") and is_disparity(entry)
+            if not table and any(known.reader.matches(entry) for known in FORMATS.values()):
+                yield entry
+            elif depth and entry.is_dir() and not entry.is_symlink():
+                yield from _inside(entry, depth - 1)

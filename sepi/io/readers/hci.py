@@ -205,11 +205,8 @@ def _square_grid(folder: Path, views: dict[int, Path]) -> tuple[int, int]:
     highest = max(views)
     side = math.isqrt(highest + 1)
     if side**2 != highest + 1:
-        raise SepiError(
-            f"{folder}: views up to {views[highest].name} make {highest + 1}, which is no square grid; "
-            f"give --grid ROWSxCOLUMNS, or num_cams_x and num_cams_y in {PARAMETERS}, or all views of a grid such as "
-            f"{side + 1}x{side + 1}"
-        )
+        what = f"{folder}: views up to {views[highest].name} make {highest + 1}, which is no square grid"
+        raise SepiError(f"{what}; give --grid ROWSxCOLUMNS, or num_cams_x and num_cams_y in {PARAMETERS}")
     return side, side
 
 

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.hdf5 import attribute, has_dataset, open_hdf5, read_dataset
+from sepi.io.hdf5 import has_dataset, number_of, open_hdf5, read_dataset
 from sepi.io.readers.arrays import light_field_from_array
 from sepi.io.readers.options import ReadOptions, arrange_numbers
 from sepi.lightfield import FloatMap, LightField
@@ -86,22 +86,10 @@ def _read_camera(file: h5py.File) -> tuple[Camera | None, str]:
     missing = [key for key in _GEOMETRY if key not in file.attrs]
     if missing:
         return None, f"the file has no attribute {', '.join(missing)}"
-    baseline, focal_length, shift = (_number(file, key) for key in _GEOMETRY)
+    baseline, focal_length, shift = (number_of(file, key) for key in _GEOMETRY)
     if not (0 < baseline < math.inf and 0 < focal_length < math.inf and math.isfinite(shift)):
         return None, f"dH {baseline:g}, focalLength {focal_length:g}, shift {shift:g} are no camera's"
     return Camera(baseline * focal_length, shift, focal_length), ""
-
-
-def _number(file: h5py.File, key: str) -> float:
-    """An attribute that is a number, or an array or text of one."""
-    given = attribute(file, key)
-    values = np.ravel(given)
-    try:
-        if values.size != 1:
-            raise ValueError
-        return float(values[0])
-    except (TypeError, ValueError) as error:
-        raise SepiError(f"expected the attribute '{key}' to be a number, got {given!r}") from error
 
 
 def _read_depth(path: Path, file: h5py.File, shape: tuple[int, ...], view: tuple[int, int]) -> DepthMap | None:

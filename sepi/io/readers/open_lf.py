@@ -22,7 +22,7 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError, printable
-from sepi.io.hdf5 import attribute, has_dataset, open_hdf5, read_dataset
+from sepi.io.hdf5 import has_dataset, number_of, open_hdf5, read_dataset
 from sepi.io.readers.arrays import Array, light_field_from_array
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
@@ -43,15 +43,14 @@ def matches(path: Path) -> bool:
 def read(path: Path, options: ReadOptions) -> LightField:
     """Read such a file; its baselines, whose unit it does not say, give the distance of rows in steps of columns."""
     with _opened(path) as group:
-        (rows, columns, H, W, _), kind = _shape(path, group)
-        channels = [_mosaic(path, group[name], (rows * H, columns * W), kind) for name in _channels(group)]
-        baselines = [_length(group, key) for key in ("baseline_v", "baseline_h")]
-    mosaic = np.stack(channels, axis=2)
+        (rows, columns, H, W), kind, names = _form(path, group)
+        mosaic = np.stack([_mosaic(path, group[name], (rows * H, columns * W), kind) for name in names], axis=2)
+        down, across = (number_of(group, key) for key in ("baseline_v", "baseline_h"))
     views = mosaic.reshape(rows, H, columns, W, -1).transpose(0, 2, 1, 3, 4)
     light_field = light_field_from_array(views, path, options, axes="TSHWC")
-    if min(rows, columns) < 2 or not all(0 < length < math.inf for length in baselines):
+    if min(rows, columns) < 2 or not (0 < down < math.inf and 0 < across < math.inf):
         return light_field
-    spacing = baselines[0] / baselines[1]
+    spacing = down / across
     # rows of the light field's own grid are the file's columns if the order exchanges them
     return replace(light_field, row_spacing=1 / spacing if "transpose" in options.order else spacing)
 
@@ -59,8 +58,8 @@ def read(path: Path, options: ReadOptions) -> LightField:
 def views_shape(path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
     """Shape (T, S, H, W), and C if in colour, and type of the views of such a file; their values are not read."""
     with _opened(path) as group:
-        shape, _ = _shape(path, group)
-        return shape[: 5 if shape[4] > 1 else 4], group[_channels(group)[0]].dtype
+        shape, _, names = _form(path, group)
+        return (*shape, len(names)) if len(names) > 1 else shape, group[names[0]].dtype
 
 
 @contextmanager
@@ -69,37 +68,24 @@ def _opened(path: Path) -> Iterator[h5py.Group]:
         group = file.get(GROUP)
         if not isinstance(group, h5py.Group):
             raise SepiError(f"{path}: expected a group '{GROUP}' as OpenLF writes it")
-        _require_known(path, group)
+        channels = [name for name in (*_COLOURS, *_GREY) if name in group]
+        known = channels in (list(_COLOURS), list(_GREY), [*_COLOURS, *_GREY])
+        if not known or any(key not in group.attrs for key in _COUNTS):
+            held = printable(", ".join(list(group)[:6])) or "nothing"
+            raise SepiError(
+                f"{path}: '{GROUP}' is a group with {held}; expected the array of the first HCI benchmark, or OpenLF's "
+                f"group of r, g and b, or bw, with the attributes {', '.join(_COUNTS)}"
+            )
         yield group
 
 
-def _channels(group: h5py.Group) -> tuple[str, ...]:
-    return _COLOURS if "r" in group else _GREY
-
-
-def _shape(path: Path, group: h5py.Group) -> tuple[tuple[int, int, int, int, int], int]:
-    """Shape of the views, and the kind of light field."""
-    kind, columns, rows, height, width = (_number(path, group, key) for key in _COUNTS)
-    _require_grid(path, kind, rows, columns)
-    if height % rows or width % columns:
-        raise SepiError(f"{path}: {width}x{height} pixels hold no {rows}x{columns} views of one size")
-    return (rows, columns, height // rows, width // columns, len(_channels(group))), kind
-
-
-def _require_known(path: Path, group: h5py.Group) -> None:
-    missing = [key for key in _COUNTS if key not in group.attrs]
-    channels = [name for name in (*_COLOURS, *_GREY) if name in group]
-    if not missing and channels in (list(_COLOURS), list(_GREY), [*_COLOURS, *_GREY]):
-        return
-    held = printable(", ".join(list(group)[:6])) or "nothing"
-    raise SepiError(
-        f"{path}: '{GROUP}' is a group with {held}; expected the array of the first HCI benchmark, or OpenLF's group "
-        f"of r, g and b, or bw, with the attributes {', '.join(_COUNTS)}"
-    )
-
-
-def _require_grid(path: Path, kind: int, rows: int, columns: int) -> None:
-    """Raise unless the kind of light field is one of which the views lie in a grid of the picture."""
+def _form(path: Path, group: h5py.Group) -> tuple[tuple[int, int, int, int], int, tuple[str, ...]]:
+    """Shape (T, S, H, W) of the views, the kind of light field, and names of the channels."""
+    counts = [number_of(group, key) for key in _COUNTS]
+    for key, count in zip(_COUNTS, counts, strict=True):
+        if not 0 <= count < 2**31 or count != int(count):
+            raise SepiError(f"{path}: expected the attribute '{key}' to be a whole number, got {count:g}")
+    kind, columns, rows, height, width = map(int, counts)
     if kind == _CROSS:
         raise SepiError(f"{path}: LF_TYPE {kind}, a cross of views, is not read; give OpenLF's pictures of the views")
     expected = {_GRID: rows * columns > 1, _ROW: rows == 1 < columns, _COLUMN: columns == 1 < rows}
@@ -107,6 +93,9 @@ def _require_grid(path: Path, kind: int, rows: int, columns: int) -> None:
         raise SepiError(f"{path}: LF_TYPE {kind} is none that is known; expected 1 (grid), 2 (row) or 3 (column)")
     if min(rows, columns) < 1 or not expected[kind]:
         raise SepiError(f"{path}: {rows}x{columns} views (cams_v x cams_h) do not fit LF_TYPE {kind}")
+    if height % rows or width % columns:
+        raise SepiError(f"{path}: {width}x{height} pixels hold no {rows}x{columns} views of one size")
+    return (rows, columns, height // rows, width // columns), kind, _COLOURS if "r" in group else _GREY
 
 
 def _mosaic(path: Path, dataset: h5py.Dataset, shape: tuple[int, int], kind: int) -> Array:
@@ -116,17 +105,3 @@ def _mosaic(path: Path, dataset: h5py.Dataset, shape: tuple[int, int], kind: int
     if values.shape != shape:
         raise SepiError(f"{path}: '{dataset.name}' has shape {values.shape}; expected (height, width) = {shape}")
     return values
-
-
-def _number(path: Path, group: h5py.Group, key: str) -> int:
-    given = attribute(group, key)
-    values = np.ravel(given)
-    if values.size != 1 or values.dtype.kind not in "iuf" or not 0 <= values[0] < 2**31 or values[0] != int(values[0]):
-        raise SepiError(f"{path}: expected the attribute '{key}' to be a whole number, got {given!r}")
-    return int(values[0])
-
-
-def _length(group: h5py.Group, key: str) -> float:
-    """An attribute that is a number; NaN where there is none."""
-    values = np.ravel(attribute(group, key) if key in group.attrs else math.nan)
-    return float(values[0]) if values.size == 1 and values.dtype.kind in "iuf" else math.nan

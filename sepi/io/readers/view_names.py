@@ -137,18 +137,15 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
 
 def decimals_in(names: Sequence[str]) -> list[tuple[float, ...]]:
     """The decimal numbers in each of some names; none where not all names have as many."""
-    found = [
-        [
-            (text[: -len(digits)], digits)
-            for text in re.findall(DECIMAL, name.rpartition(".")[0])
-            if (digits := text.lstrip("+-"))
-        ]
-        for name in names
-    ]
+    stems = (name.rpartition(".")[0] for name in names)
+    found = [[re.split("(?=[0-9])", text, maxsplit=1) for text in re.findall(DECIMAL, stem)] for stem in stems]
     if len(set(map(len, found))) != 1:
         return [()] * len(names)
     hyphens = separators([sign for sign, _ in row] for row in found)
-    return [tuple(signed(*number, hyphen, float) for number, hyphen in zip(row, hyphens, strict=True)) for row in found]
+    return [
+        tuple(signed(sign, text, hyphen, float) for (sign, text), hyphen in zip(row, hyphens, strict=True))
+        for row in found
+    ]
 
 
 def sorted_view_numbers(names: Iterable[str]) -> ViewNumbers:

@@ -72,7 +72,7 @@ BAD = {
     "no views": ({"cams_h": 0}, "do not fit"),
     "views of no size": ({"cams_h": 7}, "hold no 3x7 views of one size"),
     "another height": ({"height": 27}, r"has shape \(24, 40\); expected"),
-    "text": ({"width": np.bytes_("wide")}, "expected the attribute 'width' to be a whole number"),
+    "text": ({"width": np.bytes_("wide")}, "expected the attribute 'width' to be a number"),
     "a huge number": ({"cams_v": 2**62}, "expected the attribute 'cams_v' to be a whole number"),
 }
 
