@@ -90,11 +90,7 @@ def _pixels(path: Path) -> Pixels:
 
 
 def read_views(
-    paths: Sequence[Path],
-    positions: Sequence[int] | None = None,
-    count: int | None = None,
-    *,
-    any_floats: bool = False,
+    paths: Sequence[Path], positions: Sequence[int] | None = None, count: int | None = None, *, any_floats: bool = False
 ) -> Pixels:
     """Read pictures that must be alike, several at a time.
 
