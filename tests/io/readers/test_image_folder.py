@@ -8,6 +8,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import cv2
 import imageio.v3 as imageio
@@ -61,290 +62,195 @@ def grid_of(rows: int, columns: int) -> list[list[int]]:
     return np.arange(rows * columns).reshape(rows, columns).tolist()
 
 
-NAMED: dict[str, tuple[list[str], ReadOptions, list[list[int]], str]] = {
-    "rows and columns": (by_place("view_{:02d}_{:02d}.png", range(3), range(3)), ReadOptions(), grid_of(3, 3), "order"),
-    "17x17": (by_place("v{}x{}.png", range(17), range(17)), ReadOptions(), grid_of(17, 17), "order"),
-    "even grid": (by_place("{}-{}.png", range(4), range(6)), ReadOptions(), grid_of(4, 6), "order"),
-    "counted from 1": (by_place("2067_{:02d}_{:02d}.png", (1, 2, 3), (1, 2, 3, 4)), ReadOptions(), grid_of(3, 4), ""),
-    "counted from 5": (by_place("{} {}.png", (5, 6, 7), (1, 2, 3)), ReadOptions(), grid_of(3, 3), "rows from 5"),
-    "counted from the middle": (
-        by_place("v_{}_{}.png", (-1, 0, 1), (-1, 0, 1)),
-        ReadOptions(),
-        grid_of(3, 3),
-        "rows from -1",
-    ),
-    "hyphens": (by_place("v-{}-{}.png", (1, 2), (1, 2, 3)), ReadOptions(), grid_of(2, 3), ""),
-    "hyphens after spaces": (by_place("v -{} -{}.png", (1, 2), (1, 2, 3)), ReadOptions(), grid_of(2, 3), ""),
-    "gantry": (
+class Case(NamedTuple):
+    """Names, what is expected of them (places or a word), a word of the notes, and options."""
+
+    names: list[str]
+    expected: Any
+    note: str
+    options: ReadOptions
+
+
+def case(names: list[str], expected: Any, note: str = "", **options: Any) -> Case:
+    return Case(names, expected, note, ReadOptions(**options))
+
+
+NAMED: dict[str, Case] = {
+    "rows and columns": case(by_place("view_{:02d}_{:02d}.png", range(3), range(3)), grid_of(3, 3), "order"),
+    "17x17": case(by_place("v{}x{}.png", range(17), range(17)), grid_of(17, 17), "order"),
+    "even grid": case(by_place("{}-{}.png", range(4), range(6)), grid_of(4, 6), "order"),
+    "counted from 1": case(by_place("2067_{:02d}_{:02d}.png", (1, 2, 3), (1, 2, 3, 4)), grid_of(3, 4)),
+    "counted from 5": case(by_place("{} {}.png", (5, 6, 7), (1, 2, 3)), grid_of(3, 3), "rows from 5"),
+    "counted from the middle": case(by_place("v_{}_{}.png", (-1, 0, 1), (-1, 0, 1)), grid_of(3, 3), "rows from -1"),
+    "hyphens": case(by_place("v-{}-{}.png", (1, 2), (1, 2, 3)), grid_of(2, 3)),
+    "hyphens after spaces": case(by_place("v -{} -{}.png", (1, 2), (1, 2, 3)), grid_of(2, 3)),
+    "gantry": case(
         [
             f"out_{row:02d}_{column:02d}_{-381.909271 + row - column}_{1103.376221 * row - 1000.5}.png"
             for row, column in itertools.product(range(3), range(4))
         ],
-        ReadOptions(),
         grid_of(3, 4),
         "order",
     ),
-    "dots between": (by_place("{:02d}.{:02d}.png", range(3), range(2)), ReadOptions(), grid_of(3, 2), ""),
-    "dots after a word": (by_place("v.{}.{}.png", range(3), range(2)), ReadOptions(), grid_of(3, 2), ""),
-    "letters": (by_place("Größe é_{}ü{}.png", range(2), range(3)), ReadOptions(), grid_of(2, 3), ""),
-    "spaces and braces": (by_place("a b {{{}}} [{}].png", range(2), range(3)), ReadOptions(), grid_of(2, 3), ""),
-    "the same number twice": (
-        [f"{t}_{s}_{t}.png" for t, s in itertools.product(range(2), range(3))],
-        ReadOptions(),
-        grid_of(2, 3),
-        "",
+    "dots between": case(by_place("{:02d}.{:02d}.png", range(3), range(2)), grid_of(3, 2)),
+    "dots after a word": case(by_place("v.{}.{}.png", range(3), range(2)), grid_of(3, 2)),
+    "letters": case(by_place("Größe é_{}ü{}.png", range(2), range(3)), grid_of(2, 3)),
+    "spaces and braces": case(by_place("a b {{{}}} [{}].png", range(2), range(3)), grid_of(2, 3)),
+    "the same number twice": case(
+        [f"{t}_{s}_{t}.png" for t, s in itertools.product(range(2), range(3))], grid_of(2, 3)
     ),
-    "steps": (by_place("{}_{}.png", (0, 2, 4), (0, 2, 4)), ReadOptions(), grid_of(3, 3), "steps of 2"),
-    "steps and a gap": (
-        by_place("{}_{}.png", (10, 20, 40), (5, 15)),
-        ReadOptions(view=(0, 0)),
-        [[0, 1], [2, 3], [-1, -1], [4, 5]],
-        "steps of 10",
+    "steps": case(by_place("{}_{}.png", (0, 2, 4), (0, 2, 4)), grid_of(3, 3), "steps of 2"),
+    "steps and a gap": case(
+        by_place("{}_{}.png", (10, 20, 40), (5, 15)), [[0, 1], [2, 3], [-1, -1], [4, 5]], "steps of 10", view=(0, 0)
     ),
     # neighbouring rows are then two steps apart, as their numbers say
-    "steps of rows alone": (
-        by_place("{}_{}.png", (0, 2), (0, 1, 2)),
-        ReadOptions(view=(0, 1)),
-        [[0, 1, 2], [-1, -1, -1], [3, 4, 5]],
-        "",
+    "steps of rows alone": case(
+        by_place("{}_{}.png", (0, 2), (0, 1, 2)), [[0, 1, 2], [-1, -1, -1], [3, 4, 5]], view=(0, 1)
     ),
-    "steps in a wide grid": (
-        by_place("{}_{}.png", (0, 2), (0, 2)),
-        ReadOptions(grid=(3, 3), view=(0, 0)),
-        [[0, -1, 1], [-1, -1, -1], [2, -1, 3]],
-        "",
+    "steps in a wide grid": case(
+        by_place("{}_{}.png", (0, 2), (0, 2)), [[0, -1, 1], [-1, -1, -1], [2, -1, 3]], grid=(3, 3), view=(0, 0)
     ),
-    "steps in a tight grid": (
-        by_place("{}_{}.png", (0, 2), (0, 2)),
-        ReadOptions(grid=(2, 2)),
-        [[0, 1], [2, 3]],
-        "steps of 2",
-    ),
-    "missing views": (
-        ["0_0.png", "0_2.png", "1_1.png", "2_2.png"],
-        ReadOptions(),
-        [[0, -1, 1], [-1, 2, -1], [-1, -1, 3]],
-        "",
-    ),
-    "larger grid": (by_place("{}_{}.png", range(2), range(2)), ReadOptions(grid=(2, 3)), [[0, 1, -1], [2, 3, -1]], ""),
-    "running number": (by_number("img{}.png", range(9)), ReadOptions(grid=(3, 3)), grid_of(3, 3), "row by row"),
-    "running number from 1": (
-        by_number("{:03d}.png", range(1, 17)),
-        ReadOptions(grid=(4, 4)),
-        grid_of(4, 4),
-        "1 to 16",
-    ),
-    "running number from 7": (by_number("{:03d}.png", range(7, 16)), ReadOptions(grid=(3, 3)), grid_of(3, 3), "from 7"),
-    "running number, not square": (
-        by_number("{}.png", range(6)),
-        ReadOptions(grid=(2, 3)),
-        grid_of(2, 3),
-        "row by row",
-    ),
-    "running number in steps": (
-        by_number("{}.png", range(0, 90, 10)),
-        ReadOptions(grid=(3, 3)),
-        grid_of(3, 3),
-        "steps of 10",
-    ),
-    "running number with gaps": (by_number("{}.png", (0, 2, 3)), ReadOptions(grid=(2, 2)), [[0, -1], [1, 2]], ""),
-    "first views missing": (by_number("{}.png", (2, 3)), ReadOptions(grid=(2, 2)), [[-1, -1], [0, 1]], "2 to 3"),
-    "first views missing, from 1": (by_number("{}.png", (3, 4)), ReadOptions(grid=(2, 2)), [[-1, -1], [0, 1]], ""),
-    "a scene's number": (by_number("s_7_img_{:03d}.png", range(9)), ReadOptions(grid=(3, 3)), grid_of(3, 3), "0 to 8"),
-    "one column, said so": (by_number("view_{:02d}_03.png", range(5)), ReadOptions(grid=(5, 1)), grid_of(5, 1), ""),
+    "steps in a tight grid": case(by_place("{}_{}.png", (0, 2), (0, 2)), [[0, 1], [2, 3]], "steps of 2", grid=(2, 2)),
+    "missing views": case(["0_0.png", "0_2.png", "1_1.png", "2_2.png"], [[0, -1, 1], [-1, 2, -1], [-1, -1, 3]]),
+    "larger grid": case(by_place("{}_{}.png", range(2), range(2)), [[0, 1, -1], [2, 3, -1]], grid=(2, 3)),
+    "running number": case(by_number("img{}.png", range(9)), grid_of(3, 3), "row by row", grid=(3, 3)),
+    "running number from 1": case(by_number("{:03d}.png", range(1, 17)), grid_of(4, 4), "1 to 16", grid=(4, 4)),
+    "running number from 7": case(by_number("{:03d}.png", range(7, 16)), grid_of(3, 3), "from 7", grid=(3, 3)),
+    "running number, not square": case(by_number("{}.png", range(6)), grid_of(2, 3), "row by row", grid=(2, 3)),
+    "running number in steps": case(by_number("{}.png", range(0, 90, 10)), grid_of(3, 3), "steps of 10", grid=(3, 3)),
+    "running number with gaps": case(by_number("{}.png", (0, 2, 3)), [[0, -1], [1, 2]], grid=(2, 2)),
+    "first views missing": case(by_number("{}.png", (2, 3)), [[-1, -1], [0, 1]], "2 to 3", grid=(2, 2)),
+    "first views missing, from 1": case(by_number("{}.png", (3, 4)), [[-1, -1], [0, 1]], grid=(2, 2)),
+    "a scene's number": case(by_number("s_7_img_{:03d}.png", range(9)), grid_of(3, 3), "0 to 8", grid=(3, 3)),
+    "one column, said so": case(by_number("view_{:02d}_03.png", range(5)), grid_of(5, 1), grid=(5, 1)),
     # --- no grid: the views say which
-    "sequence": (by_number("img{}.png", range(7)), ReadOptions(), grid_of(1, 7), "numbered 0 to 6"),
-    "sequence under a shared number": (by_number("view_00_{:02d}.png", range(9)), ReadOptions(), grid_of(1, 9), ""),
-    "sequence with gaps": (
+    "sequence": case(by_number("img{}.png", range(7)), grid_of(1, 7), "numbered 0 to 6"),
+    "sequence under a shared number": case(by_number("view_00_{:02d}.png", range(9)), grid_of(1, 9)),
+    "sequence with gaps": case(
         by_number("img_{:03d}.png", (1, 2, 4, 5, 6, 9)),
-        ReadOptions(),
         [[0, 1, -1, 2, 3, 4, -1, -1, 5]],
         "numbered 1 to 9, 3 of them missing",
     ),
     # the grid is not known, so a position in it means nothing yet
-    "sequence with options of the grid": (
+    "sequence with options of the grid": case(
         by_number("{}.png", range(1, 6)),
-        ReadOptions(central=9, order="transpose", view=(3, 3), exclude=("7,7", "2.png")),
         [[0, -1, 2, 3, 4]],
-        "",
+        central=9,
+        order="transpose",
+        view=(3, 3),
+        exclude=("7,7", "2.png"),
     ),
-    "times": (
-        by_number("IMG_20150106_{}.png", (102134, 102138, 102143, 102148)),
-        ReadOptions(),
-        grid_of(1, 4),
-        "count no views",
+    "times": case(by_number("IMG_20150106_{}.png", (102134, 102138, 102143, 102148)), grid_of(1, 4), "count no views"),
+    "times and a grid": case(
+        by_number("IMG_20150106_{}.png", (102134, 102138, 102142, 102148)), grid_of(2, 2), "count no views", grid=(2, 2)
     ),
-    "times and a grid": (
-        by_number("IMG_20150106_{}.png", (102134, 102138, 102142, 102148)),
-        ReadOptions(grid=(2, 2)),
-        grid_of(2, 2),
-        "count no views",
-    ),
-    "times over midnight": (
+    "times over midnight": case(
         [f"IMG_{time}.png" for time in ("20150106_235951", "20150106_235959", "20150107_000003", "20150107_000011")],
-        ReadOptions(),
         grid_of(1, 4),
         "count no views",
     ),
-    "minutes and seconds and a grid": (
+    "minutes and seconds and a grid": case(
         by_place("v_{}_{}.png", (10,), (3, 40))
         + by_place("v_{}_{}.png", (11,), (9, 40))
         + ["v_12_3.png", "v_12_57.png"],
-        ReadOptions(grid=(2, 3)),
         grid_of(2, 3),
         "count no views",
+        grid=(2, 3),
     ),
-    "numbers beyond any count and a grid": (
-        by_number("{}.png", (10**20, 10**20 + 5, 10**20 + 77, 10**21)),
-        ReadOptions(grid=(2, 2)),
-        grid_of(2, 2),
-        "",
+    "numbers beyond any count and a grid": case(
+        by_number("{}.png", (10**20, 10**20 + 5, 10**20 + 77, 10**21)), grid_of(2, 2), grid=(2, 2)
     ),
-    "running number and time": (
+    "running number and time": case(
         [f"{number}_{time}.png" for number, time in enumerate((34, 38, 61, 79), 1)],
-        ReadOptions(grid=(2, 2)),
         grid_of(2, 2),
         "as in '{number}_*.png'",
+        grid=(2, 2),
     ),
     # --- signs
-    "signs": (by_place("v_{:+d}_{:+d}.png", (-1, 0, 1), (-2, -1, 0)), ReadOptions(), grid_of(3, 3), "columns from -2"),
+    "signs": case(by_place("v_{:+d}_{:+d}.png", (-1, 0, 1), (-2, -1, 0)), grid_of(3, 3), "columns from -2"),
     # a minus before each row's number is a sign where columns have signs
-    "signs of one kind in the rows": (
-        by_place("v_{:+d}_{:+d}.png", (-1, -2, -3), (-1, 0, 1)),
-        ReadOptions(),
-        [[6, 7, 8], [3, 4, 5], [0, 1, 2]],
-        "rows from -3",
+    "signs of one kind in the rows": case(
+        by_place("v_{:+d}_{:+d}.png", (-1, -2, -3), (-1, 0, 1)), [[6, 7, 8], [3, 4, 5], [0, 1, 2]], "rows from -3"
     ),
-    "signs without separators": (by_place("v{:+03d}{:+03d}.png", (-1, 0, 1), (0, 1)), ReadOptions(), grid_of(3, 2), ""),
-    "minus after a letter": (by_place("r{}c{}.png", (-1, 0, 1), (-1, 0)), ReadOptions(), grid_of(3, 2), "rows from -1"),
-    "minus after a hyphen": (
-        by_place("v-{}-{}.png", (-1, 0), (-1, 0, 1)),
-        ReadOptions(),
-        grid_of(2, 3),
-        "rows from -1",
-    ),
-    "pattern with signs": (
+    "signs without separators": case(by_place("v{:+03d}{:+03d}.png", (-1, 0, 1), (0, 1)), grid_of(3, 2)),
+    "minus after a letter": case(by_place("r{}c{}.png", (-1, 0, 1), (-1, 0)), grid_of(3, 2), "rows from -1"),
+    "minus after a hyphen": case(by_place("v-{}-{}.png", (-1, 0), (-1, 0, 1)), grid_of(2, 3), "rows from -1"),
+    "pattern with signs": case(
         by_place("v_{:+d}_{:+d}_x7.png", (-1, 0, 1), (-1, 0)),
-        ReadOptions(pattern="v_{row}_{column}_x*.png"),
         grid_of(3, 2),
         "rows from -1",
+        pattern="v_{row}_{column}_x*.png",
     ),
-    "a disc with signs": (
+    "a disc with signs": case(
         ["v_-1_+0.png", "v_+0_-1.png", "v_+0_+0.png", "v_+0_+1.png", "v_+1_+0.png"],
-        ReadOptions(),
         [[-1, 0, -1], [1, 2, 3], [-1, 4, -1]],
-        "",
     ),
     # --- words that say what a number counts
-    "a word before both": (by_place("frame_{:02d}_{:02d}.png", range(3), range(2)), ReadOptions(), grid_of(3, 2), ""),
-    "rows t and columns s": (by_place("t{}s{}.png", range(3), range(2)), ReadOptions(), grid_of(3, 2), ""),
-    "a time for each view": (
+    "a word before both": case(by_place("frame_{:02d}_{:02d}.png", range(3), range(2)), grid_of(3, 2)),
+    "rows t and columns s": case(by_place("t{}s{}.png", range(3), range(2)), grid_of(3, 2)),
+    "a time for each view": case(
         [f"r{t}_c{s}_time{100 + 7 * t + s}.png" for t, s in itertools.product(range(3), range(2))],
-        ReadOptions(),
         grid_of(3, 2),
         "as in 'r{row}_c{column}_time*.png'",
     ),
-    "frames alone": (by_number("frame_{:04d}.png", range(5)), ReadOptions(), grid_of(1, 5), "numbered 0 to 4"),
+    "frames alone": case(by_number("frame_{:04d}.png", range(5)), grid_of(1, 5), "numbered 0 to 4"),
     # --- more numbers than two
-    "running number, row, column": (
+    "running number, row, column": case(
         [f"IMG_{3 * t + s:04d}_{t:02d}_{s:02d}.png" for t, s in itertools.product(range(3), range(3))],
-        ReadOptions(),
         grid_of(3, 3),
         "as in 'IMG_*_{row}_{column}.png'",
     ),
-    "there and back": (
+    "there and back": case(
         [f"{3 * t + (2 - s if t % 2 else s)}_{t}_{s}.png" for t, s in itertools.product(range(3), range(3))],
-        ReadOptions(),
         grid_of(3, 3),
         "as in '*_{row}_{column}.png'",
     ),
-    "function of row and column": (
+    "function of row and column": case(
         [f"{t}_{s}_{5 * s + 11 * t}x.png" for t, s in itertools.product(range(2), range(3))],
-        ReadOptions(),
         grid_of(2, 3),
         "as in '{row}_{column}_*x.png'",
     ),
-    "row, column, millimetres": (
-        [f"{t}_{s}_{10 * t}mm_{50 - 10 * s}mm.png" for t, s in itertools.product(range(3), range(3))],
-        ReadOptions(),
-        grid_of(3, 3),
-        "",
+    "row, column, millimetres": case(
+        [f"{t}_{s}_{10 * t}mm_{50 - 10 * s}mm.png" for t, s in itertools.product(range(3), range(3))], grid_of(3, 3)
     ),
-    "positions alone": (
-        by_place("cam_{}_{}.png", (0.0, 0.5, 1.0), (-1.5, 0.0)),
-        ReadOptions(),
-        grid_of(3, 2),
-        "rows 0.333 steps",
-    ),
-    "positions with signs": (
+    "positions alone": case(by_place("cam_{}_{}.png", (0.0, 0.5, 1.0), (-1.5, 0.0)), grid_of(3, 2), "rows 0.333 steps"),
+    "positions with signs": case(
         by_place("cam_{:+.2f}_{:+.2f}.png", (-0.15, -0.05, 0.05, 0.15), (-0.05, 0.05)),
-        ReadOptions(),
         grid_of(4, 2),
         "rows 1 steps apart, on the grid",
     ),
-    "running number and names such as 03.07": (
-        [f"{3 * t + s}_{t:02d}.{s:02d}.png" for t, s in itertools.product(range(3), range(3))],
-        ReadOptions(),
-        grid_of(3, 3),
-        "",
+    "running number and names such as 03.07": case(
+        [f"{3 * t + s}_{t:02d}.{s:02d}.png" for t, s in itertools.product(range(3), range(3))], grid_of(3, 3)
     ),
-    "one row of 9, said so": (by_number("view_00_{:02d}.png", range(9)), ReadOptions(grid=(1, 9)), grid_of(1, 9), ""),
-    "two views": (["left_1.png", "left_2.png"], ReadOptions(grid=(1, 2)), [[0, 1]], ""),
-    "pattern": (
-        by_place("x{}_y{}_7.png", range(2), range(3)),
-        ReadOptions(pattern="x{column}_y{row}_*.png"),
-        [[0, 3], [1, 4], [2, 5]],
-        "",
+    "one row of 9, said so": case(by_number("view_00_{:02d}.png", range(9)), grid_of(1, 9), grid=(1, 9)),
+    "two views": case(["left_1.png", "left_2.png"], [[0, 1]], grid=(1, 2)),
+    "pattern": case(
+        by_place("x{}_y{}_7.png", range(2), range(3)), [[0, 3], [1, 4], [2, 5]], pattern="x{column}_y{row}_*.png"
     ),
-    "pattern of three numbers": (
+    "pattern of three numbers": case(
         [f"{3 * t + s}-{t}-{s}.png" for t, s in itertools.product(range(2), range(3))],
-        ReadOptions(pattern="*-{row}-{column}.png"),
         grid_of(2, 3),
-        "",
+        pattern="*-{row}-{column}.png",
     ),
-    "pattern of a number": (
-        by_number("v1.{}.png", range(4)),
-        ReadOptions(pattern="v1.{number}.png", grid=(2, 2)),
-        grid_of(2, 2),
-        "",
+    "pattern of a number": case(
+        by_number("v1.{}.png", range(4)), grid_of(2, 2), pattern="v1.{number}.png", grid=(2, 2)
     ),
-    "pattern with stars": (
-        by_number("a12bcc{:03d}dd.png", range(4)),
-        ReadOptions(pattern="a*c{number}*.png", grid=(2, 2)),
-        grid_of(2, 2),
-        "",
+    "pattern with stars": case(
+        by_number("a12bcc{:03d}dd.png", range(4)), grid_of(2, 2), pattern="a*c{number}*.png", grid=(2, 2)
     ),
-    "pattern with signs of expressions": (
-        by_place("v(+)[{}].^{}$.png", range(2), range(2)),
-        ReadOptions(pattern="v(+)[{row}].^{column}$.png"),
-        grid_of(2, 2),
-        "",
+    "pattern with signs of expressions": case(
+        by_place("v(+)[{}].^{}$.png", range(2), range(2)), grid_of(2, 2), pattern="v(+)[{row}].^{column}$.png"
     ),
-    "transposed": (
-        by_place("{}_{}.png", range(2), range(3)),
-        ReadOptions(order="transpose"),
-        [[0, 3], [1, 4], [2, 5]],
-        "",
-    ),
-    "central": (
-        by_place("{}_{}.png", range(4), range(5)),
-        ReadOptions(central=3),
-        [[6, 7, 8], [11, 12, 13], [16, 17, 18]],
-        "",
-    ),
-    "excluded": (
-        by_place("{}_{}.png", range(2), range(2)),
-        ReadOptions(exclude=("0_0.png", "0,1")),
-        [[-1, -1], [2, 3]],
-        "",
-    ),
-    "view": (by_place("{}_{}.png", range(2), range(2)), ReadOptions(view=(0, 1)), grid_of(2, 2), ""),
+    "transposed": case(by_place("{}_{}.png", range(2), range(3)), [[0, 3], [1, 4], [2, 5]], order="transpose"),
+    "central": case(by_place("{}_{}.png", range(4), range(5)), [[6, 7, 8], [11, 12, 13], [16, 17, 18]], central=3),
+    "excluded": case(by_place("{}_{}.png", range(2), range(2)), [[-1, -1], [2, 3]], exclude=("0_0.png", "0,1")),
+    "view": case(by_place("{}_{}.png", range(2), range(2)), grid_of(2, 2), view=(0, 1)),
 }
 
 
 @pytest.mark.parametrize("case", NAMED)
 def test_views_stand_where_their_names_say(tmp_path: Path, case: str) -> None:
-    names, options, expected, note = NAMED[case]
+    names, expected, note, options = NAMED[case]
     folder = put(tmp_path / "my scene", names)
     assert format_of(folder).name == "folder of views"
     light_field = read(folder, options)
@@ -434,80 +340,66 @@ def renamed(folder: Path, old: str, new: str) -> None:
 
 PLACES = by_place("v_{}_{}.png", range(3), range(3))
 
-BAD: dict[str, tuple[list[str], ReadOptions, str]] = {
-    "two sorts of names": ([*PLACES, *by_place("w_{}_{}.png", range(3), range(3))], ReadOptions(), "v_0_0.png as like"),
-    "every name another": (["a1b.png", "b1a.png", "c3.png"], ReadOptions(), "--pattern"),
-    "no numbers": (["a.png", "b.png"], ReadOptions(), "no picture's name has a number"),
-    "numbers all alike": (["a1.png", "a01.png"], ReadOptions(), "no number in the names counts the views"),
-    "several light fields": (
+BAD: dict[str, Case] = {
+    "two sorts of names": case([*PLACES, *by_place("w_{}_{}.png", range(3), range(3))], "v_0_0.png as like"),
+    "every name another": case(["a1b.png", "b1a.png", "c3.png"], "--pattern"),
+    "no numbers": case(["a.png", "b.png"], "no picture's name has a number"),
+    "numbers all alike": case(["a1.png", "a01.png"], "no number in the names counts the views"),
+    "several light fields": case(
         [f"f{f}_{t}_{s}.png" for f, t, s in itertools.product(range(2), range(3), range(3))],
-        ReadOptions(),
         "such as 'f0_{row}_{column}.png'",
     ),
-    "cameras and exposures": (
-        by_place("cam{:02d}_exp{}.png", range(9), range(3)),
-        ReadOptions(),
-        "after 'exp' count no",
-    ),
-    "frames of cameras": (by_place("frame_{}_cam_{}.png", range(9), range(9)), ReadOptions(), "after 'frame' count no"),
-    "times of cameras": (by_place("t{}_c{}.png", range(3), range(9)), ReadOptions(), "after 't' count no views"),
-    "two settings of a grid": (
+    "cameras and exposures": case(by_place("cam{:02d}_exp{}.png", range(9), range(3)), "after 'exp' count no"),
+    "frames of cameras": case(by_place("frame_{}_cam_{}.png", range(9), range(9)), "after 'frame' count no"),
+    "times of cameras": case(by_place("t{}_c{}.png", range(3), range(9)), "after 't' count no views"),
+    "two settings of a grid": case(
         [f"{t}_{s}_iso{i}_ch{c}.png" for t, s, i, c in itertools.product(range(2), range(2), (100, 400), range(3))],
-        ReadOptions(),
         "after 'iso' and 'ch' count no views",
     ),
-    "two running numbers": (["1_3.png", "2_1.png", "3_2.png"], ReadOptions(), "--pattern, such as '{number}_*.png'"),
-    "times that do not fill the grid": (
+    "two running numbers": case(["1_3.png", "2_1.png", "3_2.png"], "--pattern, such as '{number}_*.png'"),
+    "times that do not fill the grid": case(
         by_number("{}.png", (102134, 102138, 102143)),
-        ReadOptions(grid=(2, 2)),
         "the names only sort the 3 pictures, and the 2x2 grid that --grid gives has 4 views",
+        grid=(2, 2),
     ),
-    "rows and columns of --grid exchanged": (PLACES[:6], ReadOptions(grid=(3, 2)), "--grid has 3x2"),
-    "about as many of two sorts": ([*PLACES, *by_place("w_{}_{}.png", range(2), range(3))], ReadOptions(), "(9 and 6)"),
-    "one picture": (["a1.png", "b.png"], ReadOptions(), "no number in the names counts"),
-    "one picture by pattern": (["a1.png", "a.png"], ReadOptions(pattern="a{number}.png"), "only one view, a1.png"),
-    "twice": ([*PLACES, "v_01_01.png"], ReadOptions(), "view 1, 1 is given twice, also as v_01_01.png"),
-    "twice under two endings": (["1.png", "2.png", "1.PNG"], ReadOptions(), "given twice"),
-    "twice by pattern": (["a1b.png", "a1c.png"], ReadOptions(pattern="a{number}*"), "given twice"),
-    "huge row": ([*PLACES, "v_999999999_1.png"], ReadOptions(), "1000000000x3"),
-    "huge numbers": (
-        ["v_0_0.png", f"v_{10**17}_{10**17}.png", "v_1_0.png", f"v_1_{10**17}.png"],
-        ReadOptions(),
-        "--pattern",
-    ),
-    "huge running number": (["0.png", "1.png", "999999999999.png"], ReadOptions(grid=(2, 2)), "only sort"),
-    "sparse": (["0_0.png", "1_1.png", "300_1.png", "300_2.png"], ReadOptions(), "301x3"),
-    "huge grid": (PLACES, ReadOptions(grid=(999_999, 999_999)), "at most 10000 views"),
-    "small grid": (PLACES, ReadOptions(grid=(2, 3)), "--grid has 2x3"),
-    "no grid": (PLACES, ReadOptions(grid=(0, 0)), "0x0"),
-    "no grid, running": (by_number("{}.png", range(4)), ReadOptions(grid=(0, 3)), "0x3"),
-    "small grid, running": (by_number("{}.png", range(1, 5)), ReadOptions(grid=(1, 3)), "4.png: beyond the 1x3 views"),
-    "centre missing": (["0_0.png", "0_1.png", "0_2.png", "2_2.png"], ReadOptions(), "centre view"),
-    "no such view": (PLACES, ReadOptions(view=(3, 3)), "outside the grid"),
-    "axes": (PLACES, ReadOptions(axes="TSHWC"), "--axes does not apply"),
-    "variable": (PLACES, ReadOptions(variable="LF"), "--variable does not apply"),
-    "pattern of other names": (PLACES, ReadOptions(pattern="u_{row}_{column}.png"), "no file has a name like"),
-    "pattern without fields": (PLACES, ReadOptions(pattern="v_*.png"), "{row} and {column} once each"),
-    "pattern without column": (PLACES, ReadOptions(pattern="v_{row}_*.png"), "{row} and {column} once each"),
-    "pattern with all fields": (PLACES, ReadOptions(pattern="{number}_{row}_{column}"), "{row} and {column} once each"),
-    "pattern with a field twice": (PLACES, ReadOptions(pattern="{number}_{number}"), "{row} and {column} once each"),
-    "pattern with other fields": (PLACES, ReadOptions(pattern="v_{t}_{s}.png"), "{row} and {column} once each"),
-    "pattern with an open brace": (PLACES, ReadOptions(pattern="v_{row_{column}.png"), "{row} and {column} once each"),
-    "pattern with fields together": (PLACES, ReadOptions(pattern="v{row}{column}.png"), "{row} and {column} once each"),
-    "pattern of a path": (PLACES, ReadOptions(pattern="../v_{row}_{column}.png"), "{row} and {column} once each"),
-    "pattern of a Windows path": (
-        PLACES,
-        ReadOptions(pattern="f\\v_{row}_{column}.png"),
-        "{row} and {column} once each",
-    ),
-    "empty pattern": (PLACES, ReadOptions(pattern=""), "{row} and {column} once each"),
-    "long pattern": (PLACES, ReadOptions(pattern="{number}" + "*" * 10**6), "{row} and {column} once each"),
+    "rows and columns of --grid exchanged": case(PLACES[:6], "--grid has 3x2", grid=(3, 2)),
+    "about as many of two sorts": case([*PLACES, *by_place("w_{}_{}.png", range(2), range(3))], "(9 and 6)"),
+    "one picture": case(["a1.png", "b.png"], "no number in the names counts"),
+    "one picture by pattern": case(["a1.png", "a.png"], "only one view, a1.png", pattern="a{number}.png"),
+    "twice": case([*PLACES, "v_01_01.png"], "view 1, 1 is given twice, also as v_01_01.png"),
+    "twice under two endings": case(["1.png", "2.png", "1.PNG"], "given twice"),
+    "twice by pattern": case(["a1b.png", "a1c.png"], "given twice", pattern="a{number}*"),
+    "huge row": case([*PLACES, "v_999999999_1.png"], "1000000000x3"),
+    "huge numbers": case(["v_0_0.png", f"v_{10**17}_{10**17}.png", "v_1_0.png", f"v_1_{10**17}.png"], "--pattern"),
+    "huge running number": case(["0.png", "1.png", "999999999999.png"], "only sort", grid=(2, 2)),
+    "sparse": case(["0_0.png", "1_1.png", "300_1.png", "300_2.png"], "301x3"),
+    "huge grid": case(PLACES, "at most 10000 views", grid=(999_999, 999_999)),
+    "small grid": case(PLACES, "--grid has 2x3", grid=(2, 3)),
+    "no grid": case(PLACES, "0x0", grid=(0, 0)),
+    "no grid, running": case(by_number("{}.png", range(4)), "0x3", grid=(0, 3)),
+    "small grid, running": case(by_number("{}.png", range(1, 5)), "4.png: beyond the 1x3 views", grid=(1, 3)),
+    "centre missing": case(["0_0.png", "0_1.png", "0_2.png", "2_2.png"], "centre view"),
+    "no such view": case(PLACES, "outside the grid", view=(3, 3)),
+    "axes": case(PLACES, "--axes does not apply", axes="TSHWC"),
+    "variable": case(PLACES, "--variable does not apply", variable="LF"),
+    "pattern of other names": case(PLACES, "no file has a name like", pattern="u_{row}_{column}.png"),
+    "pattern without fields": case(PLACES, "{row} and {column} once each", pattern="v_*.png"),
+    "pattern without column": case(PLACES, "{row} and {column} once each", pattern="v_{row}_*.png"),
+    "pattern with all fields": case(PLACES, "{row} and {column} once each", pattern="{number}_{row}_{column}"),
+    "pattern with a field twice": case(PLACES, "{row} and {column} once each", pattern="{number}_{number}"),
+    "pattern with other fields": case(PLACES, "{row} and {column} once each", pattern="v_{t}_{s}.png"),
+    "pattern with an open brace": case(PLACES, "{row} and {column} once each", pattern="v_{row_{column}.png"),
+    "pattern with fields together": case(PLACES, "{row} and {column} once each", pattern="v{row}{column}.png"),
+    "pattern of a path": case(PLACES, "{row} and {column} once each", pattern="../v_{row}_{column}.png"),
+    "pattern of a Windows path": case(PLACES, "{row} and {column} once each", pattern="f\\v_{row}_{column}.png"),
+    "empty pattern": case(PLACES, "{row} and {column} once each", pattern=""),
+    "long pattern": case(PLACES, "{row} and {column} once each", pattern="{number}" + "*" * 10**6),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
 def test_names_that_leave_doubt_are_one_line_that_says_what_to_give(tmp_path: Path, case: str) -> None:
-    names, options, word = BAD[case]
+    names, word, _, options = BAD[case]
     folder = put(tmp_path / "f", names)
     started = time.process_time()
     with pytest.raises(SepiError) as caught:
@@ -649,7 +541,7 @@ CHOICES = (
 
 @pytest.mark.parametrize("case", CHOICES)
 def test_the_pattern_that_an_error_suggests_can_be_followed(tmp_path: Path, case: str) -> None:
-    names, _, _ = BAD[case]
+    names = BAD[case].names
     folder = put(tmp_path / "f", names)
     with pytest.raises(SepiError) as caught:
         read(folder, ReadOptions())
@@ -709,20 +601,16 @@ def test_link_out_of_the_folder_is_followed_when_asked_for(tmp_path: Path) -> No
     assert places_of(read(folder, ReadOptions(follow_links=True))) == grid_of(3, 3)
 
 
-ROWS: dict[str, tuple[list[str], ReadOptions, list[list[int]]]] = {
-    "words": (by_place("row_{}/col_{}.png", range(3), range(4)), ReadOptions(), grid_of(3, 4)),
-    "numbers": (by_place("{}/{}.png", range(3), range(3)), ReadOptions(), grid_of(3, 3)),
-    "ten rows": (by_place("a_row{}/v{:02}.png", range(1, 11), range(2)), ReadOptions(), grid_of(10, 2)),
-    "row in both": (by_place("r{0}/r{0}_c{1}.png", range(3), range(2)), ReadOptions(), grid_of(3, 2)),
-    "a view left out": (
-        by_place("{}/{}.png", range(2), range(3)),
-        ReadOptions(exclude=("1/2.png",)),
-        [[0, 1, 2], [3, 4, -1]],
-    ),
-    "columns": (
+ROWS: dict[str, Case] = {
+    "words": case(by_place("row_{}/col_{}.png", range(3), range(4)), grid_of(3, 4)),
+    "numbers": case(by_place("{}/{}.png", range(3), range(3)), grid_of(3, 3)),
+    "ten rows": case(by_place("a_row{}/v{:02}.png", range(1, 11), range(2)), grid_of(10, 2)),
+    "row in both": case(by_place("r{0}/r{0}_c{1}.png", range(3), range(2)), grid_of(3, 2)),
+    "a view left out": case(by_place("{}/{}.png", range(2), range(3)), [[0, 1, 2], [3, 4, -1]], exclude=("1/2.png",)),
+    "columns": case(
         by_place("col_{}/row_{}.png", range(2), range(3)),
-        ReadOptions(pattern="col_{column}/row_{row}.png"),
         [[0, 3], [1, 4], [2, 5]],
+        pattern="col_{column}/row_{row}.png",
     ),
 }
 
@@ -730,7 +618,7 @@ ROWS: dict[str, tuple[list[str], ReadOptions, list[list[int]]]] = {
 @pytest.mark.parametrize("case", ROWS)
 def test_folder_of_rows_is_a_grid(tmp_path: Path, case: str) -> None:
     """Whoever is told to give one of the folders gets depth from one row."""
-    names, options, expected = ROWS[case]
+    names, expected, _, options = ROWS[case]
     for name in names:
         (tmp_path / name).parent.mkdir(exist_ok=True)
     light_field = read(put(tmp_path, names), options)
