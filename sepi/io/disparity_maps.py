@@ -193,7 +193,7 @@ def _stored(path: Path, scaled: bool) -> npt.NDArray[Any]:
     if suffix == ".pfm":
         return read_pfm(path)
     if suffix in (".png", ".pgm", *_TIFF):
-        return _read_tiff(path) if _is_float_tiff(path) else _read_levels(path, scaled)
+        return _read_levels(path, scaled)
     if suffix in _NUMPY:
         shapes = array_shapes(path)
         if len(shapes) != 1:
@@ -210,19 +210,16 @@ def _stored(path: Path, scaled: bool) -> npt.NDArray[Any]:
 
 
 def _is_float_tiff(path: Path) -> bool:
-    try:
+    with suppress(SepiError):
         header = picture_header(path)
-    except SepiError:
-        return False
-    return header.kind == "TIFF" and header.grey and header.pixel_bytes == 4
-
-
-def _read_tiff(path: Path) -> FloatMap:
-    return np.asarray(read_picture(path, any_floats=True)[:, :, 0], np.float32)
+        return header.kind == "TIFF" and header.grey and header.pixel_bytes == 4
+    return False
 
 
 def _read_levels(path: Path, scaled: bool) -> npt.NDArray[Any]:
     levels, header = read_picture(path, any_floats=True)[:, :, 0], picture_header(path)
+    if levels.dtype == np.float32 and header.grey and header.kind == "TIFF":
+        return levels
     if not header.grey or header.kind not in ("PNG", "TIFF", "PNM") or (header.kind == "PNG" and _is_packed(path)):
         raise _no_map(path)
     texts = png_texts(path)
@@ -248,13 +245,10 @@ def _is_packed(path: Path) -> bool:
 
 
 def _number(path: Path, key: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise SepiError(f"{path}: text chunk '{key}' must be a number, got {text[:40]!r}")
-    return value
+    with suppress(ValueError):
+        if math.isfinite(value := float(text)):
+            return value
+    raise SepiError(f"{path}: text chunk '{key}' must be a number, got {text[:40]!r}")
 
 
 def _no_map(path: Path) -> SepiError:

@@ -18,7 +18,7 @@ from sepi.io.files import atomic_path
 from sepi.io.images import write_png
 from sepi.io.map_pictures import BEYOND, Picture, in_colours
 from sepi.io.pfm import write_pfm
-from sepi.io.result_files import DEPTH_SIGMA, INTERVAL, SIGMA_PFM, SIGMA_PNG
+from sepi.io.result_files import DEPTH_SIGMA, ERROR_FILES, INTERVAL, SIGMA_PFM, SIGMA_PNG
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.stage import StageMaps
 
@@ -56,9 +56,7 @@ def bars_in_metres(maps: StageMaps, camera: Camera | None) -> dict[str, FloatMap
 
 def names_of_error_bars(maps: StageMaps, *, in_metres: bool) -> tuple[str, ...]:
     """Names of the files of error bars, those of the depth among them or not; none where maps have no bars."""
-    if maps.sigma is None or maps.low is None or maps.high is None:
-        return ()
-    return (SIGMA_PFM, SIGMA_PNG, INTERVAL, *((DEPTH_SIGMA,) if in_metres else ()))
+    return () if maps.sigma is None else (*ERROR_FILES, *((DEPTH_SIGMA,) if in_metres else ()))
 
 
 def write_error_bars(folder: Path, maps: StageMaps, metres: Mapping[str, FloatMap], unknown: BoolMap) -> None:
@@ -78,12 +76,12 @@ def write_error_bars(folder: Path, maps: StageMaps, metres: Mapping[str, FloatMa
     SepiError
         If they cannot be written.
     """
-    if maps.sigma is None or maps.low is None or maps.high is None:
+    if maps.sigma is None:
         return
     write_pfm(folder / SIGMA_PFM, maps.sigma)
     write_png(folder / SIGMA_PNG, sigma_picture(maps.sigma, unknown))
     bounds: dict[str, Any] = {"low": maps.low, "high": maps.high}
-    bounds |= {name: metres[name] for name in ("nearest", "farthest") if name in metres}
+    bounds |= {name: values for name, values in metres.items() if name != "depth_sigma"}
     with atomic_path(folder / INTERVAL) as temporary, temporary.open("wb") as file:
         # by name NumPy would put its own end to the temporary file's; it stamps no time
         np.savez(file, **{name: values.astype("<f4") for name, values in bounds.items()})

@@ -223,7 +223,7 @@ def point_cloud(
     if max_depth is not None:
         raise SepiError("point cloud: a largest depth in metres needs the camera's geometry, which is not known")
     used &= _sure(sigma, max_sigma)
-    return replace(_relief(picture, disparity, used), sigma=None if sigma is None else _single(sigma[used]))
+    return replace(_relief(picture, disparity, used), sigma=None if sigma is None else sigma[used].astype(np.float32))
 
 
 def _sure(sigma: FloatMap | None, most: float | None) -> BoolMap | bool:
@@ -234,10 +234,6 @@ def _sure(sigma: FloatMap | None, most: float | None) -> BoolMap | bool:
         raise SepiError("point cloud: a largest sigma needs a map of it")
     # comparison with NaN is false: unknown error is any
     return np.asarray(sigma <= most, bool)
-
-
-def _single(values: npt.NDArray[Any]) -> FloatMap:
-    return values.astype(np.float32, copy=False)
 
 
 def _metric(

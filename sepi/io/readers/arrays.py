@@ -87,7 +87,10 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
         that is not excluded holds some values that are not finite.
     """
     source = str(path)
-    _require_pixel_type(source, array.dtype)
+    if array.dtype.kind not in "iuf" or array.dtype.itemsize > 8:
+        raise SepiError(
+            f"{source}: values of type {array.dtype}; expected integers such as uint8, or floats within 0..1"
+        )
     given = axes or options.axes
     letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
     # a batch of one
@@ -103,10 +106,9 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     unknown = _fill(views, stack, numbers, scale)
     present: BoolMap = np.any(views, axis=(2, 3, 4))
     black = [(t, s) for t, s in np.argwhere((numbers >= 0) & ~present).tolist() if (t, s) not in unknown]
-    if not present.any():
+    if black and not present.any():
         # a light field that is all black is none with all views missing
-        for position in black:
-            present[position] = True
+        present[tuple(zip(*black, strict=True))] = True
         black = []
     reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
     if arranged and reference in [*black, *unknown]:
@@ -134,28 +136,18 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
     if np.array_equal(numbers, np.arange(T * S).reshape(T, S)):
         return light_field
     # -1 picks the last view, which `present` then leaves out
-    views = light_field.views.reshape(T * S, *light_field.views.shape[2:])[numbers]
-    present = light_field.present.ravel()[numbers] & (numbers >= 0)
+    places = np.divmod(numbers, S)
+    present = light_field.present[places] & (numbers >= 0)
+    views = light_field.views[places]
     views[~present] = 0
-    missing = light_field.missing
-    if missing is not None:
-        missing = missing.reshape(T * S, *missing.shape[2:])[numbers] & present[..., None, None]
+    missing = None if light_field.missing is None else light_field.missing[places] & present[..., None, None]
     positions, row_spacing = reordered(light_field.positions, light_field.row_spacing, options.order, numbers)
-    view, truth, masks = options.view, None, {}
+    truth: dict[str, Any] = {"view": options.view, "ground_truth": None, "masks": {}}
     position = position_of(numbers, light_field.reference_position[0] * S + light_field.reference_position[1])
     if position is not None and (light_field.view is not None or light_field.ground_truth is not None):
-        view, truth, masks = position, light_field.ground_truth, dict(light_field.masks)
-    return replace(
-        light_field,
-        views=views,
-        present=present,
-        view=view,
-        ground_truth=truth,
-        masks=masks,
-        positions=positions,
-        row_spacing=row_spacing,
-        missing=missing,
-    )
+        truth = {"view": position}
+    where: dict[str, Any] = {"positions": positions, "row_spacing": row_spacing, "missing": missing}
+    return replace(light_field, views=views, present=present, **where, **truth)
 
 
 def with_white(views: Array, present: BoolMap, path: Path, white: float) -> Array:
@@ -165,11 +157,6 @@ def with_white(views: Array, present: BoolMap, path: Path, white: float) -> Arra
     scaled: Array = np.zeros(views.shape, scale.dtype)
     _fill(scaled, views, numbers, scale)
     return scaled
-
-
-def _require_pixel_type(source: str, kind: np.dtype[Any]) -> None:
-    if kind.kind not in "iuf" or kind.itemsize > 8:
-        raise SepiError(f"{source}: values of type {kind}; expected integers such as uint8, or floats within 0..1")
 
 
 def _checked_axes(source: str, array: Array, text: str) -> str:
@@ -251,10 +238,7 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
     if "N" in letters and grid is None:
         grid = 1, size["N"]
     elif "N" not in letters and grid not in (None, (size["T"], size["S"])):
-        raise SepiError(
-            f"{source}: --grid {grid[0]}x{grid[1]}, but the array has {size['T']}x{size['S']} views "
-            f"(axes {' '.join(letters)})"
-        )
+        raise SepiError(f"{source}: --grid {grid[0]}x{grid[1]}, but the array has {size['T']}x{size['S']} views")
     rows, columns = grid or (size["T"], size["S"])
     if rows * columns != size.get("N", rows * columns):
         raise SepiError(f"{source}: {size['N']} views make no grid of {rows}x{columns}; --grid ROWSxCOLUMNS sets it")

@@ -164,7 +164,6 @@ def _left_out(names: Sequence[str], singular: str, plural: str) -> list[str]:
 def _require_different(path: Path, named: ViewNumbers) -> None:
     seen: dict[tuple[int, ...], str] = {}
     for name, numbers in named.numbers.items():
-        if numbers in seen:
+        if seen.setdefault(numbers, name) != name:
             where = ", ".join(map(str, numbers))
             raise SepiError(f"{path / name}: view {where} is given twice, also as {seen[numbers]}")
-        seen[numbers] = name

@@ -42,12 +42,14 @@ def read(path: Path, options: ReadOptions) -> LightField:
 def read_array(path: Path) -> Array:
     """The array of a ``.npy`` file, mapped: its values are read when they are used."""
     with reading(path, _KIND), warnings.catch_warnings(action="ignore"):
-        _require_header(path)
         with path.open("rb") as file:
-            _, _, kind = _HEADERS[npy.read_magic(file)](file)
-        if kind.hasobject:
-            raise SepiError("Python objects, which may be any program; save pictures as one array, numpy.stack(them)")
-        return npy.open_memmap(path, mode="r")
+            start = file.read(12)
+        # two bytes in version 1, four in later ones: NumPy takes memory for it before it reads
+        length = int.from_bytes(start[8:10] if start[6:7] == b"\x01" else start[8:12], "little")
+        if length > path.stat().st_size:
+            raise ValueError(f"a header of {length} bytes")
+        array: Array = np.load(path, mmap_mode="r", allow_pickle=False)
+        return array
 
 
 def array_shapes(path: Path) -> Shapes:
@@ -81,16 +83,6 @@ def read_named(path: Path, name: str) -> Array:
 def _is_zipped(path: Path) -> bool:
     with reading(path, _KIND), path.open("rb") as file:
         return file.read(4) in _ZIP_MAGICS
-
-
-def _require_header(path: Path) -> None:
-    """Raise where the header is longer than the file: NumPy takes memory for it before it reads."""
-    with path.open("rb") as file:
-        start = file.read(12)
-    # two bytes in version 1, four in later ones
-    length = int.from_bytes(start[8:10] if start[6:7] == b"\x01" else start[8:12], "little")
-    if length > path.stat().st_size:
-        raise ValueError(f"a header of {length} bytes")
 
 
 def _require_room(path: Path, info: zipfile.ZipInfo) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from sepi.errors import SepiError
@@ -18,7 +19,12 @@ def odd_pictures(folder: Path, names: Iterable[str]) -> dict[str, str]:
 
     Pictures that cannot be read, and links, are left to those that read them.
     """
-    sizes = {name: size for name in names if (size := _size(folder / name)) is not None}
+    sizes: dict[str, tuple[int, int]] = {}
+    for name in names:
+        with suppress(SepiError):
+            if not (folder / name).is_symlink():
+                header = picture_header(folder / name)
+                sizes[name] = header.width, header.height
     if not sizes:
         return {}
     usual, count = Counter(sizes.values()).most_common(1)[0]
@@ -29,13 +35,3 @@ def odd_pictures(folder: Path, names: Iterable[str]) -> dict[str, str]:
         for name, size in sizes.items()
         if size != usual
     }
-
-
-def _size(path: Path) -> tuple[int, int] | None:
-    if path.is_symlink():
-        return None
-    try:
-        header = picture_header(path)
-    except SepiError:
-        return None
-    return header.width, header.height

@@ -101,9 +101,8 @@ def _given(source: str, kind: np.dtype[Any], ranges: _Ranges, white: float) -> S
 
 def _beyond(source: str, ranges: _Ranges, bounds: tuple[float, float], expected: str) -> SepiError:
     """The error that names the first view with values beyond some bounds."""
-    (t, s), (low, high) = next(
-        (position, values) for position, values in ranges.items() if values[0] < bounds[0] or values[1] > bounds[1]
-    )
+    beyond = {place: ends for place, ends in ranges.items() if ends[0] < bounds[0] or ends[1] > bounds[1]}
+    (t, s), (low, high) = next(iter(beyond.items()))
     return SepiError(f"{source}: view {t},{s} has values from {low:g} to {high:g}; expected within {expected}")
 
 

@@ -63,8 +63,7 @@ def read_grid(
     if not options.follow_links:
         _require_within(folder, paths)
     white = options.white
-    places = [int(position) for position in positions]
-    views: Array = read_views(paths, places, numbers.size, any_floats=white is not None)
+    views: Array = read_views(paths, positions.tolist(), numbers.size, any_floats=white is not None)
     views = views.reshape(*numbers.shape, *views.shape[1:])
     views = views if white is None else with_white(views, present, folder, white)
     own = {number: name for name, number in names.items() if number >= 0}
