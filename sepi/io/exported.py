@@ -8,13 +8,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path, filled_folder, remove_files
@@ -87,34 +84,32 @@ def write_exported(path: Path, light_field: LightField, *, force: bool = False) 
 
 def _write_folder(folder: Path, light_field: LightField) -> set[str]:
     digits = max(2, len(str(max(light_field.grid) - 1)))
-    places: dict[tuple[int, ...], str]
-    places = {(t, s): f"row_{t:0{digits}}_col_{s:0{digits}}" for t, s in np.argwhere(light_field.present).tolist()}
     suffix = "tif" if light_field.views.dtype == np.float32 else "png"
-    views = {place: f"{name}.{suffix}" for place, name in places.items()}
-    for place, name in views.items():
-        view = light_field.views[place]
+    names, hidden = (np.full(light_field.grid, None, object) for _ in range(2))
+    for t, s in np.argwhere(light_field.present).tolist():
+        stem, view = f"row_{t:0{digits}}_col_{s:0{digits}}", light_field.views[t, s]
+        names[t, s] = f"{stem}.{suffix}"
         pixels = view[..., 0] if view.shape[2] == 1 else view
         if suffix == "tif":
-            write_tiff(folder / name, pixels.astype(np.float32), f"view {','.join(map(str, place))}")
+            write_tiff(folder / names[t, s], pixels.astype(np.float32), f"view {t},{s}")
         else:
-            write_png(folder / name, pixels.astype(view.dtype.newbyteorder("=")))
+            write_png(folder / names[t, s], pixels.astype(view.dtype.newbyteorder("=")))
+        if light_field.missing is not None and light_field.missing[t, s].any():
+            hidden[t, s] = f"missing_{stem}.png"
+            write_png(folder / hidden[t, s], light_field.missing[t, s])
     if light_field.ground_truth is not None:
         write_pfm(folder / _TRUTH, light_field.ground_truth)
     masks = {name: f"mask_{name}.png" for name in sorted(light_field.masks)}
     for name, file in masks.items():
         write_png(folder / file, light_field.masks[name])
-    hidden = {}
-    if light_field.missing is not None:
-        hidden = {place: f"missing_{name}.png" for place, name in places.items() if light_field.missing[place].any()}
-        for place, name in hidden.items():
-            write_png(folder / name, light_field.missing[place])
+    places = [] if light_field.positions is None else light_field.positions.tolist()
     known = Manifest(
         name=light_field.name,
-        views=_in_rows(light_field.grid, views),
+        views=names.tolist(),
         view=light_field.view,
         row_spacing=float(light_field.row_spacing),
-        positions=None if light_field.positions is None else _in_rows(light_field.grid, _finite(light_field.positions)),
-        missing=None if light_field.missing is None else _in_rows(light_field.grid, hidden),
+        positions=[[at if np.isfinite(at).all() else None for at in row] for row in places] or None,
+        missing=None if light_field.missing is None else hidden.tolist(),
         disparity_range=light_field.disparity_range,
         camera=light_field.camera,
         ground_truth=None if light_field.ground_truth is None else _TRUTH,
@@ -126,19 +121,6 @@ def _write_folder(folder: Path, light_field: LightField) -> set[str]:
     with atomic_path(folder / MANIFEST) as temporary:
         temporary.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="ascii")
     return {path.name for path in folder.iterdir()}
-
-
-def _in_rows(grid: tuple[int, int], values: Mapping[tuple[int, ...], Any]) -> list[list[Any]]:
-    """A value for each place of a grid, row by row; None where there is none."""
-    return [[values.get((t, s)) for s in range(grid[1])] for t in range(grid[0])]
-
-
-def _finite(positions: npt.NDArray[np.float64]) -> dict[tuple[int, ...], tuple[float, ...]]:
-    return {
-        place: tuple(positions[place].tolist())
-        for place in np.ndindex(positions.shape[:2])
-        if np.isfinite(positions[place]).all()
-    }
 
 
 def _earlier_files(folder: Path) -> set[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -87,18 +86,15 @@ def read(path: Path, options: ReadOptions) -> LightField:
     """Read a folder; what the options ask for is done to the light field that was written."""
     file = path / MANIFEST
     known = read_manifest(file)
-    rows, columns = len(known.views), len(known.views[0])
-    files = {number: path / name for number, name in enumerate(chain(*known.views)) if name is not None}
-    views, present, *_ = read_grid(path, files, (rows, columns), unarranged(options))
-    positions = None
+    names = np.array(known.views, object)
+    files = {number: path / name for number, name in enumerate(names.ravel()) if name is not None}
+    views, present, *_ = read_grid(path, files, names.shape, unarranged(options))
+    positions, missing = None, None
     if known.positions is not None:
-        places = [place or (np.nan, np.nan) for place in chain(*known.positions)]
-        positions = np.array(places, np.float64).reshape(rows, columns, 2)
-    truth = None if known.ground_truth is None else read_pfm(path / known.ground_truth)
-    missing = None
+        positions = np.array([[place or (np.nan, np.nan) for place in row] for row in known.positions], np.float64)
     if known.missing is not None:
-        missing = np.zeros((rows, columns, *views.shape[2:4]), bool)
-        for place, name in zip(np.ndindex(rows, columns), chain(*known.missing), strict=True):
+        missing = np.zeros((*names.shape, *views.shape[2:4]), bool)
+        for place, name in np.ndenumerate(np.array(known.missing, object)):
             if name is not None:
                 missing[place] = _read_mask(path / name, views.shape[2:4])
     with naming(file):
@@ -108,7 +104,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
             source=str(path),
             present=present,
             disparity_range=known.disparity_range,
-            ground_truth=truth,
+            ground_truth=None if known.ground_truth is None else read_pfm(path / known.ground_truth),
             masks={name: _read_mask(path / mask) for name, mask in known.masks.items()},
             view=known.view,
             row_spacing=known.row_spacing,
