@@ -101,13 +101,13 @@ def read_result_at(path: Path, view: View | None = None) -> Result:
         If there is no map of this view, or the file is damaged.
     """
     file_path = _file_of(path, view)
-    if file_path is None:
-        result, origin = read_result(path), read_origin(path)
-        if view is not None and (origin is None or origin.view != view):
-            own = "" if origin is None else " {},{}".format(*origin.view)
-            raise SepiError(f"{path}: holds the map of view{own} alone; 'sepi depth --all-views' makes those of all")
-        return result
-    return _read_view(file_path, view)
+    if file_path is not None:
+        return _read_view(file_path, view)
+    result, origin = read_result(path), read_origin(path)
+    if view is not None and (origin is None or origin.view != view):
+        own = "" if origin is None else " {},{}".format(*origin.view)
+        raise SepiError(f"{path}: holds the map of view{own} alone; 'sepi depth --all-views' makes those of all")
+    return result
 
 
 def read_disparity_at(path: Path, view: View | None) -> FloatMap:

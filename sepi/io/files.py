@@ -119,34 +119,26 @@ def atomic_folder(path: Path, replace: bool = False) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic_files(folder: Path) -> Iterator[Path]:
-    """Give a temporary folder inside ``folder`` to fill; move its files up on success, in order of their making.
+def filled_folder(folder: Path) -> Iterator[Path]:
+    """Give a temporary folder to fill: it becomes ``folder``, or its files are moved there where others are already.
+
+    They are moved in the order of their making. The folder itself may be a link to where there is room.
 
     Raises
     ------
     SepiError
-        If ``folder`` cannot be written to, or the disk is full.
+        As :func:`atomic_folder`, but for files that are there.
     """
+    folder = folder.resolve()
+    if not (folder.is_dir() and any(folder.iterdir())):
+        with atomic_folder(folder) as temporary:
+            yield temporary
+        return
     with _temporary_beside(folder / "files", "", folder) as temporary:
         temporary.mkdir()
         yield temporary
         for path in sorted(temporary.iterdir(), key=lambda path: path.stat().st_mtime_ns):
             path.replace(folder / path.name)
-
-
-@contextmanager
-def filled_folder(folder: Path) -> Iterator[Path]:
-    """Give a temporary folder to fill: it becomes ``folder``, or its files are moved there where others are already.
-
-    Raises
-    ------
-    SepiError
-        As :func:`atomic_folder` and :func:`atomic_files`.
-    """
-    # the folder itself may be a link to where there is room
-    target = folder.resolve()
-    with atomic_files(target) if target.is_dir() and any(target.iterdir()) else atomic_folder(target) as temporary:
-        yield temporary
 
 
 def remove_files(folder: Path, names: Iterable[str]) -> None:

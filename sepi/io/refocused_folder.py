@@ -107,29 +107,25 @@ def write_refocused(
         written with this Pillow.
     """
     before = _earlier_files(folder / INDEX)
-    made = [
-        *([] if sharp is None else [ALL_IN_FOCUS]),
-        *stack_names(len(foci)),
-        *([ANIMATION] if animated else []),
-        INDEX,
-    ]
+    names = stack_names(len(foci))
+    made = [*[ALL_IN_FOCUS] * (sharp is not None), *names, *[ANIMATION] * animated, INDEX]
     others = [name for name in made if name not in before and os.path.lexists(folder / name)]
     if others:
         raise SepiError(f"{folder}: {others[0]} there was not written by 'sepi refocus'; choose another folder")
     with filled_folder(folder) as temporary:
-        rows = [] if sharp is None else [[ALL_IN_FOCUS, "", "", "", ""]]
         if sharp is not None:
             write_png(temporary / ALL_IN_FOCUS, _levels(sharp, dtype))
         frames = []
-        for name, focus, picture in zip(stack_names(len(foci)), foci, pictures, strict=True):
+        for name, picture in zip(names, pictures, strict=True):
             write_png(temporary / name, _levels(picture, dtype))
-            rows.append([name, *_described(focus)])
             if animated:
                 frames.append(_levels(picture, np.uint8))
         if animated:
             _write_animation(temporary / ANIMATION, frames)
-            rows.append([ANIMATION, "", "", "", ""])
-        _write_index(temporary / INDEX, rows)
+        told = dict(zip(names, map(_described, foci), strict=True))
+        rows = [[name, *told.get(name, [""] * 4)] for name in made[:-1]]
+        with (temporary / INDEX).open("w", encoding="ascii", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
     remove_files(folder, set(before).difference(made))
     return tuple(made)
 
@@ -145,11 +141,6 @@ def _described(focus: Focus) -> list[str]:
     x, y = ("", "") if focus.at is None else focus.at
     depth = "" if focus.depth is None else f"{focus.depth:.6g}"
     return [f"{focus.disparity:.6g}", depth, f"{x}", f"{y}"]
-
-
-def _write_index(path: Path, rows: Sequence[Sequence[str]]) -> None:
-    with atomic_path(path) as temporary, temporary.open("w", encoding="ascii", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
 
 
 def _write_animation(path: Path, frames: Sequence[npt.NDArray[Any]]) -> None:

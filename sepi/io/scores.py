@@ -128,10 +128,8 @@ def read_reliability(path: Path, names: Collection[str]) -> dict[str, npt.NDArra
         As :func:`read_scores`.
     """
     with open_hdf5(path, _KIND) as file:
-        groups = _groups(path, file, names)
-        return {
-            name: read_dataset(path, group[_RELIABILITY]) for name, group in groups.items() if _RELIABILITY in group
-        }
+        found = {name: group.get(_RELIABILITY) for name, group in _groups(path, file, names).items()}
+        return {name: read_dataset(path, values) for name, values in found.items() if values is not None}
 
 
 def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[str, Evaluation]:
