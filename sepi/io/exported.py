@@ -15,12 +15,12 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path, filled_folder, remove_files
-from sepi.io.float_pictures import write_tiff
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import SUFFIXES, write_png
 from sepi.io.pfm import write_pfm
 from sepi.io.readers.exported import MANIFEST, Manifest, read_manifest
 from sepi.io.result_files import require_target
+from sepi.io.tiff import write_tiff
 from sepi.lightfield import LightField
 
 HDF5 = (".h5", ".hdf5")

@@ -6,14 +6,20 @@ import importlib
 import io
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError, printable
+from sepi.io.files import atomic_path, naming
+from sepi.lightfield import FloatMap
+
+EXR = (".exr",)
+"""Ends of names, in small letters."""
 
 SIGNATURE = b"v/1\x01"
 """First bytes of a file."""
@@ -102,3 +108,27 @@ def _quiet() -> Iterator[None]:
             with open(os.devnull, "wb") as nothing:
                 os.dup2(nothing.fileno(), 2)
         yield
+
+
+def write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> None:
+    """Write maps as channels of one OpenEXR file, compressed without loss; equal content gives equal bytes.
+
+    Parameters
+    ----------
+    path : Path
+    channels : mapping of str to ndarray, shape (H, W), float32
+        Name to map, all of one shape; NaN and infinity stay. Programs know the names ``Z`` (depth) and ``Y`` (grey).
+    comment : str
+        What the numbers are.
+
+    Raises
+    ------
+    SepiError
+        If the package OpenEXR is not installed, or the file cannot be written.
+    """
+    with naming(path):
+        exr = open_exr()
+    header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage, "comments": comment}
+    pixels = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
+    with atomic_path(path) as temporary, exr.File(header, pixels) as file:
+        file.write(str(temporary))

@@ -5,6 +5,8 @@ docs/reference/outputs.md describes them.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,13 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from sepi.camera import Camera
+from sepi.io.files import atomic_path
 from sepi.io.images import write_png
+from sepi.io.pfm import write_pfm
+from sepi.io.result_files import DEPTH_SIGMA, ERROR_FILES, INTERVAL, SIGMA_PFM, SIGMA_PNG
 from sepi.lightfield import BoolMap, FloatMap, as_unit_float
+from sepi.stage import StageMaps
 from sepi.validation import require_map
 
 Picture = npt.NDArray[np.uint8]
@@ -104,3 +111,141 @@ def write_16bit(path: Path, disparity: FloatMap) -> None:
             "units": "pixels per view step",
         },
     )
+
+
+# a scale of less than a decade would make differences of a map that has none
+_LEAST_SPAN = 10.0
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+# pixels, of a picture of this height; letters grow with the root of a greater one
+_LEAST_HEIGHT, _BAR, _GAP, _LETTERS = 160, 14, 8, 0.4
+_TITLE = "px / view step"
+
+
+def bars_in_metres(maps: StageMaps, camera: Camera | None) -> dict[str, FloatMap]:
+    """Error bars of the depth by their names; none where there are none of the disparity, or no camera.
+
+    Parameters
+    ----------
+    maps : StageMaps
+    camera : Camera or None
+
+    Returns
+    -------
+    dict of str to ndarray, shape (H, W), float32
+        ``depth_sigma``, by the derivative of the depth after the disparity; ``nearest`` and ``farthest``, the depths of
+        the bounds, of which the latter may be infinite. Metres.
+    """
+    if camera is None or maps.sigma is None or maps.low is None or maps.high is None:
+        return {}
+    return {
+        "depth_sigma": camera.depth_sigma(maps.disparity, maps.sigma),
+        # larger disparities are nearer
+        "nearest": camera.depth(maps.high),
+        "farthest": camera.depth(maps.low),
+    }
+
+
+def names_of_error_bars(maps: StageMaps, *, in_metres: bool) -> tuple[str, ...]:
+    """Names of the files of error bars, those of the depth among them or not; none where maps have no bars."""
+    return () if maps.sigma is None else (*ERROR_FILES, *((DEPTH_SIGMA,) if in_metres else ()))
+
+
+def write_error_bars(folder: Path, maps: StageMaps, metres: Mapping[str, FloatMap], unknown: BoolMap) -> None:
+    """Write the error bars of maps, where they have any; equal content gives equal bytes.
+
+    Parameters
+    ----------
+    folder : Path
+    maps : StageMaps
+    metres : mapping of str to ndarray
+        Those of the depth, from :func:`bars_in_metres`.
+    unknown : ndarray, shape (H, W), bool
+        Pixels that no view knows anything about.
+
+    Raises
+    ------
+    SepiError
+        If they cannot be written.
+    """
+    if maps.sigma is None:
+        return
+    write_pfm(folder / SIGMA_PFM, maps.sigma)
+    write_png(folder / SIGMA_PNG, sigma_picture(maps.sigma, unknown))
+    bounds: dict[str, Any] = {"low": maps.low, "high": maps.high}
+    bounds |= {name: values for name, values in metres.items() if name != "depth_sigma"}
+    with atomic_path(folder / INTERVAL) as temporary, temporary.open("wb") as file:
+        # by name NumPy would put its own end to the temporary file's; it stamps no time
+        np.savez(file, **{name: values.astype("<f4") for name, values in bounds.items()})
+    if metres:
+        write_pfm(folder / DEPTH_SIGMA, metres["depth_sigma"])
+
+
+def sigma_picture(sigma: FloatMap, unknown: BoolMap | None = None) -> Picture:
+    """A standard deviation in colours, dark blue (least) to yellow (greatest) on a logarithmic scale, and that scale.
+
+    Parameters
+    ----------
+    sigma : ndarray, shape (H, W), float32
+        Pixels per view step. The colours span its values but for half a percent at either end, and a decade at least.
+    unknown : ndarray, shape (H, W), bool, optional
+        Pixels to be shown grey, which take no part of the scale.
+
+    Returns
+    -------
+    ndarray, shape (at least H, more than W, 3), uint8
+        RGB; the map's pixels at the upper left, black where they are not finite, and a bar with numbers on their right.
+    """
+    finite = np.isfinite(sigma)
+    counted = finite & (sigma > 0)
+    if unknown is not None:
+        counted &= ~unknown
+    low, high = _span(sigma[counted])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        unit = np.log(sigma / np.float32(low)) / np.float32(math.log(high / low))
+    colours = in_colours(np.where(finite, np.clip(unit, 0, 1), np.nan), unknown)
+    return _beside_scale(colours, low, high)
+
+
+def _span(values: FloatMap) -> tuple[float, float]:
+    """Ends of the scale."""
+    low, high = np.quantile(values.astype(np.float64), (BEYOND, 1 - BEYOND)) if values.size else (0.01, 0.01)
+    wider = math.sqrt(max(1.0, _LEAST_SPAN / float(high / low)))
+    return float(low) / wider, float(high) * wider
+
+
+def _beside_scale(colours: Picture, low: float, high: float) -> Picture:
+    """A picture with the scale of its colours on the right, on white."""
+    height, width = colours.shape[:2]
+    total = max(height, _LEAST_HEIGHT)
+    size = math.sqrt(total / _LEAST_HEIGHT)
+    bar, gap, letters, thick = round(_BAR * size), round(_GAP * size), _LETTERS * size, max(1, round(size / 2))
+    (title_width, line), _ = cv2.getTextSize(_TITLE, _FONT, letters, thick)
+    picture = np.full((total, width + 2 * gap + max(title_width, 4 * bar) + gap, 3), 255, np.uint8)
+    picture[:height, :width] = colours
+    left, top, bottom = width + 2 * gap, 2 * gap + line, total - 2 * gap
+    rows = bottom - top
+    ramp = np.linspace(1, 0, rows, dtype=np.float32)[:, None]
+    picture[top:bottom, left : left + bar] = np.broadcast_to(in_colours(ramp), (rows, bar, 3))
+
+    def write(text: str, x: int, y: int) -> None:
+        cv2.putText(picture, text, (x, y), _FONT, letters, (0, 0, 0), thick, cv2.LINE_AA)
+
+    write(_TITLE, left, gap + line)
+    for value in _ticks(low, high, most=max(2, rows // (2 * line))):
+        row = top + round((rows - 1) * (1 - math.log(value / low) / math.log(high / low)))
+        picture[row - thick + 1 : row + 1, left : left + bar + gap // 2] = 0
+        write(f"{value:g}", left + bar + gap, min(max(row + line // 2, top + line // 2), bottom))
+    return picture
+
+
+def _ticks(low: float, high: float, most: int) -> list[float]:
+    """Round numbers within the scale: powers of ten, and 3, or 2 and 5 times them as long as they have room."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    ticks: list[float] = []
+    for digits in ((1,), (1, 3), (1, 2, 5)):
+        # by its text a number is as round as it is written
+        values = [float(f"{digit}e{power}") for power in powers for digit in digits]
+        within = [value for value in values if low <= value <= high]
+        if not ticks or len(within) <= most:
+            ticks = within
+    return ticks

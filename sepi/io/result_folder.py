@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from sepi.camera import Camera, warn_of_infinity
 from sepi.errors import SepiError
-from sepi.io.error_bar_files import bars_in_metres, names_of_error_bars, write_error_bars
 from sepi.io.files import atomic_path, filled_folder, remove_files
 from sepi.io.hdf5 import (
     Attribute,
@@ -31,7 +30,14 @@ from sepi.io.hdf5 import (
     read_rig,
 )
 from sepi.io.images import write_png
-from sepi.io.map_pictures import colour_code, levels, write_16bit
+from sepi.io.map_pictures import (
+    bars_in_metres,
+    colour_code,
+    levels,
+    names_of_error_bars,
+    write_16bit,
+    write_error_bars,
+)
 from sepi.io.origin import DIGEST, RESULT
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply

@@ -6,15 +6,21 @@ import io
 import logging
 import math
 import struct
+from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
+from sepi.io.files import atomic_path
+from sepi.lightfield import FloatMap
 
 if TYPE_CHECKING:
     from tifffile import TiffFile, TiffPage
+
+TIFF = (".tif", ".tiff")
+"""Ends of names, in small letters."""
 
 TIFF_SIGNATURES = (b"II*\0", b"II+\0", b"MM\0*", b"MM\0+")
 """First bytes of a TIFF."""
@@ -134,3 +140,33 @@ def _require_no_larger(page: Any) -> None:
         with JpegImageFile(io.BytesIO(file.read(count))) as picture:
             if picture.width * picture.height > math.prod(page.chunks):
                 raise SepiError(f"damaged TIFF: a JPEG of {picture.width}x{picture.height} pixels in a part of it")
+
+
+def write_tiff(path: Path, values: FloatMap, comment: str) -> None:
+    """Write a TIFF of 32-bit floats, compressed without loss; equal content gives equal bytes.
+
+    Parameters
+    ----------
+    path : Path
+    values : ndarray, shape (H, W) or (H, W, 3), float32
+        NaN and infinity stay.
+    comment : str
+        What the numbers are; the picture's description.
+
+    Raises
+    ------
+    SepiError
+        If the file cannot be written.
+    """
+    import tifffile
+
+    with atomic_path(path) as temporary:
+        tifffile.imwrite(
+            temporary,
+            np.ascontiguousarray(values, np.float32),
+            photometric="minisblack" if values.ndim == 2 else "rgb",
+            compression="zlib",
+            description=comment,
+            software="sepi",
+            metadata=None,
+        )

@@ -7,9 +7,8 @@ from math import gcd, isqrt, prod
 from pathlib import Path
 
 from sepi.errors import SepiError
-from sepi.io.readers.name_groups import EXAMPLES
+from sepi.io.readers.name_groups import EXAMPLES, Kind, fill, origin
 from sepi.io.readers.options import ReadOptions
-from sepi.io.readers.view_counts import Kind, fill, origin
 from sepi.io.readers.view_files import MAX_VIEWS
 from sepi.io.readers.view_names import ViewNumbers
 

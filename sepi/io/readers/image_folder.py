@@ -7,7 +7,9 @@ may also say where the cameras stood, ``out_00_01_-703.002197_468.153625.png``.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -17,10 +19,9 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import name_of
-from sepi.io.images import SUFFIXES
+from sepi.io.images import SUFFIXES, picture_header
 from sepi.io.readers.camera_positions import off_grid, positions_from_cameras
 from sepi.io.readers.folder_layout import Layout, Numbers, widened
-from sepi.io.readers.odd_pictures import odd_pictures
 from sepi.io.readers.options import ReadOptions, is_position, unarranged
 from sepi.io.readers.row_folders import files_in, has_rows, numbered, view_files
 from sepi.io.readers.view_files import read_grid
@@ -167,3 +168,30 @@ def _require_different(path: Path, named: ViewNumbers) -> None:
         if seen.setdefault(numbers, name) != name:
             where = ", ".join(map(str, numbers))
             raise SepiError(f"{path / name}: view {where} is given twice, also as {seen[numbers]}")
+
+
+# part of the pictures, or one, that may be odd where all others agree
+_ODD = 0.1
+
+
+def odd_pictures(folder: Path, names: Iterable[str]) -> dict[str, str]:
+    """The few pictures of another size than all others, and what is odd about them; none where no size prevails.
+
+    Pictures that cannot be read, and links, are left to those that read them.
+    """
+    sizes: dict[str, tuple[int, int]] = {}
+    for name in names:
+        with suppress(SepiError):
+            if not (folder / name).is_symlink():
+                header = picture_header(folder / name)
+                sizes[name] = header.width, header.height
+    if not sizes:
+        return {}
+    usual, count = Counter(sizes.values()).most_common(1)[0]
+    if count < 2 or len(sizes) - count > max(1, _ODD * len(sizes)):
+        return {}
+    return {
+        name: f"{size[0]}x{size[1]} pixels, but all other views have {usual[0]}x{usual[1]}"
+        for name, size in sizes.items()
+        if size != usual
+    }

@@ -9,8 +9,7 @@ from pathlib import Path
 from sepi.errors import SepiError
 from sepi.io.files import reading
 from sepi.io.images import SUFFIXES
-from sepi.io.readers.name_groups import CAMERAS
-from sepi.io.readers.view_counts import Kind
+from sepi.io.readers.name_groups import CAMERAS, Kind
 from sepi.io.readers.view_names import infer_view_numbers, pair_view_numbers
 
 # the number of a row, or of a column, behind a word for it or alone

@@ -9,8 +9,17 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from sepi.errors import SepiError
-from sepi.io.readers.name_groups import DECIMAL, EXAMPLES, MAX_DIGITS, NameGroup, separators, signed
-from sepi.io.readers.view_counts import Counting, Kind, fill
+from sepi.io.readers.name_groups import (
+    DECIMAL,
+    EXAMPLES,
+    MAX_DIGITS,
+    Counting,
+    Kind,
+    NameGroup,
+    fill,
+    separators,
+    signed,
+)
 
 _FIELDS = ("row", "column", "number")
 # names of the two views of a pair
