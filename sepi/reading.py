@@ -12,7 +12,7 @@ import numpy as np
 
 from sepi.errors import SepiError, SepiWarning
 from sepi.inspection.coded_views import coded_views
-from sepi.io.origin import reading_record
+from sepi.io.provenance import reading_record
 from sepi.io.readers.arrays import UnclearAxesError
 from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import read

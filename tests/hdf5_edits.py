@@ -6,7 +6,7 @@ from pathlib import Path
 
 import h5py
 
-from sepi.io.integrity import digest_block
+from sepi.io.hdf5 import digest_block
 
 
 @contextmanager

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from sepi.camera import Camera, Part
     from sepi.cli.input_options import Geometry
     from sepi.io.disparity_maps import TruthFile
-    from sepi.io.origin import Origin
+    from sepi.io.provenance import Origin
     from sepi.io.result_folder import Result
     from sepi.lightfield import FloatMap, LightField
 

@@ -30,7 +30,7 @@ from sepi.io.hdf5 import (
     read_dataset,
     read_rig,
 )
-from sepi.io.origin import Origin, read_origin
+from sepi.io.provenance import Origin, read_origin
 from sepi.io.result_files import ALL_VIEWS
 from sepi.io.result_folder import Result, read_result
 from sepi.lightfield import FloatMap, LightField

@@ -17,8 +17,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.io.disparity_maps import SUFFIXES, map_file
-from sepi.io.hdf5 import attribute, create_hdf5, open_hdf5, put, read_dataset
-from sepi.io.integrity import members
+from sepi.io.hdf5 import attribute, create_hdf5, members, open_hdf5, put, read_dataset
 from sepi.io.scores import Evaluation, evaluation_in, put_evaluation, scores_in
 from sepi.lightfield import FloatMap
 

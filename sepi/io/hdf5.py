@@ -1,6 +1,6 @@
 """All HDF5 reading and writing: light fields and stage files.
 
-Each file tells whether it was damaged (:mod:`sepi.io.integrity`).
+Each file tells whether it was damaged (:mod:`sepi.io.hdf5`).
 
 A stage file holds ``disparity (H, W) float32`` in pixels per view step, ``confidence (H, W) float32`` in 0..1, the
 stage's own maps, and attributes that say what made them; where a later stage is to choose among candidates, their costs
@@ -9,7 +9,10 @@ stage's own maps, and attributes that say what made them; where a later stage is
 
 from __future__ import annotations
 
+import hashlib
+import io
 import math
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,12 +25,86 @@ import numpy.typing as npt
 from sepi.camera import Camera, numbers_of
 from sepi.errors import SepiError, printable
 from sepi.interrupts import no_interrupt_lost
-from sepi.io.files import PatientFile, atomic_path, reading
-from sepi.io.integrity import BLOCK, digest_block, fixed_text, is_own, members, require_held, require_sound
+from sepi.io.files import DEFLATE_RATIO, PatientFile, atomic_path, reading
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
 from sepi.rig import Rig
 from sepi.stage import ERROR_BARS, CostVolume, StageMaps
 from sepi.validation import require_known, require_path
+
+BLOCK = 512
+"""Bytes of the user block; HDF5 wants a power of two, 512 at least."""
+
+_MARK = b"sepi sha256 "
+# a file's time tells a later change when it is so many seconds old, as disks keep times no finer
+_SETTLED = 2
+
+# whether files are sound, by device, number, size and time
+_sound: dict[tuple[int, int, int, int], bool] = {}
+
+
+def members(group: h5py.Group | Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Names and entries of a group, all at once.
+
+    h5py's own iterator holds its lock until it is exhausted. If an error ends a loop early, the lock stays as long as
+    anyone keeps that error: another thread that needs HDF5, even to release a file, would wait for ever.
+    """
+    return list(group.items())
+
+
+def require_held(path: Path, dataset: Any) -> None:
+    """Raise unless a dataset lies in its file and can have as many values as it claims."""
+    name = printable(str(dataset.name).lstrip("/"))
+    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
+        raise SepiError(f"{path}: damaged HDF5 file: '{name}' is no array")
+    if dataset.is_virtual or dataset.external or dataset.file.filename != str(path):
+        raise SepiError(f"{path}: the values of '{name}' lie in another file; copy them into this one")
+    if dataset.dtype.hasobject:
+        # as of such attributes
+        raise SepiError(f"{path}: the values of '{name}' are of variable length; expected numbers")
+    held = dataset.id.get_storage_size()
+    # what is not compressed is stored as it is, but for chunks never written
+    if held > path.stat().st_size or dataset.nbytes > held * (DEFLATE_RATIO if dataset.chunks else 1):
+        raise SepiError(f"{path}: damaged HDF5 file: '{name}' of shape {dataset.shape} cannot lie in {held} bytes")
+
+
+def require_sound(path: Path) -> None:
+    """Refuse a file of this package that does not hold what was written, once looked at by this process."""
+    status = path.stat()
+    now = (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
+    sound = _sound.get(now)
+    if sound is None:
+        sound = _is_as_written(path)
+        if status.st_mtime < time.time() - _SETTLED:
+            _sound[now] = sound
+    if not sound:
+        raise SepiError(f"{path}: damaged, or changed by another program; remove it and make it again")
+
+
+def _is_as_written(path: Path) -> bool:
+    """Whether the digest of a file is that of its bytes; others than those of this package have none."""
+    with path.open("rb") as file:
+        block = file.read(BLOCK)
+        return not block.startswith(_MARK) or block == digest_block(file)
+
+
+def is_own(entry: h5py.Group | h5py.Dataset | None) -> bool:
+    """Whether a group or dataset is in a file that this package wrote: others may call theirs so, too."""
+    if entry is None:
+        return False
+    with Path(entry.file.filename).open("rb") as file:
+        return file.read(len(_MARK)) == _MARK
+
+
+def digest_block(file: io.BufferedReader | io.BufferedRandom) -> bytes:
+    """The user block for what follows in a file."""
+    file.seek(BLOCK)
+    return (_MARK + hashlib.file_digest(file, "sha256").hexdigest().encode()).ljust(BLOCK, b"\0")
+
+
+def fixed_text(text: str) -> np.bytes_:
+    """Text to be stored at a fixed length; HDF5 may hang on a damaged file that holds text of variable length."""
+    return np.bytes_(text.encode() or b"\0")
+
 
 Attribute = str | float | int | tuple[float, ...]
 

@@ -20,8 +20,7 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.io.exr import exr_pixels
 from sepi.io.files import atomic_path, reading
-from sepi.io.picture_headers import Header, pillow_class, read_header
-from sepi.io.pnm import pnm_pixels
+from sepi.io.picture_headers import Header, pillow_class, pnm_pixels, read_header
 from sepi.io.tiff import open_tiff, page_pixels
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
 from sepi.threads import available_cores

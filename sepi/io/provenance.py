@@ -1,20 +1,197 @@
-"""Provenance of a file: the attributes of stage files and results.
+"""Provenance of a file: the attributes of stage files and results, and which light field a result is of.
 
 The entries (:func:`sepi.stage.entry`) of the stages that led to a map, in order, are its history.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+from pydantic import TypeAdapter, ValidationError
+
+from sepi.camera import numbers_of
 from sepi.errors import SepiError
-from sepi.io.hdf5 import Attribute, read_attributes
-from sepi.io.origin import origin_attributes
+from sepi.io.hdf5 import RIG, Attribute, attribute, open_hdf5, read_attributes, read_dataset
+from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.stage import Entry, StageMaps
+
+RESULT = "result.h5"
+
+_FORMAT = "format"
+# a result tells its view anyway; links are followed by leave of who calls, not of who made a file
+_NOT_KEPT = ("view", "follow_links")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The light field that a result was made from, as the result records it.
+
+    Attributes
+    ----------
+    scene, source : str
+        Name and path; empty where the result does not say.
+    view, grid : (int, int)
+        Position of the view that the maps belong to; rows and columns of views.
+    row_spacing : float or None
+        Distance of rows in view steps; None where positions of the views were known, or the result does not say.
+    options : ReadOptions
+        What reads the source so that it is this light field.
+    file_format : str or None
+        Word of the format, where it was given.
+    digest : str
+        :func:`digest_of` the light field; empty in results of earlier versions.
+    picture : ndarray, shape (H, W, C), or None
+        The view.
+    rectified : bool
+        Whether the views are not as cameras took them.
+    files : tuple of str
+        Names of the files that were written with it; empty in results of earlier versions.
+    """
+
+    scene: str
+    source: str
+    view: tuple[int, int]
+    grid: tuple[int, int]
+    row_spacing: float | None
+    options: ReadOptions
+    file_format: str | None
+    digest: str
+    picture: npt.NDArray[np.generic] | None
+    rectified: bool
+    files: tuple[str, ...]
+
+    def is_of(self, light_field: LightField) -> bool:
+        """Whether it is a result of this light field, perhaps as another view, read otherwise, or since changed."""
+        named = light_field.source != "" and (self.source, self.scene) == (light_field.source, light_field.name)
+        return named or self._shows(light_field) or self.digest == digest_of(light_field)
+
+    def difference(self, light_field: LightField) -> str | None:
+        """What is other in a light field that should be the very one that the result was made from; None: nothing."""
+        places = (self.view, self.grid), (light_field.reference_position, light_field.grid)
+        if places[0] != places[1]:
+            own, other = (f"{t},{s} of {rows}x{columns}" for (t, s), (rows, columns) in places)
+            return f"depth of view {own} views, not of view {other}"
+        if self.digest != digest_of(light_field) if self.digest else not self._shows(light_field):
+            return "depth of another light field, or of its views in another order or without some of them"
+        if self.row_spacing is not None and not np.isclose(self.row_spacing, light_field.row_spacing):
+            return f"made with rows of views {self.row_spacing:g} steps apart, not {light_field.row_spacing:g}"
+        return None
+
+    def differs(self, other: Origin) -> bool:
+        """Whether another result is of another view, so that its map cannot be held against this one's."""
+        if self.picture is None or other.picture is None:
+            return (self.view, self.grid) != (other.view, other.grid)
+        return not np.array_equal(self.picture, other.picture)
+
+    def _shows(self, light_field: LightField) -> bool:
+        view = light_field.views[light_field.reference_position]
+        return self.picture is not None and np.array_equal(self.picture, view)
+
+
+DIGEST = "light_field"
+"""Name of the attribute with the :func:`digest_of` a light field."""
+
+
+def origin_attributes(light_field: LightField, digest: str | None = None) -> dict[str, Attribute]:
+    """What a file of maps says of the light field that they were made from, as :func:`read_origin` reads it.
+
+    Parameters
+    ----------
+    light_field : LightField
+    digest : str, optional
+        Its :func:`digest_of`, where that is known.
+    """
+    camera, rig = light_field.camera, light_field.reference_rig
+    return {
+        "view_position": light_field.reference_position,
+        "grid": light_field.grid,
+        "from_centre": light_field.from_centre,
+        DIGEST: digest or digest_of(light_field),
+        **({"reading": light_field.reading} if light_field.reading else {}),
+        **({} if camera is None else {"camera": numbers_of(camera)}),
+        **({} if rig is None else {RIG: rig.to_text()}),
+    }
+
+
+def read_origin(path: Path) -> Origin | None:
+    """What a result says of its light field; None for a file that does not say.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of a result, or an HDF5 file.
+
+    Raises
+    ------
+    SepiError
+        If the file is damaged, or what it says is nonsense.
+    """
+    path = path / RESULT if path.is_dir() else path
+    if path.suffix not in (".h5", ".hdf5") or not path.is_file():
+        return None
+    with open_hdf5(path, "result of 'sepi depth'") as file:
+        known = {name: attribute(file, name) for name in file.attrs}
+        if not {"view_position", "grid"} <= set(known):
+            return None
+        (t, s), (rows, columns) = (map(int, known[name]) for name in ("view_position", "grid"))
+        options, file_format = _reading(path, str(known.get("reading", "")))
+        return Origin(
+            scene=str(known.get("scene", "")),
+            source=str(known.get("source", "")),
+            view=(t, s),
+            grid=(rows, columns),
+            row_spacing=float(known["row_spacing"]) if known.get("positions") == "grid" else None,
+            options=options,
+            file_format=file_format,
+            digest=str(known.get(DIGEST, "")),
+            picture=read_dataset(path, file["view"]) if "view" in file else None,
+            rectified=RIG in known,
+            files=tuple(str(known.get("files", "")).split()),
+        )
+
+
+def digest_of(light_field: LightField) -> str:
+    """Digest of the views in their places; of nothing that other flags may give to the same views."""
+    present, positions = light_field.present, light_field.positions
+    total = hashlib.sha256(f"{light_field.views.shape} {light_field.views.dtype}".encode())
+    total.update(present.tobytes())
+    for t, s in np.argwhere(present).tolist():
+        total.update(np.ascontiguousarray(light_field.views[t, s]).data.cast("B"))
+    if positions is not None:
+        total.update(positions[present].tobytes())
+    return total.hexdigest()
+
+
+def reading_record(options: ReadOptions, file_format: str | None) -> str:
+    """Options and format that a reader does not infer by itself, as JSON; empty if none."""
+    own = {field.name: getattr(options, field.name) for field in fields(options) if field.name not in _NOT_KEPT}
+    given: dict[str, Any] = {name: value for name, value in own.items() if value != getattr(ReadOptions(), name)}
+    if file_format is not None:
+        given[_FORMAT] = file_format
+    return json.dumps(given, sort_keys=True) if given else ""
+
+
+def _reading(path: Path, record: str) -> tuple[ReadOptions, str | None]:
+    """What :func:`reading_record` made a record of."""
+    try:
+        given = json.loads(record or "{}")
+        file_format = given.pop(_FORMAT, None)
+        for name in _NOT_KEPT:
+            given.pop(name, None)
+        options = TypeAdapter(ReadOptions).validate_json(json.dumps(given), strict=True)
+        TypeAdapter(str | None).validate_python(file_format)
+    except (ValueError, AttributeError, TypeError, RecursionError, ValidationError) as error:
+        raise SepiError(f"{path}: damaged: it does not say how its light field was read ({record[:40]!r})") from error
+    return options, file_format
 
 
 def package_version() -> str:
@@ -53,7 +230,7 @@ def result_attributes(light_field: LightField, maps: StageMaps, digest: str | No
     light_field : LightField
     maps : StageMaps
     digest : str, optional
-        As in :func:`sepi.io.origin.origin_attributes`.
+        As in :func:`sepi.io.provenance.origin_attributes`.
     """
     made_by, origin = maps.made_by, origin_attributes(light_field, digest)
     if made_by is None:

@@ -38,13 +38,11 @@ from sepi.io.map_pictures import (
     write_16bit,
     write_error_bars,
 )
-from sepi.io.origin import DIGEST, RESULT
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
-from sepi.io.provenance import result_attributes
-from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, names_as_taken, require_own
-from sepi.io.sound_maps import UNKNOWN, sound_maps
+from sepi.io.provenance import DIGEST, RESULT, result_attributes
+from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, UNKNOWN, names_as_taken, require_own, sound_maps
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.rig import Rig
 from sepi.stage import StageMaps

@@ -20,8 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import Attribute, attribute, create_hdf5, open_hdf5, put, read_dataset
-from sepi.io.integrity import members
+from sepi.io.hdf5 import Attribute, attribute, create_hdf5, members, open_hdf5, put, read_dataset
 from sepi.lightfield import BoolMap, FloatMap
 
 _MAPS, _SCORES = "maps", "scores"

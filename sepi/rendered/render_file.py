@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sepi.io.hdf5 import attribute, create_hdf5, open_hdf5, read_dataset
-from sepi.io.integrity import fixed_text
+from sepi.io.hdf5 import attribute, create_hdf5, fixed_text, open_hdf5, read_dataset
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.rendered.masks import MASKS, mask
 

@@ -22,9 +22,9 @@ from sepi.cameras.rectification import light_field_of, rectification_of
 from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.io.all_views import read_result_at, write_all_views
-from sepi.io.origin import origin_attributes
 from sepi.io.pfm import read_pfm
 from sepi.io.point_cloud import point_cloud
+from sepi.io.provenance import origin_attributes
 from sepi.io.result_files import names_as_taken
 from sepi.io.result_folder import write_as_taken
 from sepi.rig import Lens, Rig, Shot

@@ -19,7 +19,7 @@ from hdf5_edits import changed
 from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.io.hdf5 import write_light_field
-from sepi.io.origin import read_origin
+from sepi.io.provenance import read_origin
 from sepi.lightfield import LightField
 from sepi.report.runs import read_numbers
 from sepi.scenes import render, write_hci

@@ -16,7 +16,7 @@ from sepi.cli.main import main
 from sepi.io.exported import write_exported
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import write_png
-from sepi.io.origin import digest_of
+from sepi.io.provenance import digest_of
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field

@@ -15,8 +15,7 @@ from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field as read_own
 from sepi.io.hdf5 import read_stage
 from sepi.io.images import picture_header, png_texts, read_picture
-from sepi.io.origin import read_origin
-from sepi.io.provenance import history_of
+from sepi.io.provenance import history_of, read_origin
 from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.sizes import size_of

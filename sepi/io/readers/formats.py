@@ -24,7 +24,6 @@ from sepi.io.readers import (
     hci,
     hci_2013,
     hdf5_arrays,
-    hdf5_datasets,
     image_folder,
     matlab,
     mosaic,
@@ -34,7 +33,7 @@ from sepi.io.readers import (
     tiff_stack,
 )
 from sepi.io.readers.arrays import with_white
-from sepi.io.readers.named_arrays import no_light_field
+from sepi.io.readers.named_arrays import hdf5_shapes, no_light_field
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.row_folders import has_rows
 from sepi.lightfield import LightField, Truth
@@ -219,7 +218,7 @@ def _what_else(path: Path) -> str:
         )
     if path.is_file() and h5py.is_hdf5(path):
         with suppress(SepiError):
-            arrays = hdf5_datasets.array_shapes(path)
+            arrays = hdf5_shapes(path)
             if any(len(shape) > 1 for shape, _ in arrays.values()):
                 return no_light_field(arrays)
     return "not a light field of a known format"

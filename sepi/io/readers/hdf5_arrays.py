@@ -6,11 +6,9 @@ import functools
 from pathlib import Path
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import has_dataset
-from sepi.io.integrity import is_own
+from sepi.io.hdf5 import has_dataset, is_own
 from sepi.io.readers.arrays import is_likely
-from sepi.io.readers.hdf5_datasets import array_shapes, read_named
-from sepi.io.readers.named_arrays import light_field_from_arrays
+from sepi.io.readers.named_arrays import hdf5_shapes, light_field_from_arrays, read_hdf5
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
@@ -19,7 +17,7 @@ def matches(path: Path) -> bool:
     """Whether ``path`` is an HDF5 file with an array that may be a light field, and none of this package's."""
     try:
         return has_dataset(path, "/", lambda root: not is_own(root)) and any(
-            is_likely(shape) for shape, _ in array_shapes(path).values()
+            is_likely(shape) for shape, _ in hdf5_shapes(path).values()
         )
     except SepiError:
         return False
@@ -27,4 +25,4 @@ def matches(path: Path) -> bool:
 
 def read(path: Path, options: ReadOptions) -> LightField:
     """Read the array ``options.variable`` of such a file; without it, what can be a light field."""
-    return light_field_from_arrays(path, array_shapes(path), options, functools.partial(read_named, path))
+    return light_field_from_arrays(path, hdf5_shapes(path), options, functools.partial(read_hdf5, path))

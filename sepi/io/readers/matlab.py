@@ -15,17 +15,203 @@ References
 
 from __future__ import annotations
 
+import math
+import struct
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
 
 import h5py
+import numpy as np
+import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.files import reading
-from sepi.io.readers import hdf5_datasets, matlab_5
-from sepi.io.readers.arrays import Array
-from sepi.io.readers.named_arrays import Shapes, light_field_from_arrays
+from sepi.io.files import DEFLATE_RATIO, reading
+from sepi.io.readers.arrays import Array, is_likely
+from sepi.io.readers.named_arrays import MATLAB_HDF5, Shapes, hdf5_shapes, light_field_from_arrays, read_hdf5
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
+
+_HEADER = 128
+"""Bytes before the first element; the last four are version and byte order."""
+
+_ORDERS = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
+"""These four to NumPy's word for the order."""
+
+_MATRIX, _COMPRESSED = 14, 15
+_COMPLEX, _LOGICAL = 0x800, 0x200
+# classes of variables: cell arrays, structures, and arrays of numbers, as which the values are read
+_CELLS, _STRUCTURE = 1, 2
+_CLASSES = dict(zip(range(6, 16), ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"), strict=True))
+# types in which values may be stored
+_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+# enough for all that comes before the values: names have at most 63 letters
+_PREFIX = 4096
+# elements before the values of an array
+_BEFORE = 3
+
+
+class _Part(NamedTuple):
+    """An element: its type, the length that its tag states, and as much of its data as was looked at."""
+
+    kind: int
+    length: int
+    data: bytes | memoryview
+
+
+class _Variable(NamedTuple):
+    """A variable: its first elements, its place and length in the file, and how many bytes it may be unpacked."""
+
+    order: str
+    parts: list[_Part]
+    file: BinaryIO
+    start: int
+    length: int
+    compressed: bool
+    most: int
+
+    @property
+    def flags(self) -> int:
+        """Class and kind of the values; 0 for what is no matrix."""
+        return _flags(self.order, self.parts) if self.parts else 0
+
+    def content(self) -> bytes:
+        """The data of the matrix element."""
+        self.file.seek(self.start)
+        stored = self.file.read(self.length)
+        if not self.compressed:
+            return stored
+        packed = zlib.decompressobj()
+        content = packed.decompress(stored, self.most)[8:]
+        if not packed.eof:
+            raise ValueError("a variable that is cut off")
+        return content
+
+
+def shapes_of_version_5(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+    """Shape and type of the arrays of real numbers, as MATLAB shows them.
+
+    Those in structures, ``scene/LF`` or ``scene(2)/LF``, and cell arrays of pictures that are alike, only where no
+    other may be a light field.
+
+    Raises
+    ------
+    SepiError, ValueError
+        If the file is damaged.
+    """
+    found = {}
+    with path.open("rb") as file:
+        for variable in _variables(path, file):
+            if _is_real(variable.flags):
+                shape, kind, _ = _form(variable.order, variable.parts)
+                found[_text(variable.parts[2])] = shape, kind
+                if variable.parts[_BEFORE].length > variable.most:
+                    raise ValueError("an array that is longer than the file")
+    if not any(is_likely(shape) for shape, _ in found.values()):
+        found |= {name: (array.shape, array.dtype) for name, array in _arrays(path)}
+    return found
+
+
+def read_version_5(path: Path, name: str) -> npt.NDArray[Any]:
+    """One of the arrays that :func:`shapes_of_version_5` found."""
+    return next(array for found, array in _arrays(path, name) if found == name)
+
+
+def _arrays(path: Path, wanted: str = "") -> Iterator[tuple[str, npt.NDArray[Any]]]:
+    """The arrays in structures and cells, and the one that is wanted."""
+    with path.open("rb") as file:
+        for variable in _variables(path, file):
+            name = _text(variable.parts[2]) if variable.parts else ""
+            if variable.flags & 0xFF in (_CELLS, _STRUCTURE) or name == wanted:
+                yield from _fields(variable.order, memoryview(variable.content()), name)
+
+
+def _form(order: str, parts: list[_Part]) -> tuple[tuple[int, ...], np.dtype[Any], np.dtype[Any]]:
+    """Shape and type of an array, and the type as which its values are stored."""
+    _, dimensions, name, values = parts[: _BEFORE + 1]
+    if values.kind not in _TYPES:
+        raise SepiError(f"damaged MATLAB file: an array with values of type {values.kind}")
+    shape, stored = tuple(np.frombuffer(dimensions.data, order + "i4").tolist()), np.dtype(order + _TYPES[values.kind])
+    if math.prod(shape) * stored.itemsize != values.length:
+        raise ValueError(f"{_text(name)} of {values.length} bytes for {shape}")
+    return shape, np.dtype(_CLASSES[_flags(order, parts) & 0xFF]), stored
+
+
+def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+    """Arrays in a matrix element, which a structure or a cell array may be."""
+    parts = _parts(order, data)
+    if any(part.length != len(part.data) for part in parts):
+        raise ValueError(f"{name} is cut off")
+    flags = _flags(order, parts)
+    if flags & 0xFF == _STRUCTURE:
+        width = struct.unpack(order + "i", parts[3].data)[0]
+        text = bytes(parts[4].data)
+        fields = [text[at : at + width].split(b"\0")[0].decode("latin-1") for at in range(0, len(text), width)]
+        values = parts[5:]
+        for number, value in enumerate(values):
+            element, field = divmod(number, len(fields))
+            # an empty one has no data at all
+            if value.kind == _MATRIX and value.length:
+                which = f"({element + 1})" if len(values) > len(fields) else ""
+                yield from _fields(order, memoryview(value.data), f"{name}{which}/{fields[field]}")
+    elif flags & 0xFF == _CELLS:
+        shape = np.frombuffer(parts[1].data, order + "i4").tolist()
+        cells = [cell for part in parts[3:] if part.length for _, cell in _fields(order, memoryview(part.data), name)]
+        if len(cells) == math.prod(shape) and len({(cell.shape, cell.dtype) for cell in cells}) == 1:
+            yield name, np.stack(cells)[np.arange(len(cells)).reshape(shape, order="F").squeeze()]
+    elif _is_real(flags):
+        shape, kind, stored = _form(order, parts)
+        # MATLAB saves doubles that are small whole numbers as bytes
+        yield name, np.frombuffer(parts[_BEFORE].data, stored).reshape(shape, order="F").astype(kind, copy=False)
+
+
+def _variables(path: Path, file: BinaryIO) -> Iterator[_Variable]:
+    order = _ORDERS[file.read(_HEADER)[-4:]]
+    while tag := file.read(8):
+        kind, length = struct.unpack(order + "II", tag)
+        start = file.tell()
+        if start + length > path.stat().st_size:
+            raise SepiError("damaged MATLAB file: it is cut off")
+        head, compressed, most = file.read(min(length, _PREFIX)), kind == _COMPRESSED, length
+        if compressed:
+            most = length * DEFLATE_RATIO
+            head = zlib.decompressobj().decompress(head, _PREFIX)
+            kind, head = struct.unpack_from(order + "I", head)[0], head[8:]
+        parts = _parts(order, head, _BEFORE + 1) if kind == _MATRIX else []
+        # SciPy takes memory on the word of each, of variables that nobody asks for, too
+        if any(part.length > len(part.data) for part in parts[:_BEFORE]):
+            raise ValueError("a variable whose head is longer than the file")
+        yield _Variable(order, parts, file, start, length, compressed, most)
+        file.seek(start + length)
+
+
+def _parts(order: str, data: bytes | memoryview, most: int | None = None) -> list[_Part]:
+    """The elements in the data of a matrix, the first ones alone or all."""
+    parts: list[_Part] = []
+    at = 0
+    while at + 8 <= len(data) and (most is None or len(parts) < most):
+        kind, length = struct.unpack_from(order + "II", data, at)
+        start, after = at + 8, at + 8 + -(-length // 8) * 8
+        if kind >> 16:
+            # up to four bytes of data stand in the tag itself
+            kind, length, start, after = kind & 0xFFFF, kind >> 16, at + 4, at + 8
+        parts.append(_Part(kind, length, data[start : start + length]))
+        at = after
+    return parts
+
+
+def _flags(order: str, parts: list[_Part]) -> int:
+    return int(struct.unpack_from(order + "I", parts[0].data)[0])
+
+
+def _is_real(flags: int) -> bool:
+    return flags & 0xFF in _CLASSES and not flags & (_COMPLEX | _LOGICAL)
+
+
+def _text(part: _Part) -> str:
+    return bytes(part.data).decode("latin-1")
+
 
 _KIND = "MATLAB file"
 
@@ -40,7 +226,7 @@ def matches(path: Path) -> bool:
         head = _head(path)
     except SepiError:
         return False
-    return head[-4:] in matlab_5.BYTE_ORDERS or head.startswith(hdf5_datasets.MATLAB)
+    return head[-4:] in _ORDERS or head.startswith(MATLAB_HDF5)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
@@ -48,7 +234,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
 
     def load(name: str) -> Array:
         with reading(path, _KIND):
-            array: Array = (hdf5_datasets if h5py.is_hdf5(path) else matlab_5).read_named(path, name)
+            array: Array = (read_hdf5 if h5py.is_hdf5(path) else read_version_5)(path, name)
         # the axes that MATLAB dropped
         while array.ndim < len(options.axes or "") <= 5:
             array = array[..., None]
@@ -61,15 +247,15 @@ def array_shapes(path: Path) -> Shapes:
     """Shape and type, as MATLAB shows them, of each array of real numbers in a file; their values are not read."""
     head = _head(path)
     # what begins with a zero is of version 4
-    if head[-4:] in matlab_5.BYTE_ORDERS and 0 not in head[:4]:
+    if head[-4:] in _ORDERS and 0 not in head[:4]:
         with reading(path, _KIND):
-            return matlab_5.array_shapes(path)
+            return shapes_of_version_5(path)
     if h5py.is_hdf5(path):
-        return hdf5_datasets.array_shapes(path)
-    what = "is damaged" if head.startswith(hdf5_datasets.MATLAB) else "is not a MATLAB file of version 5 or 7.3"
+        return hdf5_shapes(path)
+    what = "is damaged" if head.startswith(MATLAB_HDF5) else "is not a MATLAB file of version 5 or 7.3"
     raise SepiError(f"{path}: {what}; save it in MATLAB with -v7 or -v7.3")
 
 
 def _head(path: Path) -> bytes:
     with reading(path, _KIND), path.open("rb") as file:
-        return file.read(matlab_5.HEADER)
+        return file.read(_HEADER)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from sepi.io.hdf5 import has_dataset, read_light_field
-from sepi.io.integrity import is_own
+from sepi.io.hdf5 import has_dataset, is_own, read_light_field
 from sepi.io.readers.arrays import rearrange
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField

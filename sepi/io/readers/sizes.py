@@ -10,8 +10,9 @@ from typing import NamedTuple
 from sepi.errors import SepiError
 from sepi.io.files import DEFLATE_RATIO
 from sepi.io.images import SUFFIXES, picture_header
-from sepi.io.readers import eslf, hdf5_datasets, matlab, numpy_files, open_lf, tiff_stack
+from sepi.io.readers import eslf, matlab, numpy_files, open_lf, tiff_stack
 from sepi.io.readers.arrays import is_likely
+from sepi.io.readers.named_arrays import hdf5_shapes
 
 # what is taken where no header tells: a view of the benchmark
 _USUAL_SIDE = 512
@@ -95,7 +96,7 @@ def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
             arrays = [open_lf.views_shape(path)]
         else:
             # the size alone, of many: whoever reads the views checks the file
-            arrays = list(hdf5_datasets.array_shapes(path, check=False).values())
+            arrays = list(hdf5_shapes(path, check=False).values())
     except SepiError:
         return []
     most = path.stat().st_size * DEFLATE_RATIO
