@@ -15,21 +15,8 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.interrupts import interruptibly
+from sepi.io import hdf5
 from sepi.io.disparity_maps import read_disparity, read_error_bars
-from sepi.io.hdf5 import (
-    PACKED,
-    UNITS,
-    Attribute,
-    attribute,
-    create_hdf5,
-    float_maps,
-    has_dataset,
-    open_hdf5,
-    put,
-    read_camera,
-    read_dataset,
-    read_rig,
-)
 from sepi.io.provenance import Origin, read_origin
 from sepi.io.result_files import ALL_VIEWS
 from sepi.io.result_folder import Result, read_result
@@ -48,7 +35,7 @@ def write_all_views(
     path: Path,
     light_field: LightField,
     views: Iterable[tuple[View, Mapping[str, npt.NDArray[Any]]]],
-    attributes: Mapping[str, Attribute],
+    attributes: Mapping[str, hdf5.Attribute],
 ) -> None:
     """Write the maps of all views, whole or not at all; equal content gives equal bytes.
 
@@ -72,11 +59,11 @@ def write_all_views(
     SepiError
         If the file cannot be written.
     """
-    with create_hdf5(path) as file:
+    with hdf5.create_hdf5(path) as file:
         present = light_field.present
         baselines = np.where(present[..., None], light_field.baselines, np.nan)
-        put(file, "present", present)
-        put(file, "baselines", baselines, axes="t s (down, across)")
+        hdf5.put(file, "present", present)
+        hdf5.put(file, "baselines", baselines, axes="t s (down, across)")
         file.attrs.update(attributes)
         file.attrs["view_position"] = light_field.reference_position
         for position, maps in interruptibly(views):
@@ -150,7 +137,7 @@ def surfaces_of(path: Path, name: str = "disparity") -> Callable[[View], FloatMa
         return None
 
     # checked once, not for each view
-    with open_hdf5(file_path, _KIND) as file:
+    with hdf5.open_hdf5(file_path, _KIND) as file:
         if name not in file:
             return None
 
@@ -165,23 +152,23 @@ def _file_of(path: Path, view: View | None) -> Path | None:
     """The file of maps of all views that is meant; None: the map of a result's own view, or of another program."""
     path = path / ALL_VIEWS if path.is_dir() and view is not None else path
     # of a damaged one is told when it is read
-    return path if has_dataset(path, _MARK, if_damaged=True) else None
+    return path if hdf5.has_dataset(path, _MARK, if_damaged=True) else None
 
 
 def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result:
     """The maps of a view; unchecked, without reading the whole file for its digest."""
-    with open_hdf5(file_path, _KIND, check) as file:
+    with hdf5.open_hdf5(file_path, _KIND, check) as file:
         position = _position(file_path, file, view)
-        baseline = read_dataset(file_path, file["baselines"])[position]
-        down, across = (baseline + attribute(file, "from_centre")).tolist()
-        rig = read_rig(file)
-        maps = float_maps(file_path, file, position)
-        extended, picture = (read_dataset(file_path, file[name], position) for name in (_MARK, "picture"))
+        baseline = hdf5.read_dataset(file_path, file["baselines"])[position]
+        down, across = (baseline + hdf5.attribute(file, "from_centre")).tolist()
+        rig = hdf5.read_rig(file)
+        maps = hdf5.float_maps(file_path, file, position)
+        extended, picture = (hdf5.read_dataset(file_path, file[name], position) for name in (_MARK, "picture"))
         return Result(
-            scene=str(attribute(file, "scene")),
+            scene=str(hdf5.attribute(file, "scene")),
             picture=picture,
             unknown=extended.astype(bool) | (maps["confidence"] == 0),
-            camera=read_camera(file),
+            camera=hdf5.read_camera(file),
             from_centre=(down, across),
             rig=None if rig is None else rig.seen_from(baseline),
             **maps,
@@ -190,8 +177,8 @@ def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result
 
 def _position(path: Path, file: h5py.File, view: View | None) -> View:
     """Row and column of a view that is there; the reference view's unless given."""
-    t, s = map(int, attribute(file, "view_position")) if view is None else view
-    present = read_dataset(path, file["present"])
+    t, s = map(int, hdf5.attribute(file, "view_position")) if view is None else view
+    present = hdf5.read_dataset(path, file["present"])
     rows, columns = present.shape
     if not (0 <= t < rows and 0 <= s < columns and present[t, s]):
         raise SepiError(f"{path}: has no view {t},{s}; there are {present.sum()} of {rows}x{columns}, counted from 0")
@@ -202,10 +189,10 @@ def _dataset(file: h5py.File, name: str, grid: tuple[int, int], values: npt.NDAr
     """The dataset for such values of each view, made where it is not there yet; missing views take no room in it."""
     if name not in file:
         # as in stage files
-        packed = PACKED if values.dtype.itemsize < 4 else {}
+        packed = hdf5.PACKED if values.dtype.itemsize < 4 else {}
         shape, chunks = (*grid, *values.shape), (1, 1, *values.shape)
         file.create_dataset(name, shape, values.dtype, chunks=chunks, fillvalue=_MISSING.get(name), **packed)
         file[name].attrs["axes"] = "t s y x" if values.ndim == 2 else "t s y x channel"
-        if name in UNITS:
-            file[name].attrs["units"] = UNITS[name]
+        if name in hdf5.UNITS:
+            file[name].attrs["units"] = hdf5.UNITS[name]
     return file[name]

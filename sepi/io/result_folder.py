@@ -17,27 +17,9 @@ import numpy.typing as npt
 
 from sepi.camera import Camera, warn_of_infinity
 from sepi.errors import SepiError
+from sepi.io import hdf5, map_pictures
 from sepi.io.files import atomic_path, filled_folder, remove_files
-from sepi.io.hdf5 import (
-    Attribute,
-    attribute,
-    create_hdf5,
-    float_maps,
-    open_hdf5,
-    put_maps,
-    read_camera,
-    read_dataset,
-    read_rig,
-)
 from sepi.io.images import write_png
-from sepi.io.map_pictures import (
-    bars_in_metres,
-    colour_code,
-    levels,
-    names_of_error_bars,
-    write_16bit,
-    write_error_bars,
-)
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
@@ -107,7 +89,7 @@ def write_result(
     folder: str | Path,
     light_field: LightField,
     maps: StageMaps,
-    attributes: Mapping[str, Attribute] | None = None,
+    attributes: Mapping[str, hdf5.Attribute] | None = None,
     *,
     force: bool = False,
     seconds: float | None = None,
@@ -230,16 +212,16 @@ def read_result(path: str | Path) -> Result:
     """
     path = require_path("result", path)
     path = path / RESULT if path.is_dir() else path
-    with open_hdf5(path, "result of 'sepi depth'") as file:
-        picture, maps = read_dataset(path, file["view"]), float_maps(path, file)
-        unknown = read_dataset(path, file[UNKNOWN]) if UNKNOWN in file else np.zeros(maps["disparity"].shape)
-        (t, s), (rows, columns) = (map(int, attribute(file, name)) for name in ("view_position", "grid"))
+    with hdf5.open_hdf5(path, "result of 'sepi depth'") as file:
+        picture, maps = hdf5.read_dataset(path, file["view"]), hdf5.float_maps(path, file)
+        unknown = hdf5.read_dataset(path, file[UNKNOWN]) if UNKNOWN in file else np.zeros(maps["disparity"].shape)
+        (t, s), (rows, columns) = (map(int, hdf5.attribute(file, name)) for name in ("view_position", "grid"))
         # results of earlier versions: rows as far apart as columns, no view off the grid
-        told = attribute(file, "from_centre") if "from_centre" in file.attrs else (t - rows // 2, s - columns // 2)
+        told = hdf5.attribute(file, "from_centre") if "from_centre" in file.attrs else (t - rows // 2, s - columns // 2)
         down, across = map(float, told)
-        scene = str(attribute(file, "scene")) if "scene" in file.attrs else ""
-        camera = read_camera(file)
-        rig = read_rig(file)
+        scene = str(hdf5.attribute(file, "scene")) if "scene" in file.attrs else ""
+        camera = hdf5.read_camera(file)
+        rig = hdf5.read_rig(file)
     shapes = {name: values.shape for name, values in (*maps.items(), (UNKNOWN, unknown))}
     if set(shapes.values()) != {picture.shape[:2]} or picture.shape[2:] not in ((1,), (3,)):
         raise SepiError(f"{path}: damaged: view {picture.shape} and maps {shapes} do not fit together")
@@ -250,17 +232,17 @@ def _write_files(
     folder: Path,
     light_field: LightField,
     maps: StageMaps,
-    attributes: Mapping[str, Attribute],
+    attributes: Mapping[str, hdf5.Attribute],
     seconds: float | None,
     beside: tuple[str, ...],
 ) -> tuple[str, ...]:
     camera, view = light_field.camera, light_field.views[light_field.reference_position]
     masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
     more: dict[str, npt.NDArray[Any]] = {"view": view}
-    metres = bars_in_metres(maps, camera)
+    metres = map_pictures.bars_in_metres(maps, camera)
     if camera is not None:
         more |= {"depth": camera.depth(maps.disparity), **metres}
-    bars = names_of_error_bars(maps, in_metres=bool(metres))
+    bars = map_pictures.names_of_error_bars(maps, in_metres=bool(metres))
     taken = write_as_taken(folder, light_field, maps.disparity, sigma=maps.sigma)
     original = names_as_taken(with_sigma=maps.sigma is not None) if taken else ()
     given = [*([] if camera is None else [DEPTH]), *bars, *original, *([] if seconds is None else [RUNTIME])]
@@ -271,15 +253,15 @@ def _write_files(
         # a digest of all views is among them unless it is known, which takes longest, but not Python's lock
         told = pool.submit(result_attributes, light_field, maps, None if digest is None else str(digest))
         written = [
-            pool.submit(write_16bit, folder / "disparity_16bit.png", maps.disparity),
-            pool.submit(write_error_bars, folder, maps, metres, unknown),
+            pool.submit(map_pictures.write_16bit, folder / "disparity_16bit.png", maps.disparity),
+            pool.submit(map_pictures.write_error_bars, folder, maps, metres, unknown),
             pool.submit(_write_pictures, folder, maps, masks, unknown),
             pool.submit(_write_numbers, folder, light_field, maps, more.get("depth"), seconds),
         ]
         # of these a later result is sure that they are not a user's own
         files = {"files": " ".join(sorted((*names, *beside)))}
-        with create_hdf5(folder / RESULT) as file:
-            put_maps(file, maps.updated(maps.disparity, maps.confidence, **more))
+        with hdf5.create_hdf5(folder / RESULT) as file:
+            hdf5.put_maps(file, maps.updated(maps.disparity, maps.confidence, **more))
             file.attrs.update({**told.result(), **attributes, **files})
         for one in written:
             one.result()
@@ -287,8 +269,8 @@ def _write_files(
 
 
 def _write_pictures(folder: Path, maps: StageMaps, masks: Mapping[str, BoolMap], unknown: BoolMap) -> None:
-    write_png(folder / "disparity.png", colour_code(maps.disparity, unknown))
-    write_png(folder / "confidence.png", levels(maps.confidence))
+    write_png(folder / "disparity.png", map_pictures.colour_code(maps.disparity, unknown))
+    write_png(folder / "confidence.png", map_pictures.levels(maps.confidence))
     for name, mask in masks.items():
         write_png(folder / name, mask, _MASK_TEXT)
 

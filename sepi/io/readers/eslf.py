@@ -48,7 +48,9 @@ def read(path: Path, options: ReadOptions) -> LightField:
     T, S = grid = options.grid or BLOCK
     if not 2 <= T * S <= MAX_VIEWS:
         raise SepiError(f"{path}: --grid {T}x{S}: expected a grid of 2 to {MAX_VIEWS} views")
-    central = options.central or _usual_side(grid)
+    # unless another middle is asked for, 9 views a side or, in a small grid, the largest odd number
+    usual = (min(_CENTRAL, T, S) + 1) // 2 * 2 - 1
+    central = options.central or (usual if usual > 1 else None)
     picture = read_picture(path, any_floats=options.white is not None)
     height, width = picture.shape[0] // T, picture.shape[1] // S
     if min(height, width) < MIN_SIZE:
@@ -65,13 +67,6 @@ def read(path: Path, options: ReadOptions) -> LightField:
     blocks = picture[: height * T, : width * S].reshape(height, T, width, S, -1)
     light_field = light_field_from_array(blocks, path, replace(options, grid=None, central=central), axes="HTWSC")
     return replace(light_field, notes=(*notes, *light_field.notes, *_dark_notes(light_field)))
-
-
-def _usual_side(grid: tuple[int, int]) -> int | None:
-    """Side of the middle that is used unless another is asked for: 9 or, in a small grid, the largest odd number."""
-    side = min(_CENTRAL, *grid)
-    side -= (side + 1) % 2
-    return side if side > 1 else None
 
 
 def _dark_notes(light_field: LightField) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from types import ModuleType
@@ -17,21 +18,6 @@ from sepi.io.disparity_maps import is_disparity
 from sepi.io.files import naming
 from sepi.io.hdf5 import has_dataset
 from sepi.io.images import SUFFIXES
-from sepi.io.readers import (
-    calibrated,
-    eslf,
-    exported,
-    hci,
-    hci_2013,
-    hdf5_arrays,
-    image_folder,
-    matlab,
-    mosaic,
-    numpy_files,
-    open_lf,
-    own_files,
-    tiff_stack,
-)
 from sepi.io.readers.arrays import with_white
 from sepi.io.readers.named_arrays import hdf5_shapes, no_light_field
 from sepi.io.readers.options import ReadOptions
@@ -47,10 +33,11 @@ class Format(NamedTuple):
     ----------
     name, description : str
         For messages.
-    reader : module
-        ``matches(path)`` says whether a path looks like this format, quickly, and never raises; ``read(path, options)``
-        reads a light field as its files have it. It may have ``read_views``, which does so but for ground truth and
-        masks, ``read_truth``, which reads these alone, and ``truth_files``, the files with them.
+    module : str
+        Name of a module of this folder. Its ``matches(path)`` says whether a path looks like this format, quickly, and
+        never raises; ``read(path, options)`` reads a light field as its files have it. It may have ``read_views``,
+        which does so but for ground truth and masks, ``read_truth``, which reads these alone, and ``truth_files``, the
+        files with them.
     options : tuple of str
         What of :class:`ReadOptions` only some formats have a use for, and this one does.
     scales : bool
@@ -59,9 +46,14 @@ class Format(NamedTuple):
 
     name: str
     description: str
-    reader: ModuleType
+    module: str
     options: tuple[str, ...] = ()
     scales: bool = True
+
+    @property
+    def reader(self) -> ModuleType:
+        """The module."""
+        return import_module(f"sepi.io.readers.{self.module}")
 
     def truth_files(self, path: Path) -> Sequence[Path]:
         """The files with ground truth and masks."""
@@ -86,26 +78,26 @@ _SOME = ("grid", "pattern", "axes", "variable", "images", "reference", "follow_l
 
 FORMATS = {
     # before the other folders: its pictures may have any names
-    "exported": Format("exported folder", "written by 'sepi export'", exported, ("follow_links",)),
+    "exported": Format("exported folder", "written by 'sepi export'", "exported", ("follow_links",)),
     # before folders of pictures, which may lie beside
-    "cameras": Format("calibrated cameras", _CAMERAS, calibrated, ("images", "reference"), scales=False),
-    "hci": Format("HCI folder", "input_Cam000.png, ...", hci, ("grid", "follow_links")),
+    "cameras": Format("calibrated cameras", _CAMERAS, "calibrated", ("images", "reference"), scales=False),
+    "hci": Format("HCI folder", "input_Cam000.png, ...", "hci", ("grid", "follow_links")),
     "images": Format(
-        "folder of views", "a numbered picture for each", image_folder, ("grid", "pattern", "follow_links")
+        "folder of views", "a numbered picture for each", "image_folder", ("grid", "pattern", "follow_links")
     ),
-    "mosaic": Format("mosaic of views", "NAME_qs8x6a0.75.png", mosaic, ("grid",)),
-    "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf, ("grid",)),
-    "tiff-stack": Format("TIFF stack", "a page for each view", tiff_stack, ("grid",)),
+    "mosaic": Format("mosaic of views", "NAME_qs8x6a0.75.png", "mosaic", ("grid",)),
+    "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", "eslf", ("grid",)),
+    "tiff-stack": Format("TIFF stack", "a page for each view", "tiff_stack", ("grid",)),
     # before the other kinds of HDF5: MATLAB's is told by its header or ending
-    "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab, _ARRAY_OPTIONS),
-    "numpy": Format("NumPy file", ".npy or .npz", numpy_files, _ARRAY_OPTIONS),
+    "matlab": Format("MATLAB file", ".mat with an array such as LF", "matlab", _ARRAY_OPTIONS),
+    "numpy": Format("NumPy file", ".npy or .npz", "numpy_files", _ARRAY_OPTIONS),
     # before the other kinds with something called LF
-    "openlf": Format("OpenLF HDF5", "with a group LF", open_lf),
-    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci_2013),
+    "openlf": Format("OpenLF HDF5", "with a group LF", "open_lf"),
+    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", "hci_2013"),
     # behind those whose arrays have names of their own
-    "hdf5": Format("HDF5 file", "with an array of all views", hdf5_arrays, _ARRAY_OPTIONS),
+    "hdf5": Format("HDF5 file", "with an array of all views", "hdf5_arrays", _ARRAY_OPTIONS),
     # last, so that it gets what is too damaged to tell
-    "sepi": Format("sepi HDF5", "written by this package", own_files, scales=False),
+    "sepi": Format("sepi HDF5", "written by this package", "own_files", scales=False),
 }
 """Word for ``--format`` to format; the first that matches reads."""
 

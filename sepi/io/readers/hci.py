@@ -149,7 +149,11 @@ def _views_in(path: Path, options: ReadOptions, parameters: _Parameters) -> tupl
     with naming(path / PARAMETERS):
         given = parameters.pair("num_cams_y", "num_cams_x")
     files = _numbered_views(path)
-    grid = options.grid or given or _square_grid(path, files)
+    side = math.isqrt(max(files) + 1)
+    grid = options.grid or given or (side, side)
+    if options.grid is given is None and side**2 != max(files) + 1:
+        what = f"{path}: views up to {files[max(files)].name} make {max(files) + 1}, which is no square grid"
+        raise SepiError(f"{what}; give --grid ROWSxCOLUMNS, or num_cams_x and num_cams_y in {PARAMETERS}")
     if max(files) >= grid[0] * grid[1]:
         source = "--grid" if options.grid else PARAMETERS
         raise SepiError(f"{files[max(files)]}: beyond the {grid[0]}x{grid[1]} grid that {source} gives")
@@ -198,16 +202,6 @@ def _numbered_views(folder: Path) -> dict[int, Path]:
     if not views:
         raise SepiError(f"{folder}: no views (expected input_Cam000.png, input_Cam001.png, ...)")
     return views
-
-
-def _square_grid(folder: Path, views: dict[int, Path]) -> tuple[int, int]:
-    """The square grid that ends with the last view."""
-    highest = max(views)
-    side = math.isqrt(highest + 1)
-    if side**2 != highest + 1:
-        what = f"{folder}: views up to {views[highest].name} make {highest + 1}, which is no square grid"
-        raise SepiError(f"{what}; give --grid ROWSxCOLUMNS, or num_cams_x and num_cams_y in {PARAMETERS}")
-    return side, side
 
 
 def _parameters_of(folder: Path) -> _Parameters:

@@ -28,7 +28,7 @@ from sepi.io.readers.arrays import light_field_from_array
 from sepi.io.readers.options import ReadOptions, arrange_numbers
 from sepi.lightfield import FloatMap, LightField
 
-DepthMap = npt.NDArray[np.float64]
+DepthMap = npt.NDArray[Any]
 
 VIEWS = "LF"
 DEPTH = "GT_DEPTH"
@@ -97,22 +97,18 @@ def _read_depth(path: Path, file: h5py.File, shape: tuple[int, ...], view: tuple
     dataset = file[DEPTH]
     if dataset.shape == shape[2:4]:
         centre = shape[0] // 2, shape[1] // 2
-        return _as_numbers(read_dataset(path, dataset)) if view == centre else None
+        return read_dataset(path, dataset) if view == centre else None
     if dataset.shape == shape[:4]:
-        return _as_numbers(read_dataset(path, dataset, view))
+        return read_dataset(path, dataset, view)
     raise SepiError(f"{path}: '{DEPTH}' has shape {dataset.shape}; expected {shape[:4]}, or the centre view's")
-
-
-def _as_numbers(depth: npt.NDArray[Any]) -> DepthMap:
-    # a number that is none may be of a sort that is warned of
-    with np.errstate(invalid="ignore"):
-        return depth.astype(np.float64)
 
 
 def _disparity(depth: DepthMap, camera: Camera) -> FloatMap:
     """Disparity of a depth map; NaN where the depth is not a positive number."""
-    known = np.isfinite(depth) & (depth > 0)
-    with np.errstate(over="ignore"):
+    # a number that is none may be of a sort that is warned of
+    with np.errstate(over="ignore", invalid="ignore"):
+        depth = depth.astype(np.float64)
+        known = np.isfinite(depth) & (depth > 0)
         disparity = (camera.scale / np.where(known, depth, 1) - camera.offset).astype(np.float32)
     disparity[~(known & np.isfinite(disparity))] = np.nan
     return disparity

@@ -21,19 +21,13 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.io.files import name_of
 from sepi.io.images import SUFFIXES, picture_header
+from sepi.io.readers import view_names
 from sepi.io.readers.camera_positions import off_grid, positions_from_cameras
 from sepi.io.readers.name_groups import EXAMPLES, Kind, fill, origin
 from sepi.io.readers.options import ReadOptions, is_position, unarranged
 from sepi.io.readers.row_folders import files_in, has_rows, numbered, view_files
 from sepi.io.readers.view_files import MAX_VIEWS, read_grid
-from sepi.io.readers.view_names import (
-    ViewNumbers,
-    decimals_in,
-    infer_view_numbers,
-    pair_view_numbers,
-    parse_view_numbers,
-    sorted_view_numbers,
-)
+from sepi.io.readers.view_names import ViewNumbers
 from sepi.lightfield import LightField
 
 _POSITIONS_PER_PICTURE = 100
@@ -142,7 +136,11 @@ def _by_row_and_column(folder: Path, named: ViewNumbers, numbers: Numbers, optio
         step = 1 if spread[0] < grid[0] and spread[1] < grid[1] else step
     else:
         grid = spread[0] // step + 1, spread[1] // step + 1
-        _require_plausible(folder, grid, numbers)
+        if grid[0] * grid[1] > min(MAX_VIEWS, _POSITIONS_PER_PICTURE * len(numbers)):
+            raise SepiError(
+                f"{folder}: the names ({next(iter(numbers))}) give a grid of {grid[0]}x{grid[1]} for {len(numbers)} "
+                f"pictures; say which numbers are row and column with --pattern, such as {EXAMPLES}"
+            )
     if spread[0] // step >= grid[0] or spread[1] // step >= grid[1]:
         raise SepiError(
             f"{folder}: rows {top} to {max(rows)}, columns {left} to {max(columns)}; --grid has {grid[0]}x{grid[1]}"
@@ -178,7 +176,8 @@ def _by_number(folder: Path, named: ViewNumbers, numbers: Numbers, grid: tuple[i
     count = grid[0] * grid[1]
     values = [number for (number,) in numbers.values()]
     lowest, highest = min(values), max(values)
-    base = _base(lowest, highest, count)
+    # 0 or 1 is the number of the first position where only that lets the numbers end with the grid
+    base = highest - count + 1 if lowest > 1 and highest in (count - 1, count) else lowest
     # numbers that are missing, if the grid has a position for them
     step = 1 if highest - base < count else origin(values)[1]
     fits = (highest - base) // step < count
@@ -206,22 +205,6 @@ def _sorted(folder: Path, numbers: Numbers, grid: tuple[int, int]) -> Layout:
     ranked = sorted(numbers, key=lambda name: numbers[name])
     notes = [f"{_sorted_note(numbers)}, taken row by row; --order transpose if by columns"]
     return Layout(grid, {name: rank for rank, name in enumerate(ranked)}, notes)
-
-
-def _base(lowest: int, highest: int, count: int) -> int:
-    """The number of the first position: 0 or 1 where only that lets the numbers end with the grid."""
-    if lowest > 1 and highest in (count - 1, count):
-        return highest - count + 1
-    return lowest
-
-
-def _require_plausible(folder: Path, grid: tuple[int, int], numbers: Numbers) -> None:
-    positions, pictures = grid[0] * grid[1], len(numbers)
-    if positions > min(MAX_VIEWS, _POSITIONS_PER_PICTURE * pictures):
-        raise SepiError(
-            f"{folder}: the names ({next(iter(numbers))}) give a grid of {grid[0]}x{grid[1]} positions for "
-            f"{pictures} pictures; say which numbers are row and column with --pattern, such as {EXAMPLES}"
-        )
 
 
 def _sorted_note(numbers: Numbers) -> str:
@@ -267,7 +250,8 @@ def read(path: Path, options: ReadOptions) -> LightField:
         raise SepiError(f"{path}: only one view, {next(iter(named.numbers))}; depth needs at least two")
     _require_different(path, named)
     for name, why in odd.items():
-        _require_no_place(path, named, name, why, options)
+        if name in widened(path, named, named.numbers, _numbers_of(named, [name]), options).positions:
+            raise SepiError(f"{path / name}: {why}; all views must be alike; replace it, or pass --exclude {name}")
     layout = widened(path, named, named.numbers, _numbers_of(named, excluded), options)
     if not layout.arranged:
         options = unarranged(options)
@@ -298,24 +282,22 @@ def _views(folder: Path, names: Sequence[str], options: ReadOptions) -> tuple[Vi
     """
     odd = odd_pictures(folder, filter(_is_picture, names))
     named = _named(folder, [name for name in names if name not in odd], options)
-    if not odd:
-        # among pictures of other names, such as small copies of all views, none may stand out
-        odd = odd_pictures(folder, named.numbers)
-        if odd:
-            named = _named(folder, [name for name in names if name not in odd], options)
+    # among pictures of other names, such as small copies of all views, none may stand out
+    if not odd and (odd := odd_pictures(folder, named.numbers)):
+        named = _named(folder, [name for name in names if name not in odd], options)
     return named, odd
 
 
 def _named(folder: Path, names: Sequence[str], options: ReadOptions) -> ViewNumbers:
     if options.pattern is not None:
-        return parse_view_numbers(str(folder), names, options.pattern)
+        return view_names.parse_view_numbers(str(folder), names, options.pattern)
     try:
-        return pair_view_numbers(names) or infer_view_numbers(str(folder), names)
+        return view_names.pair_view_numbers(names) or view_names.infer_view_numbers(str(folder), names)
     except SepiError:
         # a grid that is given and filled needs no more than an order
         if options.grid is None or math.prod(options.grid) != len(names):
             raise
-        return sorted_view_numbers(names)
+        return view_names.sorted_view_numbers(names)
 
 
 def _is_picture(name: str) -> bool:
@@ -327,15 +309,9 @@ def _numbers_of(named: ViewNumbers, names: Iterable[str]) -> Numbers:
     return {name: numbers for name in sorted(names) if (numbers := named.numbers_of(name)) is not None}
 
 
-def _require_no_place(folder: Path, named: ViewNumbers, name: str, why: str, options: ReadOptions) -> None:
-    """Raise where a picture that is unlike the views is needed as one."""
-    if name in widened(folder, named, named.numbers, _numbers_of(named, [name]), options).positions:
-        raise SepiError(f"{folder / name}: {why}; all views must be alike; replace it, or pass --exclude {name}")
-
-
 def _with_positions(light_field: LightField, layout: Layout, numbers: npt.NDArray[np.int64]) -> LightField:
     """The light field with the positions of its cameras where two decimal numbers of the names fit its grid."""
-    decimals = decimals_in(list(layout.positions))
+    decimals = view_names.decimals_in(list(layout.positions))
     given = np.full((layout.grid[0] * layout.grid[1], len(decimals[0])), np.nan)
     given[list(layout.positions.values())] = decimals
     for pair in combinations(range(given.shape[1]), 2):
@@ -346,13 +322,9 @@ def _with_positions(light_field: LightField, layout: Layout, numbers: npt.NDArra
             on_grid = strays < _ON_GRID
             apart = f"rows {row_spacing:.3g} steps apart, " if min(numbers.shape) > 1 else ""
             where = "on the grid" if on_grid else f"off the grid by up to {strays:.2g} steps"
-            return replace(
-                light_field,
-                positions=None if on_grid else positions,
-                row_spacing=row_spacing,
-                directions=directions,
-                notes=(*light_field.notes, f"camera positions from the names; {apart}{where}"),
-            )
+            notes = (*light_field.notes, f"camera positions from the names; {apart}{where}")
+            light_field = replace(light_field, row_spacing=row_spacing, directions=directions, notes=notes)
+            return light_field if on_grid else replace(light_field, positions=positions)
     return light_field
 
 

@@ -169,7 +169,7 @@ class NameGroup:
                 groups[texts].append(name)
         self.names = _largest(source, groups)
         self._texts, self._first = self._cut(self.names[0])
-        self._hyphens = separators([sign for sign, _ in self._cut(name)[1]] for name in self.names)
+        self._hyphens = hyphens([sign for sign, _ in self._cut(name)[1]] for name in self.names)
         self._origins = [(0, 1)] * len(self._first)
         self.columns = self._values()
         if decimals_count:
@@ -279,7 +279,7 @@ def _largest(source: str, groups: Mapping[tuple[str, ...], list[str]]) -> list[s
     return ranked[0]
 
 
-def separators(signs: Iterable[Sequence[str]]) -> list[str]:
+def hyphens(signs: Iterable[Sequence[str]]) -> list[str]:
     """Of the signs before each number, those that all names have: hyphens, where no sign is a plus."""
     columns = [list(column) for column in zip(*signs, strict=True)]
     signed = any("+" in sign for column in columns for sign in column)

@@ -73,9 +73,7 @@ def read_grid(
 def _require_within(folder: Path, paths: Iterable[Path]) -> None:
     """Raise if one of the files is a link that leads out of the folder."""
     home = folder.resolve()
-    for path in paths:
-        if not path.is_symlink():
-            continue
+    for path in filter(Path.is_symlink, paths):
         try:
             target = path.resolve()
         except (OSError, RuntimeError) as error:

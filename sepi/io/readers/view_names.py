@@ -9,17 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from sepi.errors import SepiError
-from sepi.io.readers.name_groups import (
-    DECIMAL,
-    EXAMPLES,
-    MAX_DIGITS,
-    Counting,
-    Kind,
-    NameGroup,
-    fill,
-    separators,
-    signed,
-)
+from sepi.io.readers.name_groups import DECIMAL, EXAMPLES, MAX_DIGITS, Counting, Kind, NameGroup, fill, hyphens, signed
 
 _FIELDS = ("row", "column", "number")
 # names of the two views of a pair
@@ -81,16 +71,12 @@ def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewN
         found = f"; found: {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}" if names else ""
         raise SepiError(f"{source}: no file has a name like '{pattern}'{found}")
     # where all have a minus sign it only separates
-    hyphens = [all(match[field].startswith("-") for match in matches.values()) for field in fields]
+    signs = [all(match[field].startswith("-") for match in matches.values()) for field in fields]
 
     def numbers_of(name: str) -> tuple[int, ...] | None:
         match = form.fullmatch(name)
-        if match is None:
-            return None
-        return tuple(
-            abs(int(match[field])) if hyphen else int(match[field])
-            for field, hyphen in zip(fields, hyphens, strict=True)
-        )
+        values = [] if match is None else [int(match[field]) for field in fields]
+        return tuple(abs(n) if hyphen else n for n, hyphen in zip(values, signs, strict=False)) or None
 
     return ViewNumbers(
         {name: numbers for name in matches if (numbers := numbers_of(name)) is not None},
@@ -150,9 +136,9 @@ def decimals_in(names: Sequence[str]) -> list[tuple[float, ...]]:
     found = [[re.split("(?=[0-9])", text, maxsplit=1) for text in re.findall(DECIMAL, stem)] for stem in stems]
     if len(set(map(len, found))) != 1:
         return [()] * len(names)
-    hyphens = separators([sign for sign, _ in row] for row in found)
+    separators = hyphens([sign for sign, _ in row] for row in found)
     return [
-        tuple(signed(sign, text, hyphen, float) for (sign, text), hyphen in zip(row, hyphens, strict=True))
+        tuple(signed(sign, text, hyphen, float) for (sign, text), hyphen in zip(row, separators, strict=True))
         for row in found
     ]
 
@@ -202,14 +188,8 @@ def _compiled(source: str, pattern: str) -> re.Pattern[str]:
     fields = sorted(part for part in parts if part[0] in "{}")
     touching = any(first[0] == "{" == second[0] for first, second in pairwise(parts))
     # no file's name is longer
-    if (
-        fields not in (["{column}", "{row}"], ["{number}"])
-        or touching
-        or len(pattern) > 255
-        or pattern.count("/") > 1
-        or pattern.startswith(("/", "."))
-        or "\\" in pattern
-    ):
+    no_name = len(pattern) > 255 or pattern.count("/") > 1 or pattern.startswith(("/", ".")) or "\\" in pattern
+    if fields not in (["{column}", "{row}"], ["{number}"]) or touching or no_name:
         raise SepiError(
             f"{source}: pattern '{pattern[:255]}': expected the name of a file in the folder, or ROW/NAME, with "
             f"{{row}} and {{column}} once each and something between them, or {{number}} once; such as {EXAMPLES}"
