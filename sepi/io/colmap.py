@@ -78,7 +78,7 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
                 # as ``--ImageReader.mask_path`` and ``--StereoFusion.mask_path`` look for them
                 write_png(temporary / "masks" / f"{name}.png.png", posed.shown(view))
             stereo = f"{name}.png.geometric.bin"
-            write_depth(temporary / "stereo/depth_maps" / stereo, posed.depth(carried))
+            _write_maps(temporary / "stereo/depth_maps" / stereo, posed.depth(carried)[None])
             _write_maps(temporary / "stereo/normal_maps" / stereo, posed.normals(view, carried))
             progress((view + 1) / len(posed.poses))
         for name, lines in {
@@ -91,11 +91,6 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
                 file.writelines(f"{line}\n" for line in lines)
         for path in (temporary / "sparse/0").iterdir():
             shutil.copyfile(path, temporary / "sparse" / path.name)
-
-
-def write_depth(path: Path, depth: FloatMap) -> None:
-    """Write a depth map (H, W) in COLMAP's binary format."""
-    _write_maps(path, depth[None])
 
 
 def _write_maps(path: Path, maps: FloatMap) -> None:

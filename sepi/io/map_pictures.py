@@ -30,6 +30,8 @@ BEYOND = 0.005
 
 # none of the colours of the scale
 _GREY = 128
+_FORMULA = "disparity = (value - 1) * scale + offset; value 0: unknown"
+_STEPS = "pixels per view step"
 
 
 def colour_code(values: FloatMap, unknown: BoolMap | None = None) -> Picture:
@@ -101,16 +103,7 @@ def write_16bit(path: Path, disparity: FloatMap) -> None:
     scale = (high - low) / 65534 if high > low else 1.0
     levels = np.zeros(disparity.shape, np.uint16)
     levels[finite] = np.rint((values - low) / scale) + 1
-    write_png(
-        path,
-        levels,
-        {
-            "Description": "disparity = (value - 1) * scale + offset; value 0: unknown",
-            "scale": repr(scale),
-            "offset": repr(low),
-            "units": "pixels per view step",
-        },
-    )
+    write_png(path, levels, {"Description": _FORMULA, "scale": repr(scale), "offset": repr(low), "units": _STEPS})
 
 
 # a scale of less than a decade would make differences of a map that has none

@@ -23,16 +23,15 @@ References
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.images import write_png
 from sepi.io.ply import write_ply
+from sepi.io.point_cloud import PointCloud
 from sepi.lightfield import FloatMap
 from sepi.rig import WORLD
 from sepi.stage import Progress, no_progress
@@ -43,22 +42,7 @@ if TYPE_CHECKING:
 
 _MILLIMETRES = 1000
 _CLOUD = "points.ply"
-
-
-@dataclass(frozen=True)
-class _WorldCloud:
-    """The points in the axes of the world."""
-
-    positions: Points
-    colours: npt.NDArray[np.uint8]
-    units: str
-    calibrated: bool
-
-    def comments(self) -> tuple[str, ...]:
-        """What the numbers are."""
-        if self.calibrated:
-            return WORLD, self.units
-        return "x right, y the way that the cameras look, z up", f"{self.units}; origin: camera of the reference view"
+_AXES = "x right, y the way that the cameras look, z up"
 
 
 def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress = no_progress) -> None:
@@ -89,8 +73,9 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
                 write_png(temporary / "masks" / f"{name}.png", posed.shown(view))
             progress((view + 1) / len(posed.poses))
         if posed.chosen.any():
-            cloud = _WorldCloud(_world(posed, posed.points), posed.colours, posed.units, posed.rig is not None)
-            write_ply(temporary / _CLOUD, cloud)
+            cloud = PointCloud(_world(posed, posed.points), posed.colours, metric=True)
+            axes = _AXES, f"{posed.units}; origin: camera of the reference view"
+            write_ply(temporary / _CLOUD, cloud, axes if posed.rig is None else (WORLD, posed.units))
         with atomic_path(temporary / "transforms.json") as path:
             path.write_text(json.dumps(_transforms(posed), indent=1) + "\n", encoding="ascii")
 
@@ -110,12 +95,7 @@ def _transforms(posed: PosedViews) -> dict[str, Any]:
             # of all views, or none
             **({"depth_sigma_file_path": f"depth_sigmas/{name}.npy"} if posed.sure else {}),
             **({"mask_path": f"masks/{name}.png"} if posed.incomplete else {}),
-            "w": width,
-            "h": height,
-            "fl_x": focal,
-            "fl_y": focal,
-            "cx": x,
-            "cy": y,
+            **dict(zip(("w", "h", "fl_x", "fl_y", "cx", "cy"), (width, height, focal, focal, x, y), strict=True)),
             "transform_matrix": _camera_to_world(posed, centre),
         }
         for name, (x, y), centre in zip(
@@ -135,8 +115,7 @@ def _world(posed: PosedViews, points: Points) -> Points:
 
 def _camera_to_world(posed: PosedViews, centre: list[float]) -> list[list[float]]:
     """Columns: the camera's right, up and back in the world, and its place."""
+    axes = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
     if posed.rig is not None:
         axes = (posed.rotation * [[1], [-1], [-1]]).T.tolist()
-        return [[*axis, place] for axis, place in zip(axes, centre, strict=True)] + [[0.0, 0.0, 0.0, 1.0]]
-    x, y, z = centre
-    return [[1.0, 0.0, 0.0, x], [0.0, 0.0, -1.0, y], [0.0, 1.0, 0.0, z], [0.0, 0.0, 0.0, 1.0]]
+    return [*([*axis, place] for axis, place in zip(axes, centre, strict=True)), [0.0, 0.0, 0.0, 1.0]]

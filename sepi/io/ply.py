@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal, Protocol
 
@@ -38,7 +39,7 @@ class Cloud(Protocol):
         """What the numbers are, for the file's header."""
 
 
-def write_ply(path: str | Path, cloud: Cloud) -> None:
+def write_ply(path: str | Path, cloud: Cloud, comments: Sequence[str] | None = None) -> None:
     """Write coloured points as a binary little-endian PLY, whole or not at all; equal points give equal bytes.
 
     Parameters
@@ -48,6 +49,8 @@ def write_ply(path: str | Path, cloud: Cloud) -> None:
         sigma, each vertex has a property of that name, which CloudCompare shows as a scalar field.
     cloud : Cloud
         Such as a :class:`~sepi.io.point_cloud.PointCloud`.
+    comments : sequence of str, optional
+        What the numbers are, where it is not what the cloud says.
 
     Raises
     ------
@@ -56,7 +59,8 @@ def write_ply(path: str | Path, cloud: Cloud) -> None:
 
     Examples
     --------
-    >>> from pathlib import Path
+    >>> from collections.abc import Sequence
+    from pathlib import Path
     >>> from sepi.io.ply import write_ply
     >>> from sepi.io.point_cloud import point_cloud
     >>> from sepi.scenes import render
@@ -81,7 +85,7 @@ def write_ply(path: str | Path, cloud: Cloud) -> None:
     header = [
         "ply",
         "format binary_little_endian 1.0",
-        *(f"comment {comment}" for comment in cloud.comments()),
+        *(f"comment {comment}" for comment in (cloud.comments() if comments is None else comments)),
         f"element vertex {len(points)}",
         *(f"property {words}" for words in properties),
         "end_header",
