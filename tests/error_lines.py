@@ -8,6 +8,8 @@ import pytest
 from click.testing import Result
 
 from sepi.errors import SepiError
+from sepi.io.readers.formats import read
+from sepi.io.readers.options import ReadOptions
 from sepi.reading import read_light_field
 
 
@@ -19,6 +21,13 @@ def error_of(called: Result) -> str:
     (line,) = called.stderr.splitlines()
     assert line.startswith("sepi: ")
     return line
+
+
+def refused(path: Path, file_format: str | None = None, **options: Any) -> str:
+    """The one line, which names it, of the error with which a light field is not read with these options."""
+    message = reading_error(path, lambda path: read(path, ReadOptions(**options), file_format))
+    assert str(path) in message
+    return message
 
 
 def reading_error(path: Path, read: Callable[[Path], Any] = read_light_field) -> str:

@@ -73,7 +73,7 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
                 write_png(temporary / "masks" / f"{name}.png", posed.shown(view))
             progress((view + 1) / len(posed.poses))
         if posed.chosen.any():
-            cloud = PointCloud(_world(posed, posed.points), posed.colours, metric=True)
+            cloud = PointCloud(_world(posed, posed.points).astype(np.float32), posed.colours, metric=True)
             axes = _AXES, f"{posed.units}; origin: camera of the reference view"
             write_ply(temporary / _CLOUD, cloud, axes if posed.rig is None else (WORLD, posed.units))
         with atomic_path(temporary / "transforms.json") as path:

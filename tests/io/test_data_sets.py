@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,6 +17,8 @@ from sepi.io.colmap import write_colmap
 from sepi.io.nerfstudio import write_nerfstudio
 from sepi.lightfield import LightField
 from sepi.scenes import render
+
+pycolmap = pytest.importorskip("pycolmap")
 
 CAMERA = Camera(scale=30.0, offset=6.0, focal_px=90.0)
 NORMALS = "model/stereo/normal_maps/view_01_01.png.geometric.bin"
@@ -35,54 +37,8 @@ def posed_of(scene: LightField, **options: Any) -> PosedViews:
     return posed_views(scene, np.asarray(scene.ground_truth), **{"max_points": 300, **options})
 
 
-class Image(NamedTuple):
-    """An image of a COLMAP model: how it sees the world, and its keypoints."""
-
-    name: str
-    matrix: np.ndarray
-    rotation: np.ndarray
-    translation: np.ndarray
-    keypoints: np.ndarray
-    points: np.ndarray
-
-    def sees(self, world: np.ndarray) -> np.ndarray:
-        """Pixels (x, y) of points (P, 3), the middle of the first pixel being (0.5, 0.5)."""
-        local = world @ self.rotation.T + self.translation
-        seen = local @ self.matrix.T
-        return seen[:, :2] / seen[:, 2:]
-
-
 def lines_of(path: Path) -> list[list[str]]:
     return [line.split() for line in path.read_text().splitlines() if not line.startswith("#")]
-
-
-def rotation(w: float, x: float, y: float, z: float) -> np.ndarray:
-    """Rotation matrix of a unit quaternion in Hamilton's convention."""
-    turn = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + 2 * w * turn + 2 * turn @ turn
-
-
-def read_model(folder: Path) -> tuple[dict[int, Image], dict[int, np.ndarray], dict[int, list[tuple[int, int]]]]:
-    """Images by their numbers, points by theirs, and the points' tracks, as COLMAP's documentation has the files."""
-    cameras = {}
-    for number, model, width, height, *numbers in lines_of(folder / "cameras.txt"):
-        assert (model, width, height) == ("PINHOLE", "64", "64")
-        fx, fy, cx, cy = map(float, numbers)
-        cameras[number] = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
-    lines = lines_of(folder / "images.txt")
-    images = {}
-    for head, body in zip(lines[::2], lines[1::2], strict=True):
-        quaternion, translation = np.array(head[1:5], float), np.array(head[5:8], float)
-        points = np.array(body, float).reshape(-1, 3)
-        images[int(head[0])] = Image(
-            head[9], cameras[head[8]], rotation(*quaternion), translation, points[:, :2], points[:, 2].astype(int)
-        )
-    found = {int(line[0]): np.array(line[1:4], float) for line in lines_of(folder / "points3D.txt")}
-    tracks = {
-        int(line[0]): [(int(image), int(place)) for image, place in zip(line[8::2], line[9::2], strict=True)]
-        for line in lines_of(folder / "points3D.txt")
-    }
-    return images, found, tracks
 
 
 def read_depth(path: Path) -> np.ndarray:
@@ -104,23 +60,26 @@ def test_colmap_model_sees_points_where_the_views_show_them(
     scene = scene_of(geometry, view=view)
     posed = posed_of(scene)
     write_colmap(tmp_path / "model", posed)
-    images, points, tracks = read_model(tmp_path / "model/sparse/0")
+    model = pycolmap.Reconstruction(tmp_path / "model/sparse/0")
     places = {f"view_{t:02}_{s:02}.png": (t, s) for t, s in np.argwhere(scene.present)}
-    assert [image.name for image in images.values()] == list(places)
+    images = [model.images[number] for number in sorted(model.images)]
+    assert [image.name for image in images] == list(places)
     pixels = np.argwhere(posed.chosen)
-    assert len(points) == len(pixels) > 100
-    for image in images.values():
-        world = np.array([points[point] for point in image.points])
-        np.testing.assert_allclose(image.sees(world), image.keypoints, rtol=0, atol=1e-9)
-        y, x = pixels[image.points - 1].T
+    assert model.num_points3D() == len(pixels) > 100
+    for image in images:
+        seen = [point for point in image.points2D if point.has_point3D()]
+        assert len(seen) == len(image.points2D)
+        numbers, keypoints = (np.array([getattr(point, key) for point in seen]) for key in ("point3D_id", "xy"))
+        projected = [image.project_point(model.points3D[number].xyz) for number in numbers]
+        np.testing.assert_allclose(projected, keypoints, rtol=0, atol=1e-9)
+        y, x = pixels[numbers - 1].T
         disparity = posed.disparity[y, x].astype(float)
         down, across = scene.baselines[places[image.name]]
         expected = np.column_stack([x - disparity * across, y - disparity * down]) + 0.5
-        np.testing.assert_allclose(image.keypoints, expected, rtol=0, atol=1e-9)
-    for point, track in tracks.items():
-        for number, place in track:
-            assert images[number].points[place] == point
-    assert sum(map(len, tracks.values())) == sum(len(image.points) for image in images.values())
+        np.testing.assert_allclose(keypoints, expected, rtol=0, atol=1e-9)
+    elements = [(number, one) for number, point in model.points3D.items() for one in point.track.elements]
+    assert all(model.images[one.image_id].points2D[one.point2D_idx].point3D_id == number for number, one in elements)
+    assert len(elements) == sum(len(image.points2D) for image in images)
 
 
 def test_tracks_leave_out_views_in_which_a_point_is_hidden(tmp_path: Path) -> None:
@@ -175,7 +134,6 @@ def test_colmap_depth_is_that_of_the_camera(tmp_path: Path) -> None:
 
 def test_colmap_fuses_the_workspace(tmp_path: Path) -> None:
     """Users fuse to a dense cloud as their next step; of a slanted plane it must be one, facing the cameras."""
-    pycolmap = pytest.importorskip("pycolmap")
     scene = render("slanted_plane", size=64, views=3)
     write_colmap(tmp_path / "model", posed_of(LightField(scene.views, "plane", ground_truth=scene.ground_truth)))
     options = pycolmap.StereoFusionOptions()
@@ -197,18 +155,10 @@ def test_colmap_fuses_the_workspace(tmp_path: Path) -> None:
         ).read_bytes()
 
 
-def test_colmap_itself_reads_the_model(tmp_path: Path) -> None:
-    """What COLMAP's own library makes of it: poses, cameras, tracks, and depth."""
-    pycolmap = pytest.importorskip("pycolmap")
+def test_colmap_itself_reads_places_and_depth(tmp_path: Path) -> None:
     posed = posed_of(scene_of("closer rows"))
     write_colmap(tmp_path / "model", posed)
     model = pycolmap.Reconstruction(tmp_path / "model/sparse/0")
-    assert (model.num_images(), model.num_points3D()) == (8, len(posed.points))
-    for point in model.points3D.values():
-        for element in point.track.elements:
-            image = model.images[element.image_id]
-            there = image.points2D[element.point2D_idx].xy
-            np.testing.assert_allclose(image.project_point(point.xyz), there, rtol=0, atol=1e-9)
     image = model.find_image_with_name("view_02_01.png")
     np.testing.assert_allclose(image.projection_center(), [0, 0.43 * 30 / 90, 0], atol=1e-12)
     depth = pycolmap.DepthMap()

@@ -192,12 +192,6 @@ def test_a_full_disk_is_one_line_for_each_kind_of_file(tmp_path: Path) -> None:
     assert names_in(tmp_path) == []
 
 
-def test_created_file_is_whole(tmp_path: Path) -> None:
-    with create_hdf5(tmp_path / "x.h5") as file:
-        file["x"] = np.arange(4)
-    assert names_in(tmp_path) == ["x.h5"]
-
-
 @pytest.fixture(scope="session")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("scenes") / "dots"

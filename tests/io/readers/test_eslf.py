@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import cv2
-import imageio.v3 as imageio
 import numpy as np
 import pytest
 
@@ -153,12 +152,3 @@ def test_what_does_not_fit_is_one_line_that_names_the_file(tmp_path: Path, case:
     assert str(path) in str(caught.value)
     assert word in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_damaged_picture_is_one_line_that_names_it(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "a_eslf.png"
-    imageio.imwrite(path, lenslets(stack((14, 14))))
-    path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(SepiError, match=r"a_eslf\.png: not a PNG, or damaged"):
-        read(path, ReadOptions())
-    assert capfd.readouterr() == ("", "")

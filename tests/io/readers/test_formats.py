@@ -25,36 +25,22 @@ def square(tmp_path: Path) -> Path:
     return tmp_path / "square"
 
 
-def test_empty_folder_lists_the_known_formats(tmp_path: Path) -> None:
-    message = reading_error(tmp_path, format_of)
-    assert "HCI folder" in message
-    assert "HDF5" in message
-
-
-def test_folder_of_scenes_names_one(square: Path) -> None:
-    assert f"such as {square}" in reading_error(square.parent, format_of)
-
-
-def test_nothing_there(tmp_path: Path) -> None:
-    assert reading_error(tmp_path / "absent", format_of).endswith("absent: no such file or folder")
-
-
-def test_one_view_of_many(square: Path) -> None:
-    assert "give the folder of all views" in reading_error(square / "input_Cam003.png", format_of)
-
-
-def test_file_of_no_known_format(tmp_path: Path) -> None:
+def test_what_is_no_light_field_is_told_with_what_would_be_one(square: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
     (tmp_path / "notes.txt").write_text("hello")
-    assert "not a light field of a known format" in reading_error(tmp_path / "notes.txt", format_of)
-
-
-def test_raw_file_of_a_lytro_says_what_decodes_it(tmp_path: Path) -> None:
-    (tmp_path / "IMG_0001.LFR").write_bytes(b"\x89LFP\r\n\x1a\n" + bytes(64))
-    for path in (tmp_path / "IMG_0001.LFR", tmp_path):
-        message = reading_error(path, format_of)
-        assert message.startswith(f"{path}: raw data of a Lytro camera")
-        assert "Light Field Toolbox" in message
-        assert "PlenoptiCam" in message
+    (tmp_path / "lytro").mkdir()
+    (tmp_path / "lytro/IMG_0001.LFR").write_bytes(b"\x89LFP\r\n\x1a\n" + bytes(64))
+    for name, words in {
+        "empty": ("HCI folder", "HDF5"),
+        "": (f"such as {square}",),
+        "absent": ("absent: no such file or folder",),
+        "square/input_Cam003.png": ("give the folder of all views",),
+        "notes.txt": ("not a light field of a known format",),
+        "lytro": ("lytro: raw data of a Lytro camera", "Light Field Toolbox", "PlenoptiCam"),
+        "lytro/IMG_0001.LFR": ("LFR: raw data of a Lytro camera",),
+    }.items():
+        message = reading_error(tmp_path / name, format_of)
+        assert all(word in message for word in words), message
 
 
 def test_a_result_is_not_taken_for_a_light_field(tmp_path: Path) -> None:

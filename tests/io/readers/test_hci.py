@@ -131,19 +131,6 @@ def test_masks_that_are_no_regions_of_the_views_are_left_out(full: Path) -> None
     assert set(read_light_field(full).masks) == {"occluded", "planes_lowres"}
 
 
-def test_sixteen_bit_views_keep_their_depth(square: Path) -> None:
-    for number in range(9):
-        put(square / f"input_Cam{number:03d}.png", pixels(number, np.uint16))
-    light_field = read_light_field(square)
-    assert light_field.views.dtype == np.uint16
-    np.testing.assert_array_equal(light_field.views[2, 2], pixels(8, np.uint16))
-    assert light_field.reference_view.max() <= 1
-
-
-def test_a_string_is_a_path(square: Path) -> None:
-    assert read_light_field(str(square)).name == "square"
-
-
 def cut(path: Path) -> None:
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 2])
@@ -250,11 +237,6 @@ def test_a_missing_view_is_known_to_be_missing(square: Path) -> None:
     np.testing.assert_array_equal(light_field.views[1, 0], pixels(3))
 
 
-def test_missing_centre_view_without_parameters(square: Path) -> None:
-    (square / "input_Cam004.png").unlink()
-    assert "the centre view (t, s) = (1, 1) is missing" in reading_error(square)
-
-
 def test_count_that_makes_no_square(square: Path) -> None:
     """Without parameters the grid is taken to be square; eight views could be 2x4 or 4x2."""
     (square / "input_Cam008.png").unlink()
@@ -280,17 +262,6 @@ def test_real_scene(hci: Path, name: str, low: float, high: float) -> None:
     assert light_field.ground_truth.max() == pytest.approx(high, abs=1e-3)
     own = DisparityRange(-1.6, 1.5, "parameters") if name == "cotton" else None
     assert light_field.disparity_range == own
-
-
-def test_scene_with_a_view_missing(tmp_path: Path) -> None:
-    """What is left of an incomplete download is used; only the view whose depth is made must be there."""
-    write_hci(render("dots", size=64), tmp_path / "dots")
-    (tmp_path / "dots/input_Cam003.png").unlink()
-    light_field = read_light_field(tmp_path / "dots")
-    assert np.argwhere(~light_field.present).tolist() == [[0, 3]]
-    assert light_field.ground_truth is not None
-    (tmp_path / "dots/input_Cam040.png").unlink()
-    assert "the centre view (t, s) = (4, 4) is missing" in reading_error(tmp_path / "dots")
 
 
 def test_ground_truth_can_be_read_apart(full: Path) -> None:

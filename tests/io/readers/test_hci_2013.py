@@ -1,14 +1,14 @@
 """HDF5 files of the first HCI benchmark: views, the ground truth of the view whose depth is wanted, and the camera."""
 
-import re
+import functools
 from pathlib import Path
 
+import error_lines
 import h5py
 import numpy as np
 import pytest
 
 from sepi.camera import Camera
-from sepi.errors import SepiError
 from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ORDERS, ReadOptions
 from sepi.lightfield import LightField
@@ -35,11 +35,7 @@ def taken(path: Path, **options: object) -> LightField:
     return read(path, ReadOptions(**options))
 
 
-def refused(path: Path, **options: object) -> str:
-    with pytest.raises(SepiError, match=re.escape(str(path))) as caught:
-        read(path, ReadOptions(**options), "hci-2013")
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
+refused = functools.partial(error_lines.refused, file_format="hci-2013")
 
 
 def test_views_truth_and_camera(tmp_path: Path) -> None:

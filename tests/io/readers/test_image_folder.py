@@ -293,29 +293,6 @@ def test_pictures_of_any_kind(tmp_path: Path, ending: str) -> None:
     assert places_of(light_field) == grid_of(2, 3)
 
 
-SORTS: dict[str, tuple[Callable[[np.ndarray], np.ndarray], type]] = {
-    "grey": (lambda rgb: rgb[:, :, :1], np.uint8),
-    "grey 16": (lambda rgb: rgb[:, :, :1].astype(np.uint16) * 200, np.uint16),
-    "RGB 16": (lambda rgb: rgb.astype(np.uint16) * 200, np.uint16),
-    "RGB float": (lambda rgb: (rgb / 255).astype(np.float32), np.float32),
-    "grey float": (lambda rgb: (rgb[:, :, :1] / 255).astype(np.float32), np.float32),
-}
-
-
-@pytest.mark.parametrize("sort", SORTS)
-def test_depth_of_pixels_is_kept(tmp_path: Path, sort: str) -> None:
-    convert, kind = SORTS[sort]
-    folder = put(
-        tmp_path / "f",
-        by_number("{}.tif", range(4)),
-        lambda path, rgb: cv2.imwrite(str(path), convert(rgb)[:, :, ::-1]),
-    )
-    light_field = read(folder, ReadOptions(grid=(2, 2)))
-    assert light_field.views.dtype == kind
-    for number in range(4):
-        np.testing.assert_array_equal(light_field.views[divmod(number, 2)], convert(pixels(number)))
-
-
 def test_what_is_no_view_is_left_out_with_a_note(tmp_path: Path) -> None:
     folder = put(tmp_path / "f", by_place("view_{}_{}.png", range(2), range(2)))
     imageio.imwrite(folder / "thumb.png", pixels(9)[:2])

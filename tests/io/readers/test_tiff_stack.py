@@ -1,11 +1,11 @@
 """TIFFs whose pages are the views, as the programs write them that microscopes and scripts use."""
 
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import tifffile
+from error_lines import refused
 from PIL import Image
 
 from sepi.errors import SepiError
@@ -30,12 +30,6 @@ SEQUENCES = {
     "tifffile": (ROW, {"photometric": "rgb", "metadata": None}),
     "ImageJ": (GREY.reshape(8, 20, 30), {"imagej": True}),
 }
-
-
-def refused(path: Path, **options: object) -> str:
-    with pytest.raises(SepiError, match=re.escape(str(path))) as caught:
-        read(path, ReadOptions(**options))
-    return str(caught.value)
 
 
 @pytest.mark.parametrize("kind", COUNTED)
