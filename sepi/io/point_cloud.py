@@ -194,10 +194,11 @@ def point_cloud(
         raise SepiError(f"point cloud: expected a step of at least 1 pixel, got {step}")
     if not 0 <= min_confidence <= 1:
         raise SepiError(f"point cloud: expected a least confidence within 0..1, got {min_confidence:g}")
-    if max_depth is not None and not max_depth > 0:
-        raise SepiError(f"point cloud: expected a positive largest depth in metres, got {max_depth:g}")
-    if max_sigma is not None and not max_sigma > 0:
-        raise SepiError(f"point cloud: expected a positive largest sigma, got {max_sigma:g}")
+    for name, most in (("depth in metres", max_depth), ("sigma", max_sigma)):
+        if most is not None and not most > 0:
+            raise SepiError(f"point cloud: expected a positive largest {name}, got {most:g}")
+    if max_sigma is not None and sigma is None:
+        raise SepiError("point cloud: a largest sigma needs a map of it")
     used = np.zeros(disparity.shape, bool)
     used[::step, ::step] = True
     used &= np.isfinite(disparity)
@@ -212,7 +213,9 @@ def point_cloud(
         depth = camera.depth(disparity)
         used &= np.isfinite(depth) & (depth > 0) & (depth <= (max_depth or np.inf))
         sigma = None if sigma is None else camera.depth_sigma(disparity, sigma)
-        used &= _sure(sigma, max_sigma)
+        if sigma is not None and max_sigma is not None:
+            # comparison with NaN is false: unknown error is any
+            used &= sigma <= max_sigma
         cloud = _metric(picture, disparity, used, camera, from_centre)
         cloud = replace(cloud, sigma=None if sigma is None else sigma[used])
         if rig is None:
@@ -222,18 +225,9 @@ def point_cloud(
         return replace(cloud, positions=points.astype(np.float32), units=rig.units)
     if max_depth is not None:
         raise SepiError("point cloud: a largest depth in metres needs the camera's geometry, which is not known")
-    used &= _sure(sigma, max_sigma)
+    if sigma is not None and max_sigma is not None:
+        used &= sigma <= max_sigma
     return replace(_relief(picture, disparity, used), sigma=None if sigma is None else sigma[used].astype(np.float32))
-
-
-def _sure(sigma: FloatMap | None, most: float | None) -> BoolMap | bool:
-    """Which pixels are sure enough."""
-    if most is None:
-        return True
-    if sigma is None:
-        raise SepiError("point cloud: a largest sigma needs a map of it")
-    # comparison with NaN is false: unknown error is any
-    return np.asarray(sigma <= most, bool)
 
 
 def _metric(

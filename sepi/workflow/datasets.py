@@ -19,10 +19,9 @@ from sepi.errors import SepiError
 from sepi.io.disparity_maps import TruthFile
 from sepi.io.images import SUFFIXES
 from sepi.io.readers import exported, hci, hci_2013
-from sepi.io.readers.formats import Format, format_of
+from sepi.io.readers.formats import Format, format_of, size_of
 from sepi.io.readers.options import ReadOptions
-from sepi.io.readers.row_folders import view_files
-from sepi.io.readers.sizes import size_of
+from sepi.io.readers.view_files import view_files
 from sepi.workflow.rendered_scenes import DATASET
 
 VIEW_PATTERN = "input_Cam*.png"

@@ -16,9 +16,8 @@ from sepi.io.hdf5 import read_light_field as read_own
 from sepi.io.hdf5 import read_stage
 from sepi.io.images import picture_header, png_texts, read_picture
 from sepi.io.provenance import history_of, read_origin
-from sepi.io.readers.formats import format_of, read
+from sepi.io.readers.formats import format_of, read, size_of
 from sepi.io.readers.options import ReadOptions
-from sepi.io.readers.sizes import size_of
 from sepi.io.result_folder import read_result
 from sepi.io.scores import read_evaluations, read_scores
 from sepi.reading import read_light_field

@@ -25,8 +25,7 @@ from sepi.io.readers import view_names
 from sepi.io.readers.camera_positions import off_grid, positions_from_cameras
 from sepi.io.readers.name_groups import EXAMPLES, Kind, fill, origin
 from sepi.io.readers.options import ReadOptions, is_position, unarranged
-from sepi.io.readers.row_folders import files_in, has_rows, numbered, view_files
-from sepi.io.readers.view_files import MAX_VIEWS, read_grid
+from sepi.io.readers.view_files import MAX_VIEWS, files_in, has_rows, numbered, read_grid, view_files
 from sepi.io.readers.view_names import ViewNumbers
 from sepi.lightfield import LightField
 

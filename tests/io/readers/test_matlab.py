@@ -12,9 +12,8 @@ import scipy.io
 from error_lines import refused
 
 from sepi.errors import SepiError
-from sepi.io.readers.formats import format_of, read
+from sepi.io.readers.formats import format_of, read, size_of
 from sepi.io.readers.options import ReadOptions
-from sepi.io.readers.sizes import size_of
 from sepi.lightfield import LightField
 
 RNG = np.random.default_rng(3)

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from sepi.errors import SepiError
-from sepi.io.readers.formats import format_of, read
+from sepi.io.readers.formats import format_of, read, size_of
 from sepi.io.readers.options import ReadOptions
-from sepi.io.readers.sizes import size_of
 
 RNG = np.random.default_rng(5)
 VIEWS = RNG.uniform(0.1, 1, (3, 4, 8, 10, 3)).astype(np.float32)

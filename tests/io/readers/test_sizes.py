@@ -12,7 +12,7 @@ import scipy.io
 from PIL import Image
 
 from sepi.io.hdf5 import write_light_field
-from sepi.io.readers.sizes import Size, size_of
+from sepi.io.readers.formats import Size, size_of
 from sepi.lightfield import LightField
 from sepi.workflow.datasets import own_scene
 

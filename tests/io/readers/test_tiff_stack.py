@@ -9,9 +9,8 @@ from error_lines import refused
 from PIL import Image
 
 from sepi.errors import SepiError
-from sepi.io.readers.formats import format_of, read
+from sepi.io.readers.formats import format_of, read, size_of
 from sepi.io.readers.options import ReadOptions
-from sepi.io.readers.sizes import size_of
 from sepi.reading import read_light_field
 from sepi.scenes import render
 
