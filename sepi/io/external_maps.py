@@ -12,12 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import h5py
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.io.disparity_maps import SUFFIXES, map_file
-from sepi.io.hdf5 import attribute, create_hdf5, members, open_hdf5, put, read_dataset
+from sepi.io.hdf5 import attribute, create_hdf5, float_maps, members, open_hdf5, put
 from sepi.io.scores import Evaluation, evaluation_in, put_evaluation, scores_in
 from sepi.lightfield import FloatMap
 
@@ -109,12 +107,8 @@ def read_external(path: Path, *, with_maps: bool = True) -> dict[str, ExternalMa
         return {
             name: ExternalMap(
                 **{key: str(attribute(group, key)) for key in _ATTRIBUTES},
-                disparity=_disparity(path, group) if with_maps else None,
+                disparity=float_maps(path, group).get("disparity") if with_maps else None,
                 evaluation=evaluation_in(group) if with_maps else Evaluation(scores_in(group)),
             )
             for name, group in members(file[_METHODS])
         }
-
-
-def _disparity(path: Path, group: h5py.Group) -> FloatMap | None:
-    return read_dataset(path, group["disparity"]).astype(np.float32) if "disparity" in group else None

@@ -51,40 +51,20 @@ def members(group: h5py.Group | Mapping[str, Any]) -> list[tuple[str, Any]]:
     return list(group.items())
 
 
-def require_held(path: Path, dataset: Any) -> None:
-    """Raise unless a dataset lies in its file and can have as many values as it claims."""
-    name = printable(str(dataset.name).lstrip("/"))
-    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
-        raise SepiError(f"{path}: damaged HDF5 file: '{name}' is no array")
-    if dataset.is_virtual or dataset.external or dataset.file.filename != str(path):
-        raise SepiError(f"{path}: the values of '{name}' lie in another file; copy them into this one")
-    if dataset.dtype.hasobject:
-        # as of such attributes
-        raise SepiError(f"{path}: the values of '{name}' are of variable length; expected numbers")
-    held = dataset.id.get_storage_size()
-    # what is not compressed is stored as it is, but for chunks never written
-    if held > path.stat().st_size or dataset.nbytes > held * (DEFLATE_RATIO if dataset.chunks else 1):
-        raise SepiError(f"{path}: damaged HDF5 file: '{name}' of shape {dataset.shape} cannot lie in {held} bytes")
-
-
 def require_sound(path: Path) -> None:
     """Refuse a file of this package that does not hold what was written, once looked at by this process."""
     status = path.stat()
     now = (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
     sound = _sound.get(now)
     if sound is None:
-        sound = _is_as_written(path)
+        # files of other programs have no digest
+        with path.open("rb") as file:
+            block = file.read(BLOCK)
+            sound = not block.startswith(_MARK) or block == digest_block(file)
         if status.st_mtime < time.time() - _SETTLED:
             _sound[now] = sound
     if not sound:
         raise SepiError(f"{path}: damaged, or changed by another program; remove it and make it again")
-
-
-def _is_as_written(path: Path) -> bool:
-    """Whether the digest of a file is that of its bytes; others than those of this package have none."""
-    with path.open("rb") as file:
-        block = file.read(BLOCK)
-        return not block.startswith(_MARK) or block == digest_block(file)
 
 
 def is_own(entry: h5py.Group | h5py.Dataset | None) -> bool:
@@ -116,13 +96,9 @@ _COSTS, _CANDIDATES = "cost_volume", "candidates"
 
 _STEPS, _METRES = "pixels per view step", "metres"
 UNITS = {
-    **dict.fromkeys(("disparity", *ERROR_BARS), _STEPS),
+    **dict.fromkeys(("disparity", *ERROR_BARS, _CANDIDATES, "ground_truth", "error"), _STEPS),
+    **dict.fromkeys(("positions", "baselines"), "view steps"),
     "confidence": "0..1",
-    "candidates": _STEPS,
-    "ground_truth": _STEPS,
-    "error": _STEPS,
-    "positions": "view steps",
-    "baselines": "view steps",
     **dict.fromkeys(("depth", "depth_sigma", "nearest", "farthest"), _METRES),
 }
 """Units of arrays, by their names."""
@@ -350,7 +326,18 @@ def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDAr
         If ``dataset`` is none, lies in another file, or claims more values than it can have: no memory is taken on the
         word of its shape.
     """
-    require_held(path, dataset)
+    name = printable(str(dataset.name).lstrip("/"))
+    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
+        raise SepiError(f"{path}: damaged HDF5 file: '{name}' is no array")
+    if dataset.is_virtual or dataset.external or dataset.file.filename != str(path):
+        raise SepiError(f"{path}: the values of '{name}' lie in another file; copy them into this one")
+    if dataset.dtype.hasobject:
+        # as of such attributes
+        raise SepiError(f"{path}: the values of '{name}' are of variable length; expected numbers")
+    held = dataset.id.get_storage_size()
+    # what is not compressed is stored as it is, but for chunks never written
+    if held > path.stat().st_size or dataset.nbytes > held * (DEFLATE_RATIO if dataset.chunks else 1):
+        raise SepiError(f"{path}: damaged HDF5 file: '{name}' of shape {dataset.shape} cannot lie in {held} bytes")
     return np.asarray(dataset[part])
 
 

@@ -64,15 +64,7 @@ def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
         return _read(path, any_floats)
 
 
-def _read(path: Path, any_floats: bool = False) -> Pixels:
-    image = _pixels(path)
-    if image.dtype == np.float32 and not any_floats and not (image.min() >= LOWEST and image.max() <= HIGHEST):
-        what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinite ones"
-        raise SepiError(f"{path}: float pixels must be finite and within 0..1, got {what}; --white says what white is")
-    return image
-
-
-def _pixels(path: Path) -> Pixels:
+def _read(path: Path, any_floats: bool) -> Pixels:
     with _opened(path) as file:
         # all of it at once: each of many small reads would let go of Python's lock, for which others wait
         data = file.read()
@@ -85,7 +77,11 @@ def _pixels(path: Path) -> Pixels:
             raise SepiError(f"pixels of type {image.dtype}; expected 8 or 16 bit without sign, or float32")
     channels = image[:, :, None] if image.ndim == 2 else image
     # grey with transparency may be decoded to colours
-    return np.ascontiguousarray(channels[:, :, : 1 if header.grey else 3])
+    image = np.ascontiguousarray(channels[:, :, : 1 if header.grey else 3])
+    if image.dtype == np.float32 and not any_floats and not (image.min() >= LOWEST and image.max() <= HIGHEST):
+        what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinite ones"
+        raise SepiError(f"{path}: float pixels must be finite and within 0..1, got {what}; --white says what white is")
+    return image
 
 
 def read_views(
@@ -221,9 +217,8 @@ def _decoded(path: Path, data: bytes, kind: str) -> Pixels:
     if kind == "TIFF":
         with open_tiff(io.BytesIO(data)) as pictures:
             return page_pixels(pictures.pages[0].aspage())
-    if (kind == "PNG" and _LAST_CHUNK not in data) or (
-        kind == "BMP" and int.from_bytes(data[2:6], "little") > len(data)
-    ):
+    ends = {"PNG": _LAST_CHUNK in data, "BMP": int.from_bytes(data[2:6], "little") <= len(data)}
+    if not ends.get(kind, True):
         raise ValueError("its end is missing")
     if kind in _PLUGINS:
         with pillow_class(_PLUGINS[kind])(io.BytesIO(data)) as image:

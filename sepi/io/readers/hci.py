@@ -81,7 +81,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
         With the scene's own disparity range, ground truth and masks where the folder has them.
     """
     light_field = read_views(path, options)
-    of = _view_of_truth(path, options)
+    of, _ = _view_of_truth(path, options)
     if of is None or not light_field.present[of] or options.view not in (None, of) or not truth_files(path):
         return light_field
     ground_truth, masks = _truth_of(path, light_field.shape, options.part)
@@ -90,11 +90,10 @@ def read(path: Path, options: ReadOptions) -> LightField:
 
 def read_truth(path: Path, options: ReadOptions) -> Truth:
     """Ground truth and masks of a folder alone, where they are of the reference view of :func:`read_views`."""
-    files, grid = _views_in(path, options, _parameters_of(path))
-    numbers = arrange_numbers(str(path), grid, replace(options, exclude=()))
-    of, reference = _view_of_truth(path, options), options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
+    of, (rows, columns) = _view_of_truth(path, options)
+    reference = options.view or (rows // 2, columns // 2)
     if of == reference:
-        header = picture_header(next(iter(files.values())))
+        header = picture_header(min(path.glob("input_Cam*.png")))
         return _truth_of(path, (header.height, header.width), options.part)
     if of is not None and options.view is None and truth_files(path):
         known, made = (f"{t},{s}" for t, s in (of, reference))
@@ -127,9 +126,9 @@ def read_views(path: Path, options: ReadOptions) -> LightField:
             f"cut out of such, --crop-of {size}+X+Y tells where, and all else holds; where they were scaled, set "
             "image_resolution, disp_min and disp_max for them"
         )
-    camera = parameters.model_dump(include=set(_CAMERA))
+    known = parameters.model_dump(include=set(_CAMERA))
     with naming(file):
-        known_camera = None if None in camera.values() else camera_from(**camera, shape=shape, crop_of=options.part)
+        camera = None if None in known.values() else camera_from(**known, shape=shape, crop_of=options.part)
     return LightField(
         views=views,
         name=parameters.scene or str(name_of(path)),
@@ -137,7 +136,7 @@ def read_views(path: Path, options: ReadOptions) -> LightField:
         present=present,
         view=options.view,
         disparity_range=disparity_range,
-        camera=known_camera,
+        camera=camera,
         # one number for both directions: rows are as far apart as columns
         settled=parameters.baseline_mm is not None,
         files=names,
@@ -160,11 +159,11 @@ def _views_in(path: Path, options: ReadOptions, parameters: _Parameters) -> tupl
     return files, grid
 
 
-def _view_of_truth(path: Path, options: ReadOptions) -> tuple[int, int] | None:
-    """Where the centre view of the folder's own grid stands, to which ground truth and masks belong."""
+def _view_of_truth(path: Path, options: ReadOptions) -> tuple[tuple[int, int] | None, tuple[int, ...]]:
+    """Where the centre view of the folder's own grid stands, to which ground truth and masks belong; the grid."""
     _, grid = _views_in(path, options, _parameters_of(path))
     numbers = arrange_numbers(str(path), grid, replace(options, exclude=()))
-    return position_of(numbers, grid[0] // 2 * grid[1] + grid[1] // 2)
+    return position_of(numbers, grid[0] // 2 * grid[1] + grid[1] // 2), numbers.shape
 
 
 def _truth_of(folder: Path, shape: tuple[int, int], part: Part | None) -> Truth:

@@ -205,9 +205,13 @@ def arrange_numbers(
     """
     T, S = grid
     require_known("order", [options.order], ORDERS)
-    numbers = np.arange(T * S).reshape(T, S)
-    if options.central is not None:
-        numbers = _central(source, numbers, options.central)
+    numbers, side = np.arange(T * S).reshape(T, S), options.central
+    if side is not None:
+        # around the centre view, as the light field's convention has it; an even grid has one row more before it
+        top, left = T // 2 - side // 2, S // 2 - side // 2
+        if side < 1 or side % 2 == 0 or top < 0 or left < 0 or top + side > T or left + side > S:
+            raise SepiError(f"{source}: the central {side}x{side} views of {T}x{S}; expected an odd number that fits")
+        numbers = numbers[top : top + side, left : left + side]
     numbers = ORDERS[options.order](numbers)
     if options.view is not None:
         _require_inside(source, numbers, options.view)
@@ -235,15 +239,6 @@ def position_of(numbers: Numbers, number: int) -> tuple[int, int] | None:
     """Where a view of the given grid stands, ``(t, s)``; None where it was left out."""
     positions = np.argwhere(numbers == number)
     return (int(positions[0][0]), int(positions[0][1])) if len(positions) else None
-
-
-def _central(source: str, numbers: Numbers, side: int) -> Numbers:
-    T, S = numbers.shape
-    # around the centre view, as the light field's convention has it; an even grid has one row more before it than after
-    top, left = T // 2 - side // 2, S // 2 - side // 2
-    if side < 1 or side % 2 == 0 or top < 0 or left < 0 or top + side > T or left + side > S:
-        raise SepiError(f"{source}: the central {side}x{side} views of {T}x{S}; expected an odd number that fits")
-    return numbers[top : top + side, left : left + side]
 
 
 def _excluded(source: str, view: str, numbers: Numbers, names: Mapping[str, int]) -> int:
