@@ -152,12 +152,16 @@ def config(**changes: str) -> Callable[[Path], None]:
     return change
 
 
+def parameters(text: str) -> Callable[[Path], object]:
+    return lambda folder: (folder / "parameters.cfg").write_bytes(text.encode("latin-1"))
+
+
+def mask(name: str, values: np.ndarray) -> Callable[[Path], object]:
+    return lambda folder: cv2.imwrite(str(folder / f"mask_{name}.png"), values)
+
+
 BAD_FOLDERS: dict[str, tuple[Callable[[Path], object], str, str]] = {
-    "centre view missing": (
-        lambda f: (f / "input_Cam004.png").unlink(),
-        "full",
-        "centre view (t, s) = (1, 1) is missing",
-    ),
+    "centre view missing": (lambda f: (f / "input_Cam004.png").unlink(), "full", "(1, 1) is missing"),
     "view beyond the grid": (lambda f: put(f / "input_Cam006.png", pixels(6)), "input_Cam006.png", "2x3 grid"),
     "view twice": (lambda f: put(f / "input_Cam2.png", pixels(2)), "input_Cam2.png", "twice"),
     "view without number": (lambda f: put(f / "input_Cam.png", pixels(2)), "input_Cam.png", "input_Cam007.png"),
@@ -174,46 +178,22 @@ BAD_FOLDERS: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "range not a number": (config(disp_max="near"), "parameters.cfg", "'near'"),
     "range NaN": (config(disp_max="nan"), "parameters.cfg", "finite"),
     "range infinite": (config(disp_max="inf"), "parameters.cfg", "finite"),
-    "half a range": (
-        lambda f: (f / "parameters.cfg").write_text("[meta]\ndisp_min = 1"),
-        "parameters.cfg",
-        "both disp_min and disp_max",
-    ),
+    "half a range": (parameters("[meta]\ndisp_min = 1"), "parameters.cfg", "both disp_min and disp_max"),
     "no cameras": (config(num_cams_x="0"), "parameters.cfg", "num_cams_x: input should be greater than 0"),
     "half a camera": (config(num_cams_x="2.5"), "parameters.cfg", "num_cams_x: input should be a valid integer"),
     "fewer cameras than views": (config(num_cams_x="2"), "input_Cam005.png", "2x2 grid that parameters.cfg gives"),
     "parameters of another size": (config(image_resolution_x_px="512"), "parameters.cfg", "image_resolution"),
-    "parameters without section": (
-        lambda f: (f / "parameters.cfg").write_text("disp_min = 1"),
-        "parameters.cfg",
-        "section",
-    ),
-    "parameters twice": (
-        lambda f: (f / "parameters.cfg").write_text(CONFIG + "disp_min = 0"),
-        "parameters.cfg",
-        "disp_min",
-    ),
-    "parameters not text": (
-        lambda f: (f / "parameters.cfg").write_bytes(b"\xff\xfe\x00"),
-        "parameters.cfg",
-        "not a text file with",
-    ),
+    "parameters without section": (parameters("disp_min = 1"), "parameters.cfg", "section"),
+    "parameters twice": (parameters(CONFIG + "disp_min = 0"), "parameters.cfg", "disp_min"),
+    "parameters not text": (parameters("\xff\xfe\x00"), "parameters.cfg", "not a text file with"),
     "truth of another size": (
         lambda f: write_pfm(f / "gt_disp_lowres.pfm", np.zeros((12, 15), np.float32)),
         "gt_disp_lowres.pfm",
         "(12, 15)",
     ),
     "truth cut off": (lambda f: cut(f / "gt_disp_lowres.pfm"), "gt_disp_lowres.pfm", "bytes"),
-    "mask of another size": (
-        lambda f: cv2.imwrite(str(f / "mask_occluded.png"), np.zeros((5, 5), np.uint8)),
-        "mask_occluded.png",
-        "views' size",
-    ),
-    "mask not black and white": (
-        lambda f: cv2.imwrite(str(f / "mask_textureless.png"), pixels(0)),
-        "mask_textureless.png",
-        "black and white",
-    ),
+    "mask of another size": (mask("occluded", np.zeros((5, 5), np.uint8)), "mask_occluded.png", "views' size"),
+    "mask not black and white": (mask("textureless", pixels(0)), "mask_textureless.png", "black and white"),
     "mask damaged": (lambda f: cut(f / "mask_planes_lowres.png"), "mask_planes_lowres.png", "not a PNG, or damaged"),
 }
 
