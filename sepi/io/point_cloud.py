@@ -34,6 +34,7 @@ from sepi.validation import require_map, require_type
 
 Positions = npt.NDArray[np.float32]
 Colours = npt.NDArray[np.uint8]
+View = npt.NDArray[np.generic]
 
 # depth of a relief as part of the picture's width, and the part of the pixels beyond each end of what counts as its
 # range, so that a few wrong pixels do not flatten it
@@ -102,7 +103,7 @@ class PointCloud:
 
 
 def point_cloud(
-    picture: npt.NDArray[np.generic],
+    picture: View,
     disparity: FloatMap,
     confidence: FloatMap | None = None,
     *,
@@ -231,11 +232,7 @@ def point_cloud(
 
 
 def _metric(
-    picture: npt.NDArray[np.generic],
-    disparity: FloatMap,
-    used: BoolMap,
-    camera: Camera,
-    from_centre: tuple[float, float],
+    picture: View, disparity: FloatMap, used: BoolMap, camera: Camera, from_centre: tuple[float, float]
 ) -> PointCloud:
     across, down = _from_middle(used)
     depth = camera.depth(disparity[used]).astype(np.float64)
@@ -244,7 +241,7 @@ def _metric(
     return PointCloud(_stacked(x, -y, -depth), _colours(picture[used]), metric=True)
 
 
-def _relief(picture: npt.NDArray[np.generic], disparity: FloatMap, used: BoolMap) -> PointCloud:
+def _relief(picture: View, disparity: FloatMap, used: BoolMap) -> PointCloud:
     across, down = _from_middle(used)
     values = disparity[used].astype(np.float64)
     low, high = np.quantile(values, (_BEYOND, 1 - _BEYOND)) if values.size else (0.0, 0.0)

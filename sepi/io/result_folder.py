@@ -31,6 +31,10 @@ from sepi.stage import StageMaps
 from sepi.threads import available_cores
 from sepi.validation import described, is_finite, require_path, require_type
 
+_Attributes = Mapping[str, hdf5.Attribute]
+_Names = tuple[str, ...]
+_View = tuple[int, int]
+
 _MASK_TEXT = {"Software": "sepi", "Description": "mask: 255 inside, 0 outside"}
 
 
@@ -232,10 +236,10 @@ def _write_files(
     folder: Path,
     light_field: LightField,
     maps: StageMaps,
-    attributes: Mapping[str, hdf5.Attribute],
+    attributes: _Attributes,
     seconds: float | None,
-    beside: tuple[str, ...],
-) -> tuple[str, ...]:
+    beside: _Names,
+) -> _Names:
     camera, view = light_field.camera, light_field.views[light_field.reference_position]
     masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
     more: dict[str, npt.NDArray[Any]] = {"view": view}
@@ -302,7 +306,7 @@ def write_as_taken(
     folder: Path,
     light_field: LightField,
     disparity: FloatMap,
-    position: tuple[int, int] | None = None,
+    position: _View | None = None,
     sigma: FloatMap | None = None,
 ) -> bool:
     """Write the maps of a view in the picture that its camera took; False where no calibrated camera did.

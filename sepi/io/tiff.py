@@ -160,13 +160,8 @@ def write_tiff(path: Path, values: FloatMap, comment: str) -> None:
     """
     import tifffile
 
+    pixels, kind = np.ascontiguousarray(values, np.float32), "minisblack" if values.ndim == 2 else "rgb"
     with atomic_path(path) as temporary:
         tifffile.imwrite(
-            temporary,
-            np.ascontiguousarray(values, np.float32),
-            photometric="minisblack" if values.ndim == 2 else "rgb",
-            compression="zlib",
-            description=comment,
-            software="sepi",
-            metadata=None,
+            temporary, pixels, photometric=kind, compression="zlib", description=comment, software="sepi", metadata=None
         )
