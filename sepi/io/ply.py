@@ -59,8 +59,7 @@ def write_ply(path: str | Path, cloud: Cloud, comments: Sequence[str] | None = N
 
     Examples
     --------
-    >>> from collections.abc import Sequence
-    from pathlib import Path
+    >>> from pathlib import Path
     >>> from sepi.io.ply import write_ply
     >>> from sepi.io.point_cloud import point_cloud
     >>> from sepi.scenes import render
