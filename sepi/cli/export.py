@@ -50,7 +50,7 @@ def export(
       sepi depth lego
     """
     from sepi.inspection.disparity_range import settle_range
-    from sepi.io.exported import require_room, write_exported
+    from sepi.io.readers.exported import require_room, write_exported
 
     if output.resolve() == light_field_path.resolve():
         raise SepiError(f"{output}: is the light field itself; choose another name")

@@ -229,10 +229,7 @@ def _read_levels(path: Path, scaled: bool) -> npt.NDArray[Any]:
         return np.where(levels > 0, values, np.nan).astype(np.float32)
     if not scaled:
         kind = "a PNG without the text chunks 'scale' and 'offset'" if header.kind == "PNG" else f"a {header.kind}"
-        raise SepiError(
-            f"{path}: {kind} does not say what its levels mean; give a scale (--truth-scale; in the configuration "
-            "scale or truth_scale), or write the map as .pfm or .npy"
-        )
+        raise SepiError(f"{path}: {kind} does not say what its levels mean; give a scale, or write it as .pfm or .npy")
     # of a PGM, whose levels end at a white of its own
     return np.rint(levels * (header.white / full_scale(levels.dtype))).astype(int) if header.white else levels
 

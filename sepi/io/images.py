@@ -241,10 +241,8 @@ def _require_memory(folder: Path, view: Pixels, count: int) -> None:
     except (AttributeError, ValueError, OSError):  # not all systems tell
         return
     if view.nbytes * count > there:
-        raise SepiError(
-            f"{folder}: {count} views of {_described(view)} take {view.nbytes * count / 1e9:.1f} GB, more than the "
-            f"{there / 1e9:.1f} GB of memory; use fewer (--central) or smaller ones"
-        )
+        sizes = f"{view.nbytes * count / 1e9:.1f} GB, more than the {there / 1e9:.1f} GB of memory"
+        raise SepiError(f"{folder}: {count} views of {_described(view)} take {sizes}; use fewer (--central)")
 
 
 def _described(image: Pixels) -> str:

@@ -190,6 +190,5 @@ def _require_error_bars(name: str, maps: StageMaps) -> None:
     if outside.any():
         y, x = np.argwhere(outside)[0]
         raise SepiError(
-            f"{name}: low and high must enclose the disparity, got {low[y, x]:g} to {high[y, x]:g} and "
-            f"{disparity[y, x]:g} at row {y}, column {x}"
+            f"{name}: low and high must enclose the disparity, not {low[y, x]:g}, {high[y, x]:g} at {y},{x}"
         )

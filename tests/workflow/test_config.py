@@ -12,8 +12,8 @@ import yaml
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import TruthFile
-from sepi.io.exported import write_exported
 from sepi.io.images import write_png
+from sepi.io.readers.exported import write_exported
 from sepi.scenes import SCENES, render
 from sepi.variants import STAGES, VARIANTS
 from sepi.workflow.config import load_settings

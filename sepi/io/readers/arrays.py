@@ -192,9 +192,7 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     """
     source = str(path)
     if array.dtype.kind not in "iuf" or array.dtype.itemsize > 8:
-        raise SepiError(
-            f"{source}: values of type {array.dtype}; expected integers such as uint8, or floats within 0..1"
-        )
+        raise SepiError(f"{source}: values of type {array.dtype}; expected integers such as uint8, or floats in 0..1")
     given = axes or options.axes
     letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
     # a batch of one
@@ -216,9 +214,9 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
         black = []
     reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
     if arranged and reference in [*black, *unknown]:
+        t, s = reference
         raise SepiError(
-            f"{source}: view {reference[0]},{reference[1]} is black (all zeros) or NaN, so taken as missing; depth is "
-            "made for it, unless --view ROW,COLUMN names another"
+            f"{source}: view {t},{s} is black or NaN, and depth is made for it; name another by --view ROW,COLUMN"
         )
     assumed = [] if given else [f"axes taken as {' '.join(letters)}; --axes sets them otherwise"]
     missing = [*_missing_notes("all zeros", black), *_missing_notes("NaN throughout", unknown)]
@@ -266,10 +264,7 @@ def with_white(views: Array, present: BoolMap, path: Path, white: float) -> Arra
 def _checked_axes(source: str, array: Array, text: str) -> str:
     letters = text.upper()
     if sorted(letters) not in map(sorted, _LAYOUTS):
-        raise SepiError(
-            f"{source}: --axes {text}: expected T, S, H and W once each, and C where there are colours, in the array's "
-            f"order, such as HWTSC ({_AXES_HELP})"
-        )
+        raise SepiError(f"{source}: --axes {text}: expected T, S, H and W once each, C for colours ({_AXES_HELP})")
     spare = array.ndim - len(letters)
     if spare < 0 or prod(array.shape[:spare]) != 1:
         raise SepiError(f"{source}: --axes {text} names {len(letters)} axes, the array has {array.ndim}: {array.shape}")

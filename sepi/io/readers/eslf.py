@@ -54,10 +54,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     picture = read_picture(path, any_floats=options.white is not None)
     height, width = picture.shape[0] // T, picture.shape[1] // S
     if min(height, width) < MIN_SIZE:
-        raise SepiError(
-            f"{path}: {picture.shape[1]}x{picture.shape[0]} pixels with {T}x{S} views under each lenslet make views of "
-            f"{width}x{height} pixels; expected at least {MIN_SIZE}x{MIN_SIZE}"
-        )
+        raise SepiError(f"{path}: {T}x{S} views under each lenslet make views of {width}x{height} pixels; too small")
     notes = []
     if options.central is None and central is not None and (central, central) != grid:
         notes.append(f"the {central}x{central} views in the middle of {T}x{S}; --central N takes another odd number")

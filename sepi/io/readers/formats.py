@@ -201,15 +201,9 @@ def _what_else(path: Path) -> str:
     if _is_result(path):
         return "holds a disparity map, not a light field"
     if any(one.suffix.lower() in _RAW and one.is_file() for one in (path, *path.glob("*"))):
-        return (
-            "raw data of a Lytro camera, not yet views; decode it with the Light Field Toolbox (MATLAB) or PlenoptiCam "
-            "(Python), and give what they write"
-        )
+        return "raw data of a Lytro camera; decode it with the Light Field Toolbox (MATLAB) or PlenoptiCam (Python)"
     if path.is_file() and path.suffix.lower() in SUFFIXES:
-        return (
-            "a single picture; give the folder of all views, or say how they all lie in it: --format mosaic, side by "
-            "side, or eslf, under lenslets, with --grid ROWSxCOLUMNS"
-        )
+        return "a single picture; give the folder of all views, or --format mosaic or eslf with --grid ROWSxCOLUMNS"
     if path.is_file() and h5py.is_hdf5(path):
         with suppress(SepiError):
             arrays = hdf5_shapes(path)

@@ -122,9 +122,8 @@ def read_views(path: Path, options: ReadOptions) -> LightField:
     if given_shape not in (None, whole):
         size = f"{given_shape[1]}x{given_shape[0]}"
         raise SepiError(
-            f"{file}: image_resolution is {size}, but the pictures are {whole[1]}x{whole[0]} (x, y); where they were "
-            f"cut out of such, --crop-of {size}+X+Y tells where, and all else holds; where they were scaled, set "
-            "image_resolution, disp_min and disp_max for them"
+            f"{file}: image_resolution is {size}, but the pictures are {whole[1]}x{whole[0]} (x, y); give --crop-of "
+            f"{size}+X+Y where they were cut out, and where they were scaled, set it, disp_min and disp_max anew"
         )
     known = parameters.model_dump(include=set(_CAMERA))
     with naming(file):

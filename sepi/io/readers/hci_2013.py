@@ -56,10 +56,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
         views = read_dataset(path, file[VIEWS])
         shape = views.shape
         if not _is_layout(shape):
-            raise SepiError(
-                f"{path}: expected '{VIEWS}' of shape (T, S, H, W, 3), got {shape}; if it is a light field of other "
-                "axes, write it as .npy and name them with --axes"
-            )
+            raise SepiError(f"{path}: expected '{VIEWS}' of shape (T, S, H, W, 3), got {shape}; as .npy, --axes tells")
         camera, reason = _read_camera(file)
         light_field = light_field_from_array(views, path, options, axes="TSHWC")
         numbers = arrange_numbers(str(path), shape[:2], options)

@@ -197,10 +197,7 @@ def _by_number(folder: Path, named: ViewNumbers, numbers: Numbers, grid: tuple[i
 def _sorted(folder: Path, numbers: Numbers, grid: tuple[int, int]) -> Layout:
     """Views one after the other, row by row."""
     if len(numbers) != grid[0] * grid[1]:
-        raise SepiError(
-            f"{folder}: the names only sort the {len(numbers)} pictures, and the {grid[0]}x{grid[1]} grid that --grid "
-            f"gives has {grid[0] * grid[1]} views; expected as many pictures, or names such as {EXAMPLES}"
-        )
+        raise SepiError(f"{folder}: the names only sort the {len(numbers)} pictures; --grid gives {grid[0]}x{grid[1]}")
     ranked = sorted(numbers, key=lambda name: numbers[name])
     notes = [f"{_sorted_note(numbers)}, taken row by row; --order transpose if by columns"]
     return Layout(grid, {name: rank for rank, name in enumerate(ranked)}, notes)

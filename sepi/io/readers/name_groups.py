@@ -209,9 +209,9 @@ class NameGroup:
     def why_open(self) -> str:
         """What is unclear where nothing is counted."""
         if not self._beside:
-            return "no two of them alone fill a grid"
+            return "several numbers differ from name to name, and no two of them alone fill a grid"
         words = " and ".join(f"'{self._words[at] or self._texts[at]}'" for at in self._beside)
-        return f"those after {words} count no views, so that one value of each is to be chosen"
+        return f"the numbers after {words} count no views, so that one value of each is to be chosen"
 
     def numbers_of(self, name: str, columns: Sequence[int]) -> tuple[int, ...] | None:
         """Some of the numbers of a name; None where it is unlike those of the group."""

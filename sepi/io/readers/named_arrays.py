@@ -89,10 +89,8 @@ def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, 
     if len(triples) == 1:
         return triples[0]
     if fitting:
-        raise SepiError(
-            f"{path}: holds several arrays that may be a light field; choose one with --variable: "
-            f"{_listed({name: arrays[name] for name in fitting})}"
-        )
+        several = _listed({name: arrays[name] for name in fitting})
+        raise SepiError(f"{path}: holds several arrays that may be one; choose one with --variable: {several}")
     raise SepiError(f"{path}: {no_light_field(arrays)}")
 
 

@@ -72,10 +72,7 @@ def _opened(path: Path) -> Iterator[h5py.Group]:
         known = channels in (list(_COLOURS), list(_GREY), [*_COLOURS, *_GREY])
         if not known or any(key not in group.attrs for key in _COUNTS):
             held = printable(", ".join(list(group)[:6])) or "nothing"
-            raise SepiError(
-                f"{path}: '{GROUP}' is a group with {held}; expected the array of the first HCI benchmark, or OpenLF's "
-                f"group of r, g and b, or bw, with the attributes {', '.join(_COUNTS)}"
-            )
+            raise SepiError(f"{path}: '{GROUP}' holds {held}; expected r, g and b, or bw, and {', '.join(_COUNTS)}")
         yield group
 
 

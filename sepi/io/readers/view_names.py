@@ -105,10 +105,7 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
     names = sorted(names)
     group, counted = _best_reading(source, names)
     if counted is None:
-        raise SepiError(
-            f"{source}: several numbers differ from name to name ({group.names[0]}), and {group.why_open()}; give "
-            f"--pattern, such as {group.suggestion()}"
-        )
+        raise SepiError(f"{source}: {group.why_open()} ({group.names[0]}); try --pattern, such as {group.suggestion()}")
     if not counted.columns:
         raise SepiError(f"{source}: no number in the names counts the views; give --pattern, such as {EXAMPLES}")
     columns, said = group.row_first(counted.columns)

@@ -326,7 +326,7 @@ BAD: dict[str, Case] = {
     "two running numbers": case(["1_3.png", "2_1.png", "3_2.png"], "--pattern, such as '{number}_*.png'"),
     "times that do not fill the grid": case(
         by_number("{}.png", (102134, 102138, 102143)),
-        "the names only sort the 3 pictures, and the 2x2 grid that --grid gives has 4 views",
+        "the names only sort the 3 pictures; --grid gives 2x2",
         grid=(2, 2),
     ),
     "rows and columns of --grid exchanged": case(PLACES[:6], "--grid has 3x2", grid=(3, 2)),
