@@ -59,7 +59,7 @@ def tiff_form(page: Any, size: int) -> tuple[int, int, int, bool]:
     SepiError
         If the page is damaged, or of a form that would be decoded to other values than it holds.
     """
-    if _FORM_TAGS & (_codes(page) - {tag.code for tag in page.tags}):
+    if _FORM_TAGS & (directory_of(page)[0] - {tag.code for tag in page.tags}):
         raise SepiError("damaged TIFF: what its pixels are is cut off")
     bits, samples, photometric, dtype = page.bitspersample, page.samplesperpixel, page.photometric, page.dtype
     if dtype is None or dtype.str[1:] not in _KINDS or bits != 8 * dtype.itemsize:
@@ -121,13 +121,14 @@ def page_pixels(page: TiffPage) -> npt.NDArray[Any]:
     return np.ascontiguousarray(values)
 
 
-def _codes(page: Any) -> set[int]:
-    """Codes of the tags of a page, also of those that cannot be read."""
+def directory_of(page: Any) -> tuple[set[int], bool]:
+    """Codes of the tags of a page, also of those that cannot be read, and whether no page follows it."""
     form, file = page.parent.tiff, page.parent.filehandle
     file.seek(page.offset)
     (count,) = struct.unpack(form.tagnoformat, file.read(form.tagnosize))
     entries = file.read(count * form.tagsize)
-    return {struct.unpack_from(f"{form.byteorder}H", entries, at)[0] for at in range(0, len(entries), form.tagsize)}
+    codes = {struct.unpack_from(f"{form.byteorder}H", entries, at)[0] for at in range(0, len(entries), form.tagsize)}
+    return codes, bool(file.read(form.offsetsize) == bytes(form.offsetsize))
 
 
 def _require_no_larger(page: Any) -> None:

@@ -21,7 +21,7 @@ from sepi.io.hdf5 import has_dataset
 from sepi.io.images import SUFFIXES, picture_header
 from sepi.io.readers import eslf, matlab, numpy_files, open_lf, tiff_stack
 from sepi.io.readers.arrays import is_likely, with_white
-from sepi.io.readers.named_arrays import hdf5_shapes, no_light_field
+from sepi.io.readers.named_arrays import Shapes, hdf5_shapes, no_light_field
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import has_rows
 from sepi.lightfield import LightField, Truth
@@ -304,18 +304,14 @@ def _of_array(shape: tuple[int, ...], itemsize: int) -> Size:
 
 def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
     """Shape and bytes of a value of each array in a file that may be a light field, and that the file can hold."""
-    try:
-        if numpy_files.matches(path):
-            arrays = list(numpy_files.array_shapes(path).values())
-        elif matlab.matches(path):
-            arrays = list(matlab.array_shapes(path).values())
-        elif open_lf.matches(path):
-            arrays = [open_lf.views_shape(path)]
+    shapes: Shapes = {}
+    with suppress(SepiError):
+        reader = next((one for one in (numpy_files, matlab) if one.matches(path)), None)
+        if reader is None and open_lf.matches(path):
+            shapes = {"LF": open_lf.views_shape(path)}
         else:
             # the size alone, of many: whoever reads the views checks the file
-            arrays = list(hdf5_shapes(path, check=False).values())
-    except SepiError:
-        return []
+            shapes = hdf5_shapes(path, check=False) if reader is None else reader.array_shapes(path)
     most = path.stat().st_size * DEFLATE_RATIO
-    sized = [(shape, kind.itemsize) for shape, kind in arrays if is_likely(shape)]
+    sized = [(shape, kind.itemsize) for shape, kind in shapes.values() if is_likely(shape)]
     return [(shape, itemsize) for shape, itemsize in sized if 0 < math.prod(shape) * itemsize <= most]

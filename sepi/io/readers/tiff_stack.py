@@ -6,7 +6,6 @@ views, and an axis of three channels holds their colours. Otherwise the pages ar
 
 from __future__ import annotations
 
-import struct
 from dataclasses import replace
 from math import prod
 from pathlib import Path
@@ -19,7 +18,7 @@ from sepi.io.files import DEFLATE_RATIO, naming, reading
 from sepi.io.readers.arrays import Array, light_field_from_array
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import MAX_VIEWS
-from sepi.io.tiff import TIFF_SIGNATURES, open_tiff, page_pixels, tiff_form
+from sepi.io.tiff import TIFF_SIGNATURES, directory_of, open_tiff, page_pixels, tiff_form
 from sepi.lightfield import LightField
 
 _SUFFIXES = (".tif", ".tiff")
@@ -85,12 +84,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
 
 def _is_whole(pictures: Any) -> bool:
     """Whether no page follows the last that can be read: tifffile leaves out what lies beyond the end of a file."""
-    form, file = pictures.tiff, pictures.filehandle
-    at = pictures.pages[len(pictures.pages) - 1].offset
-    file.seek(at)
-    (tags,) = struct.unpack(form.tagnoformat, file.read(form.tagnosize))
-    file.seek(at + form.tagnosize + tags * form.tagsize)
-    return bool(file.read(form.offsetsize) == bytes(form.offsetsize))
+    return directory_of(pictures.pages[len(pictures.pages) - 1])[1]
 
 
 def _form(pictures: Any, size: int) -> tuple[int, int, int, int]:
