@@ -290,14 +290,10 @@ def _write_numbers(
     write_pfm(folder / "disparity.pfm", maps.disparity)
     with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
         np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
+    view, unknown = light_field.views[light_field.reference_position], maps.mask(UNKNOWN)
+    camera, centre, rig = light_field.camera, light_field.from_centre, light_field.reference_rig
     cloud = point_cloud(
-        light_field.views[light_field.reference_position],
-        maps.disparity,
-        camera=light_field.camera,
-        from_centre=light_field.from_centre,
-        unknown=maps.mask(UNKNOWN),
-        rig=light_field.reference_rig,
-        sigma=maps.sigma,
+        view, maps.disparity, camera=camera, from_centre=centre, unknown=unknown, rig=rig, sigma=maps.sigma
     )
     write_ply(folder / "points.ply", cloud)
 

@@ -220,15 +220,8 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
         )
     assumed = [] if given else [f"axes taken as {' '.join(letters)}; --axes sets them otherwise"]
     missing = [*_missing_notes("all zeros", black), *_missing_notes("NaN throughout", unknown)]
-    return LightField(
-        views=views,
-        name=path.stem,
-        source=source,
-        present=present,
-        view=options.view,
-        notes=(*assumed, *channel_notes, *scale.notes, *missing),
-        arranged=arranged,
-    )
+    notes = (*assumed, *channel_notes, *scale.notes, *missing)
+    return LightField(views, path.stem, source, present, view=options.view, notes=notes, arranged=arranged)
 
 
 def rearrange(light_field: LightField, options: ReadOptions) -> LightField:

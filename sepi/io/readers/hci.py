@@ -128,17 +128,10 @@ def read_views(path: Path, options: ReadOptions) -> LightField:
     known = parameters.model_dump(include=set(_CAMERA))
     with naming(file):
         camera = None if None in known.values() else camera_from(**known, shape=shape, crop_of=options.part)
+    # one number for both directions: rows are as far apart as columns
+    settled, name, view = parameters.baseline_mm is not None, parameters.scene or str(name_of(path)), options.view
     return LightField(
-        views=views,
-        name=parameters.scene or str(name_of(path)),
-        source=str(path),
-        present=present,
-        view=options.view,
-        disparity_range=disparity_range,
-        camera=camera,
-        # one number for both directions: rows are as far apart as columns
-        settled=parameters.baseline_mm is not None,
-        files=names,
+        views, name, str(path), present, disparity_range, view=view, camera=camera, settled=settled, files=names
     )
 
 

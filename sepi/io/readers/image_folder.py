@@ -254,21 +254,13 @@ def read(path: Path, options: ReadOptions) -> LightField:
     views = {layout.positions[name]: path / name for name in named.numbers}
     pixels, present, numbers, names = read_grid(path, views, layout.grid, options)
     unmatched = [name for name in named.unmatched if _is_picture(name)]
+    notes = _left_out(unmatched, "whose name is unlike the views'", "whose names are unlike the views'")
+    told = (*notes, *_left_out(list(odd), *2 * ["of another size than all others"]), *layout.notes)
+    arranged, name = layout.arranged, str(name_of(path))
     light_field = LightField(
-        views=pixels,
-        name=str(name_of(path)),
-        source=str(path),
-        present=present,
-        view=options.view,
-        notes=(
-            *_left_out(unmatched, "whose name is unlike the views'", "whose names are unlike the views'"),
-            *_left_out(list(odd), *2 * ["of another size than all others"]),
-            *layout.notes,
-        ),
-        arranged=layout.arranged,
-        files=names,
+        pixels, name, str(path), present, view=options.view, notes=told, arranged=arranged, files=names
     )
-    return _with_positions(light_field, layout, numbers) if layout.arranged else light_field
+    return _with_positions(light_field, layout, numbers) if arranged else light_field
 
 
 def _views(folder: Path, names: Sequence[str], options: ReadOptions) -> tuple[ViewNumbers, dict[str, str]]:

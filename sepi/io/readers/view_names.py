@@ -17,11 +17,8 @@ _PAIRS = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("l", "r"), (
 _INTEGER = r"(?P<integer>[+-]*+[0-9]++)"
 # ways to find the numbers, and whether decimals may count: camera positions beside numbers that count, names such as
 # 03.07.png, and names with nothing but positions such as 0.5_1.0.png
-_FORMS = (
-    (re.compile(f"{DECIMAL}|{_INTEGER}"), False),
-    (re.compile(_INTEGER), False),
-    (re.compile(f"{DECIMAL}|{_INTEGER}"), True),
-)
+_EITHER = re.compile(f"{DECIMAL}|{_INTEGER}")
+_FORMS = ((_EITHER, False), (re.compile(_INTEGER), False), (_EITHER, True))
 
 
 @dataclass(frozen=True)
@@ -116,15 +113,9 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
         numbers = {name: (ranks[key],) for name, key in numbers.items()}
         # of names that only sort, no other has a place among the views
         numbers_of = _no_numbers
-    kept = set(group.names)
-    return ViewNumbers(
-        numbers,
-        numbers_of,
-        tuple(name for name in names if name not in kept),
-        counted.kind,
-        "" if counted.kind is Kind.SORT else group.pattern(columns),
-        said,
-    )
+    pattern = "" if counted.kind is Kind.SORT else group.pattern(columns)
+    others = tuple(sorted({*names}.difference(group.names)))
+    return ViewNumbers(numbers, numbers_of, others, counted.kind, pattern, said)
 
 
 def decimals_in(names: Sequence[str]) -> list[tuple[float, ...]]:
