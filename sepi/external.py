@@ -19,7 +19,7 @@ from sepi.command import SepiCommand, bad_thresholds
 from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluations_of
 from sepi.io.disparity_maps import map_file, read_disparity
-from sepi.io.external_maps import ExternalMap, ExternalSource, write_external
+from sepi.io.scores import ExternalMap, ExternalSource, write_external
 from sepi.io.truth import read_with_truth
 from sepi.lightfield import LightField
 

@@ -14,11 +14,10 @@ from sepi.camera import Camera
 from sepi.errors import SepiWarning
 from sepi.evaluate import evaluations_of
 from sepi.external import ExternalSource, external_maps
-from sepi.io.external_maps import ExternalMap, write_external
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.pfm import write_pfm
 from sepi.io.provenance import scene_attributes, stage_attributes
-from sepi.io.scores import map_name, write_scores
+from sepi.io.scores import ExternalMap, map_name, write_external, write_scores
 from sepi.io.truth import write_truth
 from sepi.lightfield import FloatMap, LightField
 from sepi.machine import this_machine

@@ -14,10 +14,9 @@ from click.testing import CliRunner, Result
 from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluation_of
 from sepi.external import ExternalSource, command, external_maps
-from sepi.io.external_maps import ExternalMap, read_external, write_external
 from sepi.io.hdf5 import write_light_field
 from sepi.io.pfm import write_pfm
-from sepi.io.scores import without_nan
+from sepi.io.scores import ExternalMap, read_external, without_nan, write_external
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
 

@@ -24,6 +24,8 @@ from sepi.lightfield import FloatMap, LightField
 from sepi.stage import ERROR_BARS, StageMaps
 
 View = tuple[int, int]
+_Maps = Mapping[str, npt.NDArray[Any]]
+_Attributes = Mapping[str, hdf5.Attribute]
 
 _KIND = "file of maps of all views, of this version of 'sepi depth --all-views'"
 # of the datasets the one that no other file has
@@ -32,10 +34,7 @@ _MISSING = dict.fromkeys(("disparity", *ERROR_BARS), np.nan)
 
 
 def write_all_views(
-    path: Path,
-    light_field: LightField,
-    views: Iterable[tuple[View, Mapping[str, npt.NDArray[Any]]]],
-    attributes: Mapping[str, hdf5.Attribute],
+    path: Path, light_field: LightField, views: Iterable[tuple[View, _Maps]], attributes: _Attributes
 ) -> None:
     """Write the maps of all views, whole or not at all; equal content gives equal bytes.
 

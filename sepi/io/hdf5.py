@@ -254,10 +254,11 @@ def read_light_field(path: Path) -> LightField:
             searched = DisparityRange(low, high, str(known["disparity_range_source"]))
             require_known("disparity range", [searched.source], RANGE_SOURCES)
         positions, missing, view = arrays.get("positions"), arrays.get("missing"), known.get("view")
+        texts: dict[str, Any] = {key: str(known[key]) for key in ("name", "source")}
         return LightField(
             views=arrays["views"],
-            name=str(known["name"]),
-            source=str(known["source"]),
+            **texts,
+            reading=str(known.get("reading", "")),
             present=arrays["present"].astype(bool),
             view=None if view is None else (int(view[0]), int(view[1])),
             row_spacing=float(known.get("row_spacing", 1.0)),
@@ -269,7 +270,6 @@ def read_light_field(path: Path) -> LightField:
             ground_truth=ground_truth,
             masks=masks,
             rig=Rig.from_text(arrays[RIG].tobytes().decode("utf-8", "replace")) if RIG in arrays else None,
-            reading=str(known.get("reading", "")),
             missing=None if missing is None else missing.astype(bool),
         )
 

@@ -60,7 +60,8 @@ def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
         If the file is unreadable, no picture of these kinds, cut off or damaged, of other numbers than 8 or 16 bit or
         float32, or has float pixels that are not finite or far outside 0..1.
     """
-    with _no_warnings():
+    # of what is told as an error, or does not matter
+    with warnings.catch_warnings(action="ignore"):
         return _read(path, any_floats)
 
 
@@ -122,8 +123,8 @@ def read_views(
             raise SepiError(f"{paths[index]}: {_described(image)}, but {paths[0].name} is {_described(first)}")
         views[positions[index]] = image
 
-    # decoding runs outside Python's lock, so threads share the work
-    with _no_warnings(), ThreadPoolExecutor(min(8, available_cores())) as pool:
+    # decoding runs outside Python's lock, so threads share the work; the list of filters for warnings is one for all
+    with warnings.catch_warnings(action="ignore"), ThreadPoolExecutor(min(8, available_cores())) as pool:
         try:
             for _ in pool.map(fill, range(len(paths))):
                 pass
@@ -182,17 +183,6 @@ def write_png(path: Path, pixels: Pixels | BoolMap, texts: Mapping[str, str] | N
         if not done:
             raise SepiError(f"{path}: pixels {pixels.shape} of type {pixels.dtype} cannot be written as PNG")
         temporary.write_bytes(data.tobytes())
-
-
-@contextmanager
-def _no_warnings() -> Iterator[None]:
-    """Keep Pillow from warning of what is told as an error, or does not matter.
-
-    Not to be used by several threads at once: Python has one list of filters for all, and who leaves last would put
-    back what another had set, so that no warning was ever shown again.
-    """
-    with warnings.catch_warnings(action="ignore"):
-        yield
 
 
 @contextmanager

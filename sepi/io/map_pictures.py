@@ -130,12 +130,9 @@ def bars_in_metres(maps: StageMaps, camera: Camera | None) -> dict[str, FloatMap
     """
     if camera is None or maps.sigma is None or maps.low is None or maps.high is None:
         return {}
-    return {
-        "depth_sigma": camera.depth_sigma(maps.disparity, maps.sigma),
-        # larger disparities are nearer
-        "nearest": camera.depth(maps.high),
-        "farthest": camera.depth(maps.low),
-    }
+    sigma = camera.depth_sigma(maps.disparity, maps.sigma)
+    # larger disparities are nearer
+    return {"depth_sigma": sigma, "nearest": camera.depth(maps.high), "farthest": camera.depth(maps.low)}
 
 
 def names_of_error_bars(maps: StageMaps, *, in_metres: bool) -> tuple[str, ...]:

@@ -90,13 +90,11 @@ class PointCloud:
         tuple of str
             Axes, units, and what ``sigma`` is where there is one.
         """
-        of_depth = "sigma: standard deviation of the depth along the viewing direction, "
+        sigma = f"sigma: standard deviation of the depth along the viewing direction, {self.units or 'metres'}"
+        lines = _AXES, "metres; origin: camera of the view"
         if self.units is not None:
-            lines, sigma = (WORLD, self.units), of_depth + self.units
-        elif self.metric:
-            lines = _AXES, "metres; origin: camera of the view"
-            sigma = of_depth + "metres"
-        else:
+            lines = WORLD, self.units
+        elif not self.metric:
             units = f"x and y: pixels from the middle; z: disparity (pixels per view step) times {self.stretch!r}"
             lines, sigma = (_AXES, units), "sigma: standard deviation of the disparity, pixels per view step"
         return lines if self.sigma is None else (*lines, sigma)

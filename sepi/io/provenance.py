@@ -213,13 +213,9 @@ def stage_attributes(light_field: LightField, history: Sequence[Entry]) -> dict[
         How the maps were made; the last entry is the file's own, the others become ``made_from``.
     """
     *before, last = history
-    return {
-        **scene_attributes(light_field),
-        "stage": last["stage"],
-        "choice": last["choice"],
-        "parameters": json.dumps(last["parameters"], sort_keys=True),
-        "made_from": json.dumps(before, sort_keys=True),
-    }
+    parameters, made_from = (json.dumps(told, sort_keys=True) for told in (last["parameters"], before))
+    own = {"stage": last["stage"], "choice": last["choice"], "parameters": parameters, "made_from": made_from}
+    return {**scene_attributes(light_field), **own}
 
 
 def result_attributes(light_field: LightField, maps: StageMaps, digest: str | None = None) -> dict[str, Attribute]:

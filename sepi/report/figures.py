@@ -16,11 +16,10 @@ import click
 import numpy as np
 
 from sepi.command import SepiCommand
-from sepi.io.external_maps import read_external
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.hdf5 import read_stage
 from sepi.io.images import write_png
-from sepi.io.scores import read_evaluations
+from sepi.io.scores import read_evaluations, read_external
 from sepi.io.truth import read_with_truth
 from sepi.matching.unknown import with_unknown
 from sepi.report.panels import Panel, SceneResults, first_final, panels_of

@@ -19,8 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.command import SepiCommand
-from sepi.io.external_maps import read_external
-from sepi.io.scores import Scores, read_reliability, read_scores, without_nan
+from sepi.io.scores import Scores, read_external, read_reliability, read_scores, without_nan
 from sepi.io.truth import read_with_truth
 from sepi.report.plan import Plan
 from sepi.report.pooled import pooled_q25

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from sepi.io.external_maps import read_external
-from sepi.io.scores import Evaluation, read_evaluations
+from sepi.io.scores import Evaluation, read_evaluations, read_external
 from sepi.report.plan import Plan
 from sepi.scoring.scores import WHOLE_MAP
 from sepi.workflow.rendered_scenes import DATASET, rendered_scene

@@ -15,9 +15,9 @@ from pydantic import Field, create_model
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES, TruthFile
-from sepi.io.external_maps import ExternalSource
 from sepi.io.readers.formats import FORMATS
 from sepi.io.readers.options import AS_GIVEN, ORDERS, Positive, ReadOptions
+from sepi.io.scores import ExternalSource
 from sepi.lightfield import DisparityRange
 from sepi.models import CheckedModel, validated
 from sepi.scenes import SCENES

@@ -12,8 +12,8 @@ from pydantic import Field
 
 from sepi.compared.methods import LEARNED
 from sepi.errors import SepiError
-from sepi.io.external_maps import ExternalSource
 from sepi.io.readers.options import Index
+from sepi.io.scores import ExternalSource
 from sepi.models import CheckedModel
 from sepi.stage import Parameters
 from sepi.validation import require_known

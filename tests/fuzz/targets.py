@@ -11,7 +11,6 @@ from mutations import MAT, PNG
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import TruthFile, is_disparity, read_disparity, read_error_bars
-from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field as read_own
 from sepi.io.hdf5 import read_stage
 from sepi.io.images import picture_header, png_texts, read_picture
@@ -19,7 +18,7 @@ from sepi.io.provenance import history_of, read_origin
 from sepi.io.readers.formats import format_of, read, size_of
 from sepi.io.readers.options import ReadOptions
 from sepi.io.result_folder import read_result
-from sepi.io.scores import read_evaluations, read_scores
+from sepi.io.scores import read_evaluations, read_external, read_scores
 from sepi.reading import read_light_field
 from sepi.report.runs import read_numbers
 from sepi.scoring.hci_submission import problems_of

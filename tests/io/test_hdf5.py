@@ -13,9 +13,8 @@ from geometries import GEOMETRIES, standing
 from hdf5_edits import changed
 
 from sepi.errors import SepiError
-from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_stage, write_light_field, write_stage
-from sepi.io.scores import read_evaluations
+from sepi.io.scores import read_evaluations, read_external
 from sepi.lightfield import DisparityRange, LightField
 from sepi.reading import read_light_field
 from sepi.stage import CostVolume, StageMaps

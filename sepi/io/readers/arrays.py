@@ -125,11 +125,8 @@ def _range_of(source: str, position: tuple[int, int], view: npt.NDArray[np.gener
 Array = npt.NDArray[np.generic]
 
 # orders of the axes that are looked for; "N" is the number t * S + s of a view
-_LAYOUTS = tuple(
-    "".join(order)
-    for axes in (("TS", "HW", "C"), ("TS", "HW"), ("N", "HW", "C"), ("N", "HW"))
-    for order in permutations(axes)
-)
+_AXES = (("TS", "HW", "C"), ("TS", "HW"), ("N", "HW", "C"), ("N", "HW"))
+_LAYOUTS = tuple("".join(order) for axes in _AXES for order in permutations(axes))
 _MOST_AXES = 5
 _AXES_HELP = "T, S: row and column of the view, or N: its number; H, W: of the pixel; C: colour"
 _COLOURS = (1, 3, 4)
@@ -306,12 +303,9 @@ def readings(shape: tuple[int, ...], grid: tuple[int, int] | None = None) -> lis
     squares = [size for size in coloured if size["N"] % 2 and isqrt(size["N"]) ** 2 == size["N"]]
     unclear = first if any(size in squares for size in first) else first + squares
     rows = [size for size in rows if _is_small(size)] or unclear or rows
-    found = [
-        size
-        for size in (*grids, *rows)
-        if grid in (None, (size.get("T"), size.get("S"))) or prod(grid) == size.get("N")
-    ]
-    return ["".join(size) for size in found or (*grids, *rows)]
+    both = (*grids, *rows)
+    found = [size for size in both if grid in (None, (size.get("T"), size.get("S"))) or prod(grid) == size.get("N")]
+    return ["".join(size) for size in found or both]
 
 
 def _is_small(size: dict[str, int]) -> bool:

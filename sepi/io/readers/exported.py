@@ -11,6 +11,7 @@ import json
 import re
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
@@ -50,6 +51,11 @@ class Manifest(BaseModel, defer_build=True):
     ground_truth: str | None = None
     masks: dict[str, str] = {}
     notes: tuple[str, ...] = ()
+
+
+def _same(known: Manifest | LightField) -> dict[str, Any]:
+    """What a light field and its manifest hold alike."""
+    return {key: getattr(known, key) for key in ("name", "view", "row_spacing", "disparity_range", "camera", "notes")}
 
 
 def read_manifest(path: Path) -> Manifest:
@@ -106,23 +112,11 @@ def read(path: Path, options: ReadOptions) -> LightField:
         for place, name in np.ndenumerate(np.array(known.missing, object)):
             if name is not None:
                 missing[place] = _read_mask(path / name, views.shape[2:4])
+    ground_truth = None if known.ground_truth is None else read_pfm(path / known.ground_truth)
+    masks = {name: _read_mask(path / mask) for name, mask in known.masks.items()}
+    truth: dict[str, Any] = {"ground_truth": ground_truth, "masks": masks, "positions": positions, "missing": missing}
     with naming(file):
-        light_field = LightField(
-            views=views,
-            name=known.name,
-            source=str(path),
-            present=present,
-            disparity_range=known.disparity_range,
-            ground_truth=None if known.ground_truth is None else read_pfm(path / known.ground_truth),
-            masks={name: _read_mask(path / mask) for name, mask in known.masks.items()},
-            view=known.view,
-            row_spacing=known.row_spacing,
-            positions=positions,
-            camera=known.camera,
-            notes=known.notes,
-            settled=True,
-            missing=missing,
-        )
+        light_field = LightField(views, source=str(path), present=present, settled=True, **truth, **_same(known))
     return rearrange(light_field, in_grid(options))
 
 
@@ -216,17 +210,12 @@ def _write_folder(folder: Path, light_field: LightField) -> set[str]:
         write_png(folder / file, light_field.masks[name])
     places = [] if light_field.positions is None else light_field.positions.tolist()
     known = Manifest(
-        name=light_field.name,
         views=names.tolist(),
-        view=light_field.view,
-        row_spacing=float(light_field.row_spacing),
         positions=[[at if np.isfinite(at).all() else None for at in row] for row in places] or None,
         missing=None if light_field.missing is None else hidden.tolist(),
-        disparity_range=light_field.disparity_range,
-        camera=light_field.camera,
         ground_truth=None if light_field.ground_truth is None else _TRUTH,
         masks=masks,
-        notes=light_field.notes,
+        **_same(light_field),
     )
     # a line for each key
     lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in known.model_dump(mode="json").items()]

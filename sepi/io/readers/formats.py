@@ -63,15 +63,12 @@ class Format(NamedTuple):
         return files
 
 
-# light fields that a message names, and levels of folders in which it looks for them
+# light fields that a message names
 _LISTED = 5
-_DEPTH = 1
 
 # poses of LLFF, Gaussian splatting and NeuS
 _POSES = ("poses_bounds.npy", "cameras.json", "cameras_sphere.npz")
 
-# what Lytro's cameras and programs write
-_RAW = frozenset({".lfr", ".lfp", ".raw"})
 
 _ARRAY_OPTIONS = ("grid", "axes", "variable")
 _CAMERAS = "COLMAP model, transforms.json, cameras.csv or cameras.yaml"
@@ -200,7 +197,7 @@ def _what_else(path: Path) -> str:
     """What a path that is no light field seems to be, for who gave the wrong one of several."""
     if _is_result(path):
         return "holds a disparity map, not a light field"
-    if any(one.suffix.lower() in _RAW and one.is_file() for one in (path, *path.glob("*"))):
+    if any(one.suffix.lower() in (".lfr", ".lfp", ".raw") and one.is_file() for one in (path, *path.glob("*"))):
         return "raw data of a Lytro camera; decode it with the Light Field Toolbox (MATLAB) or PlenoptiCam (Python)"
     if path.is_file() and path.suffix.lower() in SUFFIXES:
         return "a single picture; give the folder of all views, or --format mosaic or eslf with --grid ROWSxCOLUMNS"
@@ -216,7 +213,7 @@ def _is_result(path: Path) -> bool:
     return has_dataset(path / "result.h5" if path.is_dir() else path, "disparity")
 
 
-def _inside(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
+def _inside(folder: Path, depth: int = 1) -> Iterator[Path]:
     """The light fields in a folder, and in folders of it, as far as they may be read."""
     with suppress(OSError):
         for entry in sorted(folder.iterdir()):

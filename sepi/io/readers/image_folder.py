@@ -351,8 +351,5 @@ def odd_pictures(folder: Path, names: Iterable[str]) -> dict[str, str]:
     usual, count = Counter(sizes.values()).most_common(1)[0]
     if count < 2 or len(sizes) - count > max(1, _ODD * len(sizes)):
         return {}
-    return {
-        name: f"{size[0]}x{size[1]} pixels, but all other views have {usual[0]}x{usual[1]}"
-        for name, size in sizes.items()
-        if size != usual
-    }
+    most = "pixels, but all other views have {}x{}".format(*usual)
+    return {name: f"{width}x{height} {most}" for name, (width, height) in sizes.items() if (width, height) != usual}

@@ -218,10 +218,8 @@ _KIND = "MATLAB file"
 
 def matches(path: Path) -> bool:
     """Whether ``path`` is a file with MATLAB's header or its ending ``.mat``."""
-    if not path.is_file():
-        return False
-    if path.suffix.lower() == ".mat":
-        return True
+    if path.suffix.lower() == ".mat" or not path.is_file():
+        return path.is_file()
     try:
         head = _head(path)
     except SepiError:

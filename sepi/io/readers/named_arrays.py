@@ -96,10 +96,8 @@ def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, 
 
 def no_light_field(arrays: Shapes) -> str:
     """What to say of a file whose arrays are no light field: what they are."""
-    return (
-        f"holds no array of numbers of 4 or 5 axes (found: {_listed(arrays) or 'nothing'}); a single picture of all "
-        "views is read as PNG or TIFF with --format mosaic --grid ROWSxCOLUMNS"
-    )
+    found = _listed(arrays) or "nothing"
+    return f"holds no array of numbers of 4 or 5 axes (found: {found}); a picture of all views takes --format mosaic"
 
 
 def _listed(arrays: Shapes) -> str:

@@ -59,11 +59,8 @@ def has_rows(folder: Path, *, surely: bool) -> bool:
 
 def files_in(folder: Path) -> list[Path]:
     """Files and links that lead to no folder; hidden ones are not views."""
-    return sorted(
-        file
-        for file in folder.iterdir()
-        if not file.name.startswith(".") and (file.is_file() or (file.is_symlink() and not file.is_dir()))
-    )
+    shown = (file for file in folder.iterdir() if not file.name.startswith("."))
+    return sorted(file for file in shown if file.is_file() or (file.is_symlink() and not file.is_dir()))
 
 
 def numbered(files: list[Path]) -> list[str]:

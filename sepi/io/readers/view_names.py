@@ -11,7 +11,6 @@ from itertools import pairwise
 from sepi.errors import SepiError
 from sepi.io.readers.name_groups import DECIMAL, EXAMPLES, MAX_DIGITS, Counting, Kind, NameGroup, fill, hyphens, signed
 
-_FIELDS = ("row", "column", "number")
 # names of the two views of a pair
 _PAIRS = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("l", "r"), ("L", "R"))
 _INTEGER = r"(?P<integer>[+-]*+[0-9]++)"
@@ -62,7 +61,7 @@ def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewN
     """
     names = sorted(names)
     form = _compiled(source, pattern)
-    fields = [field for field in _FIELDS if field in form.groupindex]
+    fields = [field for field in ("row", "column", "number") if field in form.groupindex]
     matches = {name: match for name in names if (match := form.fullmatch(name))}
     if not matches:
         found = f"; found: {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}" if names else ""
@@ -75,12 +74,9 @@ def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewN
         values = [] if match is None else [int(match[field]) for field in fields]
         return tuple(abs(n) if hyphen else n for n, hyphen in zip(values, signs, strict=False)) or None
 
-    return ViewNumbers(
-        {name: numbers for name in matches if (numbers := numbers_of(name)) is not None},
-        numbers_of,
-        tuple(name for name in names if name not in matches),
-        Kind.GRID if len(fields) == 2 else Kind.COUNT,
-    )
+    numbers = {name: values for name in matches if (values := numbers_of(name)) is not None}
+    others = tuple(name for name in names if name not in matches)
+    return ViewNumbers(numbers, numbers_of, others, Kind.GRID if len(fields) == 2 else Kind.COUNT)
 
 
 def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
