@@ -1,6 +1,7 @@
 """All HDF5 reading and writing: light fields and stage files.
 
-Each file tells whether it was damaged (:mod:`sepi.io.hdf5`).
+Each file begins with a digest of all bytes that follow, in what HDF5 calls the user block, which other programs skip:
+from a damaged file HDF5 may read other numbers, crash, or hang, so a file is checked before anything is made of it.
 
 A stage file holds ``disparity (H, W) float32`` in pixels per view step, ``confidence (H, W) float32`` in 0..1, the
 stage's own maps, and attributes that say what made them; where a later stage is to choose among candidates, their costs

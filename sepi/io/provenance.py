@@ -226,7 +226,7 @@ def result_attributes(light_field: LightField, maps: StageMaps, digest: str | No
     light_field : LightField
     maps : StageMaps
     digest : str, optional
-        As in :func:`sepi.io.provenance.origin_attributes`.
+        As in :func:`origin_attributes`.
     """
     made_by, origin = maps.made_by, origin_attributes(light_field, digest)
     if made_by is None:

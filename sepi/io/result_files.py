@@ -1,4 +1,4 @@
-"""The files of a result: their names, and whose a folder is that one is to be written to."""
+"""The files of a result: their names, whose a folder is that one is to be written to, and whether maps are sound."""
 
 from __future__ import annotations
 

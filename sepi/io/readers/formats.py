@@ -1,4 +1,4 @@
-"""The formats of light fields: which one a path is of, and reading it."""
+"""The formats of light fields: which one a path is of, reading it, and how large it is by its headers alone."""
 
 from __future__ import annotations
 

@@ -5,7 +5,10 @@ The axes are those that MATLAB shows. It drops trailing axes of size 1, so grey 
 fourth channel.
 
 Version 5 is read without SciPy, which ends the program with a segmentation fault where the type of the values is none
-that there is, and reads an array in a structure only with all else that is in there.
+that there is, and reads an array in a structure only with all else that is in there. After a header of 128 bytes come
+elements, each a tag of type and length and then data; a variable is a *matrix* element, or that compressed by zlib, and
+begins with the elements flags, dimensions and name. The values of an array follow; of a structure the length of its
+fields' names, the names, and a matrix element for each field of each of its elements. No word of theirs takes memory.
 
 References
 ----------
