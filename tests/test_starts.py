@@ -190,10 +190,12 @@ import numpy as np
 from sepi import kernels
 from sepi.kernels import semi_global
 kernels.set_thread_count(2)
-averaged, disparities = np.zeros((8, 8, 16), np.uint16), np.linspace(0, 1, 8, dtype=np.float32)
+volume, disparities = np.zeros(8 * 8 * 16, np.uint16), np.linspace(0, 1, 8, dtype=np.float32)
+first = np.zeros((8, 8), np.int32)
+places = first, first + 16, np.arange(0, 8 * 8 * 16, 16).reshape(8, 8), 16
 disparity, margin = np.empty((2, 8, 8), np.float32)
 def loop():
-    semi_global.choose(averaged, averaged, disparities, 0.1, disparity, margin)
+    semi_global.choose(volume, volume, disparities, places, 0.1, disparity, margin)
 loop()
 begun = time.process_time()
 for _ in range(200):
