@@ -31,7 +31,7 @@ from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_view
 from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
-from sepi.matching.denoising import DenoisedLightField, measured_noise
+from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
 from sepi.matching.softening import compared_views
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import (
@@ -200,7 +200,7 @@ def second_order(
     from sepi.matching.surface_windows import ANY_SURFACE, Surfaces, windowed_step
 
     before, given = require_previous(previous), light_field
-    noisy = isinstance(compared_views(light_field, parameters), DenoisedLightField)
+    noisy = isinstance(denoised(light_field, parameters.denoising), DenoisedLightField)
     light_field = compared_views(light_field, parameters, parameters.least_noise)
     disparity = before.disparity
     uniform = before.mask("textureless")

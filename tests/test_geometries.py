@@ -103,7 +103,7 @@ def test_a_part_of_a_picture_has_the_camera_of_the_whole() -> None:
     # the same ray through the same pixel: its place from the picture's middle and the principal point's
     assert (30 - 1) / 2 + part.right == (96 - 1) / 2 - 60
     assert (40 - 1) / 2 + part.down == (64 - 1) / 2 - 2
-    with pytest.raises(SepiError, match="from column 67, row 2 on do not lie inside 96x64"):
+    with pytest.raises(SepiError, match=r"column 67, row 2 .*96x64"):
         camera_from(**known, shape=(40, 30), crop_of=(96, 64, 67, 2))
 
 

@@ -115,7 +115,8 @@ def compared_depths(
     views = light_field.rgb_views
     depths, unit = (disparity, other, guide_of(light_field)), 1 / full_scale(views.dtype)
     sums = np.zeros((3, *disparity.shape), np.float32)
-    for begin, end, rows in row_bands(light_field, others, float(np.abs(disparity).max()), _BYTES_PER_PIXEL):
+    farthest = float(max(np.abs(disparity).max(), np.abs(other).max()))
+    for begin, end, rows in row_bands(light_field, others, farthest, _BYTES_PER_PIXEL):
         nearest = nearest_surfaces(light_field, other if occluders is None else occluders, others, rows)
         asked = (others, light_field.baselines, nearest, rows.low, occlusion_margin)
         kernels.compare_depths(views, unit, *depths, asked, most, begin, end, sums)

@@ -92,7 +92,7 @@ def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple
     pixels, samples = height * width, height * width * int(light_field.present.sum())
     own = max((p.needs.bytes_per_sample * samples + p.needs.bytes_per_pixel * pixels for p in stages), default=0)
     ours = _BYTES_OF_MAPS * pixels + max(bytes_of_volumes(light_field, stages), *rings, 0)
-    copies = {id(light_field.views): 0}
+    copies = [light_field.views]
     for p in stages:
         made: tuple[LightField, ...] = ()
         if isinstance(p, SofteningParameters):
@@ -100,8 +100,8 @@ def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple
         elif isinstance(p, SweepParameters):
             made = (softened(light_field, p.softening),)
         for field in made:
-            copies.setdefault(id(field.views), field.views.nbytes)
-    ours += sum(copies.values())
+            copies += [field.views] * all(field.views is not known for known in copies)
+    ours += sum(views.nbytes for views in copies[1:])
     whole = _LIBRARIES + light_field.views.nbytes + round(max(ours, own))
     in_bands = any(isinstance(p, (BaseDetailParameters, OcclusionMarginParameters)) for p in stages)
     if not in_bands:

@@ -48,7 +48,7 @@ _LEAST_CONTRAST = 3e-3
 Softening = Annotated[
     float, Field(ge=0, le=3, description="blur of texture too sharp for interpolation, in pixels; 0 keeps it")
 ]
-"""A parameter of every choice that compares views."""
+"""A parameter of the sweeps and of what refines their maps."""
 
 
 class SofteningParameters(DenoisingParameters):
@@ -111,8 +111,8 @@ def softened(light_field: LightField, blur: float, noise: ViewNoise | None = Non
         return light_field
     kept = kept_of(light_field, _Kept)
     if kept.blur != blur:
-        kept.blur = blur
-        kept.made = _softened_views(light_field, measured_noise(light_field) if noise is None else noise, blur)
+        made = _softened_views(light_field, measured_noise(light_field) if noise is None else noise, blur)
+        kept.made, kept.blur = made, blur
     return light_field if kept.made is None else replace(light_field, views=kept.made)
 
 
@@ -149,6 +149,9 @@ def sharpness(picture: FloatMap, variance: FloatMap) -> FloatMap:
 def _softened_views(light_field: LightField, noise: ViewNoise, blur: float) -> npt.NDArray[Any] | None:
     """The views, blurred where they are too sharp; None if hardly any place is."""
     views = light_field.views
+    if light_field.missing is not None:
+        # what a view does not show is black, and would be blurred into what it shows
+        return None
     # views are as bright as the reference view within the window
     variance = (_OF_GREY**2 * expected_variance(light_field, noise)).astype(np.float32)
     if np.mean(_too_sharp(views[light_field.reference_position], variance) > 0) < LEAST_SHARE:

@@ -288,4 +288,4 @@ def uniform_regions(
     colour = cv2.blur(mean * core[..., None].astype(np.float32), (size, size)) / np.maximum(near, 1e-9)[..., None]
     alike = np.sum(cv2.split((mean - colour) ** 2), axis=0) < 27 * variance + parameters.colour_tolerance**2
     # above zero by more than the rounding errors of a running sum
-    return np.asarray(core | ((near > 0.5 / size**2) & alike & (confidence < parameters.grow_confidence)))
+    return np.asarray(core | ((near > 1.5 / size**2) & alike & (confidence < parameters.grow_confidence)))

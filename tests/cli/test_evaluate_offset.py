@@ -168,4 +168,5 @@ def test_ground_truth_of_the_whole_picture_is_cut_as_the_views_were(
     for wrong, size in ((f"64x63+{left}+{top}", (64, 64)), ("64x64+40+40", (24, 24))):
         told = evaluate("crop.npy", "truth.pfm", "--crop-of", wrong)
         assert (told.exit_code, told.stderr.count("\n")) == (1, 1)
-        assert f"ground truth is {size}, the estimate {SIZE}" in told.stderr
+        assert str(size) in told.stderr
+        assert str(SIZE) in told.stderr

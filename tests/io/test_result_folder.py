@@ -543,5 +543,5 @@ def test_what_noise_puts_beyond_infinity_is_no_fault_of_the_camera(tmp_path: Pat
         return StageMaps(disparity, np.ones_like(disparity), bars)
 
     write_result(tmp_path / "sky", light_field, maps(sky))
-    with pytest.warns(SepiWarning, match="98 % of the pixels lie beyond infinity, where disparity is below 0 by"):
+    with pytest.warns(SepiWarning, match="98 % of the pixels lie beyond infinity.* 0 "):
         write_result(tmp_path / "off", light_field, maps(sky - np.float32(0.5)))

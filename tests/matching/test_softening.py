@@ -1,5 +1,7 @@
 """Texture too sharp for interpolation is found at its disparity, and other views stay as they are."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -55,3 +57,8 @@ def test_soft_texture_and_single_edges_stay() -> None:
     sharp = dotted(0.25)
     assert compared_views(sharp, parameters) is not sharp
     assert compared_views(sharp, SofteningParameters(denoising=0, softening=0)) is sharp
+    # the black of what a view does not show would be blurred into what it shows
+    missing = np.zeros((9, 9, SIZE, SIZE), bool)
+    missing[0, 0, :5] = True
+    partly = replace(sharp, missing=missing)
+    assert compared_views(partly, parameters) is partly
