@@ -1,4 +1,4 @@
-"""Light fields that arrive as one array, and what white is in it."""
+"""Light fields from one array of views: which axis is which, and what value is white."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from sepi.io.readers.camera_positions import reordered
 from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers, position_of, unarranged
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
 
-# integers that values of other types may stand for, and the least brightest value of floats that are not whole: below
-# that it is rather 1 that is exceeded
+# integer types that values of other types may stand for, and the least maximum of floats that are not whole numbers:
+# below it, values rather exceed a white of 1
 _INTEGERS = (np.uint8, np.uint16)
 _LEAST_BRIGHTEST = 16
 
@@ -28,16 +28,16 @@ _Ranges = Mapping[tuple[int, int], tuple[float, float]]
 
 @dataclass(frozen=True)
 class Scale:
-    """How the values of an array become those of a light field.
+    """Conversion of the values of an array to those of a light field.
 
     Attributes
     ----------
     dtype : dtype
         uint8, uint16 or float32.
     divisor : float
-        What values are divided by: for floats the value that stands for 1.
+        Values are divided by it; for floats it is the value of white.
     notes : tuple of str
-        What was assumed.
+        Assumptions that were made.
     """
 
     dtype: np.dtype[Any]
@@ -46,7 +46,7 @@ class Scale:
 
 
 def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers, white: float | None = None) -> Scale:
-    """The scale of views.
+    """Scale of the values of views.
 
     Parameters
     ----------
@@ -55,14 +55,14 @@ def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers, whit
     stack : ndarray, shape (T, S, H, W, C), integers or floats
         Views of the given grid, in any byte order.
     numbers : ndarray, int64
-        Number ``t * S + s`` in that grid of the views that are used, by their own positions; -1 for none.
+        Number ``t * S + s`` in that grid of each used view, at its position; -1 for none.
     white : float, optional
-        Value that stands for white; found out unless given.
+        Value of white; default: guessed from the values.
 
     Raises
     ------
     SepiError
-        If a view that is used holds some floats that are not finite, or values beyond every scale.
+        If a used view holds floats that are not finite, or values beyond every scale.
     """
     floats = stack.dtype.kind == "f"
     if white is None and stack.dtype.kind == "u" and stack.dtype.itemsize <= 2:
@@ -87,12 +87,12 @@ def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers, whit
             note = f"{word} from {low:g} to {high:g} taken as {8 * dtype.itemsize} bit, white being {white}"
             return Scale(dtype if whole else np.dtype(np.float32), 1.0 if whole else float(white), (note,))
     bounds = (LOWEST, HIGHEST) if floats else (0, np.iinfo(_INTEGERS[-1]).max)
-    expected = f"{'0..1, ' if floats else ''}0..255 or 0..65535; --white says what white is elsewhere"
+    expected = f"{'0..1, ' if floats else ''}0..255 or 0..65535; --white sets another white"
     raise _beyond(source, ranges, bounds, expected)
 
 
 def _given(source: str, kind: np.dtype[Any], ranges: _Ranges, white: float) -> Scale:
-    """Narrow integers over their whole range, as pictures of few bits are stored; others as parts of white."""
+    """Scale for a given white: integers of few bits span the range of their type, other values are shares of white."""
     whole = kind.kind in "iu"
     bounds = (0.0, white) if whole else (LOWEST * white, HIGHEST * white)
     if any(low < bounds[0] or high > bounds[1] for low, high in ranges.values()):
@@ -104,14 +104,14 @@ def _given(source: str, kind: np.dtype[Any], ranges: _Ranges, white: float) -> S
 
 
 def _beyond(source: str, ranges: _Ranges, bounds: tuple[float, float], expected: str) -> SepiError:
-    """The error that names the first view with values beyond some bounds."""
+    """Error that names the first view with values outside the bounds."""
     beyond = {place: ends for place, ends in ranges.items() if ends[0] < bounds[0] or ends[1] > bounds[1]}
     (t, s), (low, high) = next(iter(beyond.items()))
     return SepiError(f"{source}: view {t},{s} has values from {low:g} to {high:g}; expected within {expected}")
 
 
 def _range_of(source: str, position: tuple[int, int], view: npt.NDArray[np.generic]) -> tuple[float, float] | None:
-    """The least and the greatest value of a view; None where it is NaN throughout."""
+    """Least and greatest value of a view; None if all are NaN."""
     with np.errstate(invalid="ignore"):
         low, high = float(view.min()), float(view.max())
     if math.isfinite(low) and math.isfinite(high):
@@ -119,30 +119,30 @@ def _range_of(source: str, position: tuple[int, int], view: npt.NDArray[np.gener
     if np.isnan(view).all():
         return None
     at = f"{position[0]},{position[1]}"
-    raise SepiError(f"{source}: view {at} holds NaN or infinite values; mend it, or leave it out with --exclude {at}")
+    raise SepiError(f"{source}: view {at} holds NaN or infinite values; repair it, or leave it out: --exclude {at}")
 
 
 Array = npt.NDArray[np.generic]
 
-# orders of the axes that are looked for; "N" is the number t * S + s of a view
+# possible orders of the axes; "N" is the number t * S + s of a view
 _AXES = (("TS", "HW", "C"), ("TS", "HW"), ("N", "HW", "C"), ("N", "HW"))
 _LAYOUTS = tuple("".join(order) for axes in _AXES for order in permutations(axes))
 _MOST_AXES = 5
 _AXES_HELP = "T, S: row and column of the view, or N: its number; H, W: of the pixel; C: colour"
 _COLOURS = (1, 3, 4)
-# a narrower axis is rather a grid's than a picture's
+# a narrower axis is rather one of the grid than one of a view
 _NARROW = 4
-# positions that a note lists
+# most positions that a note lists
 _LISTED = 12
 
 
 class UnclearAxesError(SepiError):
-    """An array whose sizes leave open which axis is which.
+    """The shape of an array does not tell which axis is which.
 
     Attributes
     ----------
     readings : tuple of str
-        Orders of the axes that they allow, as ``ReadOptions.axes`` has them.
+        Orders of the axes that the shape allows, as in ``ReadOptions.axes``.
     """
 
     def __init__(self, source: str, shape: tuple[int, ...], readings: Sequence[str]) -> None:
@@ -155,44 +155,43 @@ class UnclearAxesError(SepiError):
 
 
 def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, axes: str | None = None) -> LightField:
-    """A light field from an array of all its views.
+    """Light field from an array of all its views.
 
-    Views that are all zeros, or NaN throughout, are taken as missing (light field cameras have none in the corners,
-    and their software pads with zeros), unless all views are. A fourth channel is left out: transparency, or a weight.
+    Views of only zeros, or only NaN, are taken as missing, unless all views are: software of light field cameras pads
+    the corners of the grid with zeros. A fourth channel, transparency or a weight, is left out.
 
     Parameters
     ----------
     array : ndarray of 3 to 5 axes, integers or floats
-        uint8 and uint16 span their whole range; floats 0..1. Others are 0 to 255 or 65535, as 8 or 16 bit. Axes of one
-        may come before.
+        uint8 and uint16 span their whole range, floats 0..1. Other types hold 0..255 or 0..65535, as 8 or 16 bit.
+        Leading axes of size 1 are dropped.
     path : Path
-        Where it comes from: name and source of the light field.
+        File of the array: name and source of the light field.
     options : ReadOptions
         ``axes``, ``grid``, ``central``, ``order``, ``exclude``, ``view`` and ``white`` are used.
     axes : str, optional
-        Order of the axes where the format fixes it, as ``options.axes`` gives it elsewhere; guessed from the shape
-        where neither is given.
+        Order of the axes if the format fixes it; default: ``options.axes``, or guessed from the shape.
 
     Returns
     -------
     LightField
-        Views uint8, uint16 or float32 at their positions, zero where missing. Not arranged where the views have one
-        axis and no grid is given.
+        Views uint8, uint16 or float32 at their positions, zero where missing. They stay in one row if they have a
+        single axis and no grid is given.
 
     Raises
     ------
     UnclearAxesError
-        If several orders of the axes are as likely.
+        If several orders of the axes are equally likely.
     SepiError
         If the axes cannot be told apart or contradict the options, the values are of another type or range, or a view
-        that is not excluded holds some values that are not finite.
+        that is not excluded holds values that are not finite.
     """
     source = str(path)
     if array.dtype.kind not in "iuf" or array.dtype.itemsize > 8:
         raise SepiError(f"{source}: values of type {array.dtype}; expected integers such as uint8, or floats in 0..1")
     given = axes or options.axes
     letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
-    # a batch of one
+    # drop a batch axis of size 1
     array = array.reshape(array.shape[array.ndim - len(letters) :])
     stack, channel_notes = _as_stack(source, array, letters, options.grid)
     arranged = "N" not in letters or options.grid is not None
@@ -201,19 +200,19 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     numbers = arrange_numbers(source, stack.shape[:2], options)
     scale = scale_of(source, stack, numbers, options.white)
     views: Array = np.zeros((*numbers.shape, *stack.shape[2:]), scale.dtype)
-    # those left out are not even looked at
+    # excluded views may hold any values
     unknown = _fill(views, stack, numbers, scale)
     present: BoolMap = np.any(views, axis=(2, 3, 4))
     black = [(t, s) for t, s in np.argwhere((numbers >= 0) & ~present).tolist() if (t, s) not in unknown]
     if black and not present.any():
-        # a light field that is all black is none with all views missing
+        # if all views are black, none is taken as missing
         present[tuple(zip(*black, strict=True))] = True
         black = []
     reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
     if arranged and reference in [*black, *unknown]:
         t, s = reference
         raise SepiError(
-            f"{source}: view {t},{s} is black or NaN, and depth is made for it; name another by --view ROW,COLUMN"
+            f"{source}: view {t},{s}, whose depth is estimated, is black or NaN; choose another by --view ROW,COLUMN"
         )
     assumed = [] if given else [f"axes taken as {' '.join(letters)}; --axes sets them otherwise"]
     missing = [*_missing_notes("all zeros", black), *_missing_notes("NaN throughout", unknown)]
@@ -222,12 +221,12 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
 
 
 def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
-    """A light field whose views are arranged as asked for; ground truth and masks stay with the view they belong to."""
+    """Light field with its views arranged as the options ask; ground truth and masks stay with their view."""
     numbers = arrange_numbers(light_field.source or light_field.name, light_field.grid, options)
     T, S = light_field.grid
     if np.array_equal(numbers, np.arange(T * S).reshape(T, S)):
         return light_field
-    # -1 picks the last view, which `present` then leaves out
+    # -1 picks the last view, which `present` then marks as missing
     places = np.divmod(numbers, S)
     present = light_field.present[places] & (numbers >= 0)
     views = light_field.views[places]
@@ -243,7 +242,7 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
 
 
 def with_white(views: Array, present: BoolMap, path: Path, white: float) -> Array:
-    """Views (T, S, H, W, C) that have another value for white than their type says."""
+    """Views (T, S, H, W, C) scaled so that ``white`` becomes the white of their type."""
     numbers = np.where(present, np.arange(present.size).reshape(present.shape), -1)
     scale = scale_of(str(path), views, numbers, white)
     scaled: Array = np.zeros(views.shape, scale.dtype)
@@ -262,7 +261,7 @@ def _checked_axes(source: str, array: Array, text: str) -> str:
 
 
 def _found_axes(source: str, shape: tuple[int, ...], grid: tuple[int, int] | None) -> str:
-    """The order of the axes that the shape suggests."""
+    """Order of the axes that the shape suggests."""
     found = readings(shape, grid)
     if len(found) == 1:
         return found[0]
@@ -272,22 +271,22 @@ def _found_axes(source: str, shape: tuple[int, ...], grid: tuple[int, int] | Non
 
 
 def is_likely(shape: tuple[int, ...]) -> bool:
-    """Whether an array has the number of axes of a light field; three are a picture where one has colours."""
+    """Whether an array has the number of axes of a light field; three axes with colours are one image."""
     axes = len(_without_batch(shape))
     return axes in (4, 5) or (axes == 3 and bool(readings(shape)))
 
 
 def _without_batch(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """A shape without axes of one before it: a batch, or a single row of views, which are numbered."""
+    """Shape without leading axes of size 1: a batch, or a single row of views."""
     while len(shape) > len("TSHW") and shape[0] == 1:
         shape = shape[1:]
     return shape
 
 
 def readings(shape: tuple[int, ...], grid: tuple[int, int] | None = None) -> list[str]:
-    """The orders of the axes that sizes allow: a grid is smaller than pictures, colours are 1, 3 or 4.
+    """Orders of the axes that the sizes allow: a grid is smaller than a view, colours are 1, 3 or 4.
 
-    Where an axis of 1, 3 or 4 beside another may be colours or a grid's, both are given.
+    An axis of 1, 3 or 4 may be colours or part of the grid; then both orders are given.
     """
     shape = _without_batch(shape)
     sizes = [dict(zip(axes, shape, strict=True)) for axes in _LAYOUTS if len(axes) == len(shape)]
@@ -295,9 +294,9 @@ def readings(shape: tuple[int, ...], grid: tuple[int, int] | None = None) -> lis
     grids = [size for size in sizes if "T" in size and _is_small(size) and ("C" in size or 1 not in shape)]
     rows = [size for size in sizes if size.get("N", 1) > 1 and min(size["H"], size["W"]) > _NARROW]
     if len(shape) == len("NHW"):
-        # else a picture in colour
+        # an axis of colours makes it one image
         rows = [size for size in rows if size["N"] not in _COLOURS]
-    # pictures are larger than there are views; else views in colour come before pictures, or are those of a square grid
+    # views are larger than the grid; else prefer an order with colours, or a square number of views
     coloured = [size for size in rows if "C" in size]
     first = [size for size in coloured if size["N"] == shape[0]]
     squares = [size for size in coloured if size["N"] % 2 and isqrt(size["N"]) ** 2 == size["N"]]
@@ -309,12 +308,12 @@ def readings(shape: tuple[int, ...], grid: tuple[int, int] | None = None) -> lis
 
 
 def _is_small(size: dict[str, int]) -> bool:
-    """Whether the axes of the grid are clearly smaller than those of a picture."""
+    """Whether the axes of the grid are clearly smaller than those of a view."""
     return 2 * max(size.get(axis, 1) for axis in "TSN") <= min(size["H"], size["W"])
 
 
 def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | None) -> tuple[Array, list[str]]:
-    """The array as views (T, S, H, W, C), without copying, and what was assumed."""
+    """Array as views (T, S, H, W, C), without a copy, and the assumptions."""
     size = dict(zip(letters, array.shape, strict=True))
     if 0 in array.shape:
         raise SepiError(f"{source}: the array is empty: {array.shape}")
@@ -330,12 +329,12 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
         raise SepiError(f"{source}: {size['N']} views make no grid of {rows}x{columns}; --grid ROWSxCOLUMNS sets it")
     views = array.transpose([letters.index(letter) for letter in "NTSHWC" if letter in letters])
     views = views.reshape(rows, columns, size["H"], size["W"], size["C"])
-    # grey stays grey, the fourth channel goes
+    # drop the fourth channel
     return views[..., :3], notes
 
 
 def _fill(views: Array, stack: Array, numbers: Numbers, scale: Scale) -> list[tuple[int, int]]:
-    """Put the views in their positions; those that are NaN throughout stay zero and are returned."""
+    """Put the views in their positions; return the views that are all NaN, which stay zero."""
     unknown = []
     for t, s in np.argwhere(numbers >= 0).tolist():
         view = stack[divmod(int(numbers[t, s]), stack.shape[1])]

@@ -1,4 +1,4 @@
-"""Views with calibrated cameras: a COLMAP model, a ``transforms.json``, or a table; rectified to a light field."""
+"""Views of calibrated cameras, from a COLMAP model, a ``transforms.json``, or a table; rectified to a light field."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ def matches(path: Path) -> bool:
 
 
 def read(path: Path, options: ReadOptions, inverse_depths: tuple[float, float] | None = None) -> LightField:
-    """The light field that calibrated cameras make.
+    """Rectified light field of calibrated cameras.
 
     Parameters
     ----------
     path : Path
     options : ReadOptions
-        ``images``, ``reference``, ``exclude`` and ``view`` mean something here.
+        ``images``, ``reference``, ``exclude`` and ``view`` are used.
     inverse_depths : (float, float), optional
-        Of the farthest and the nearest surface, where they are known better than the model's points tell.
+        Inverse depths of the farthest and the nearest surface; default: from the model's points.
     """
     from sepi.cameras.rectification import light_field_of, rectification_of
 

@@ -1,7 +1,7 @@
-"""Pictures of a Lytro camera as the Stanford Lytro Light Field Archive has them: ``NAME_eslf.png``.
+"""Decoded lenslet images of the Stanford Lytro Light Field Archive, ``NAME_eslf.png``.
 
-Under each lenslet of the picture lies a block of pixels, one of each view: the pixel ``(t, s)`` of all blocks together
-is the view ``(t, s)``. Views near the corners see little light.
+Under each lenslet lies a block of pixels, one of each sub-aperture image: the pixels ``(t, s)`` of all blocks are the
+view ``(t, s)``. Views near the corners of the grid are dark.
 
 References
 ----------
@@ -24,31 +24,31 @@ from sepi.io.readers.view_files import MAX_VIEWS
 from sepi.lightfield import MIN_SIZE, LightField
 
 BLOCK = (14, 14)
-"""Rows and columns of pixels under a lenslet in the archive's pictures."""
+"""Rows and columns of pixels under a lenslet in images of the archive."""
 
 _CENTRAL = 9
 _DARK = 0.2
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a picture with ``eslf`` in its name."""
+    """Whether ``path`` is an image with ``eslf`` in its name."""
     return "eslf" in path.name.lower() and path.suffix.lower() in SUFFIXES and path.is_file()
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read a picture; the middle 9x9 views of it unless the options ask for others.
+    """Read the views of a lenslet image; by default the middle 9x9 of them.
 
     Parameters
     ----------
     path : Path
-        Any picture.
+        Image of any supported kind.
     options : ReadOptions
         ``grid`` is the size of the block under a lenslet.
     """
     T, S = grid = options.grid or BLOCK
     if not 2 <= T * S <= MAX_VIEWS:
         raise SepiError(f"{path}: --grid {T}x{S}: expected a grid of 2 to {MAX_VIEWS} views")
-    # unless another middle is asked for, 9 views a side or, in a small grid, the largest odd number
+    # default: 9 views a side or, in a smaller grid, the largest odd number
     usual = (min(_CENTRAL, T, S) + 1) // 2 * 2 - 1
     central = options.central or (usual if usual > 1 else None)
     picture = read_picture(path, any_floats=options.white is not None)
@@ -67,7 +67,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
 
 
 def _dark_notes(light_field: LightField) -> list[str]:
-    """Which views are much darker than the reference view."""
+    """Notes on the views that are much darker than the reference view."""
     brightness = light_field.views.mean(axis=(2, 3, 4), dtype=np.float64)
     limit = _DARK * brightness[light_field.reference_position]
     dark = np.argwhere(light_field.present & (brightness < limit)).tolist()
@@ -75,4 +75,4 @@ def _dark_notes(light_field: LightField) -> list[str]:
         return []
     flags = " ".join(f"--exclude {t},{s}" for t, s in dark)
     views = "1 view is" if len(dark) == 1 else f"{len(dark)} views are"
-    return [f"{views} darker than a fifth of the view that depth is made for; to leave out: {flags}"]
+    return [f"{views} darker than a fifth of the reference view; to leave out: {flags}"]

@@ -1,8 +1,7 @@
-"""A light field as a folder of pictures with all that is known about it beside them, in ``light_field.json``.
+"""A light field as a folder of images, with its properties in ``light_field.json``.
 
-Views are PNG of 8 or 16 bit, or TIFF of floats: nothing is lost. The file names each by its place in the grid, so that
-neither what else lies in the folder nor what the pictures are called has a say. ``sepi export`` writes such folders;
-somebody else may, too.
+Views are PNG of 8 or 16 bit, or TIFF of floats, so nothing is lost. ``light_field.json`` gives the file of each place
+in the grid; the names and other files do not matter. ``sepi export`` writes such folders, and other programs may.
 """
 
 from __future__ import annotations
@@ -34,10 +33,10 @@ MANIFEST = "light_field.json"
 
 
 class Manifest(BaseModel, defer_build=True):
-    """Content of ``light_field.json``: the fields of a light field, and names of files in the folder for its arrays.
+    """Content of ``light_field.json``: the fields of a light field, with file names instead of arrays.
 
-    ``views`` has a name, or null for a missing view, for each row and column of the grid; ``positions`` likewise a pair
-    ``[down, across]`` in view steps, and ``missing`` a mask of the pixels that a view does not show, null for none.
+    For each row and column of the grid, ``views`` has a file name, or null for a missing view; ``positions`` a pair
+    ``[down, across]`` in view steps; and ``missing`` a mask of the pixels that the view does not show, or null.
     """
 
     name: str
@@ -54,7 +53,7 @@ class Manifest(BaseModel, defer_build=True):
 
 
 def _same(known: Manifest | LightField) -> dict[str, Any]:
-    """What a light field and its manifest hold alike."""
+    """Fields that a light field and its manifest share."""
     return {key: getattr(known, key) for key in ("name", "view", "row_spacing", "disparity_range", "camera", "notes")}
 
 
@@ -64,7 +63,7 @@ def read_manifest(path: Path) -> Manifest:
     Raises
     ------
     SepiError
-        If it is damaged, its rows differ in length, or it names what is no file in its own folder.
+        If it is damaged, its rows differ in length, or it names a file that is not in its own folder.
     """
     with reading(path, "file of 'sepi export'"):
         values = json.loads(path.read_bytes())
@@ -88,9 +87,9 @@ def matches(path: Path) -> bool:
 
 
 def truth_files(folder: Path) -> list[Path]:
-    """The files of a folder with ground truth and masks, and the one that names them."""
+    """Files of a folder with ground truth and masks, and the manifest that names them."""
     names: list[str] = []
-    # of a damaged one, reading says what is wrong
+    # reading reports a damaged manifest
     with suppress(SepiError):
         known = read_manifest(folder / MANIFEST)
         names = [name for name in (known.ground_truth, *known.masks.values()) if name is not None]
@@ -98,7 +97,7 @@ def truth_files(folder: Path) -> list[Path]:
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read a folder; what the options ask for is done to the light field that was written."""
+    """Read an exported folder; the options are applied to the light field that was written."""
     file = path / MANIFEST
     known = read_manifest(file)
     names = np.array(known.views, object)
@@ -130,22 +129,21 @@ def _read_mask(path: Path, shape: tuple[int, ...] | None = None) -> BoolMap:
 
 
 HDF5 = (".h5", ".hdf5")
-"""Ends of names, in small letters, of what is one file."""
+"""Suffixes of a light field in one file, in lower case."""
 
-# of other formats of light fields, and of maps
+# suffixes of other formats of light fields, and of maps
 _OTHERS = SUFFIXES | {".mat", ".npy", ".npz", ".pfm", ".json"}
 _TRUTH = "gt_disp_lowres.pfm"
 _VIEW = re.compile(r"row_\d+_col_\d+\.(png|tif)")
 
 
 def require_room(path: Path, *, force: bool = False) -> None:
-    """Raise unless a light field may be written to ``path``; for telling before it is read.
+    """Raise unless a light field may be written to ``path``; a check before it is read.
 
     Raises
     ------
     SepiError
-        If the name is that of another kind of file, something is there already and not ``force``, or it cannot be
-        written.
+        If the suffix is that of another kind of file, ``path`` exists and not ``force``, or it cannot be written.
     """
     suffix = path.suffix.lower()
     if suffix in HDF5:
@@ -153,7 +151,7 @@ def require_room(path: Path, *, force: bool = False) -> None:
             raise SepiError(f"{path}: exists already; choose another name, or replace it with --force")
         return
     if suffix in _OTHERS and not path.is_dir():
-        raise SepiError(f"{path}: expected a name that ends with .h5, for one file, or that of a folder, for pictures")
+        raise SepiError(f"{path}: expected a file name that ends with .h5, or the name of a folder, for images")
     require_target(path)
     there = sorted(file.name for file in path.iterdir() if file.name[0] != ".") if path.is_dir() else []
     if there and not force:
@@ -170,8 +168,8 @@ def write_exported(path: Path, light_field: LightField, *, force: bool = False) 
         A name that ends with ``.h5`` or ``.hdf5``, or that of a folder.
     light_field : LightField
     force : bool
-        Write where something is already, too. What an earlier export wrote there is replaced or removed, and all else
-        of others left alone, but for files of the very names.
+        Also write if ``path`` exists. Files of an earlier export and files of the same names are replaced or removed;
+        others stay.
 
     Raises
     ------
@@ -217,7 +215,7 @@ def _write_folder(folder: Path, light_field: LightField) -> set[str]:
         masks=masks,
         **_same(light_field),
     )
-    # a line for each key
+    # one line for each key
     lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in known.model_dump(mode="json").items()]
     with atomic_path(folder / MANIFEST) as temporary:
         temporary.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="ascii")
@@ -225,7 +223,7 @@ def _write_folder(folder: Path, light_field: LightField) -> set[str]:
 
 
 def _earlier_files(folder: Path) -> set[str]:
-    """Files that an earlier export wrote; one that was edited may name a user's own."""
+    """Files that an earlier export wrote; an edited manifest may name a user's own files."""
     with suppress(SepiError):
         known = read_manifest(folder / MANIFEST)
         masks = {file for name, file in known.masks.items() if file == f"mask_{name}.png"}

@@ -1,4 +1,4 @@
-"""The formats of light fields: which one a path is of, reading it, and how large it is by its headers alone."""
+"""Formats of light fields: finding the format of a path, reading it, and its size from headers alone."""
 
 from __future__ import annotations
 
@@ -36,14 +36,13 @@ class Format(NamedTuple):
     name, description : str
         For messages.
     module : str
-        Name of a module of this folder. Its ``matches(path)`` says whether a path looks like this format, quickly, and
-        never raises; ``read(path, options)`` reads a light field as its files have it. It may have ``read_views``,
-        which does so but for ground truth and masks, ``read_truth``, which reads these alone, and ``truth_files``, the
-        files with them.
+        Name of a module of this folder. Its ``matches(path)`` quickly says whether a path looks like this format, and
+        never raises; ``read(path, options)`` reads a light field. It may also have ``read_views``, which reads no
+        ground truth and masks, ``read_truth``, which reads only these, and ``truth_files``, which lists their files.
     options : tuple of str
-        What of :class:`ReadOptions` only some formats have a use for, and this one does.
+        Fields of :class:`ReadOptions` that not all formats use, and this one does.
     scales : bool
-        Whether it reads values of any scale, and asks the options for their white.
+        Whether it reads values of any scale, and uses the option ``white``.
     """
 
     name: str
@@ -54,16 +53,16 @@ class Format(NamedTuple):
 
     @property
     def reader(self) -> ModuleType:
-        """The module."""
+        """Module of the format."""
         return import_module(f"sepi.io.readers.{self.module}")
 
     def truth_files(self, path: Path) -> Sequence[Path]:
-        """The files with ground truth and masks."""
+        """Files with ground truth and masks."""
         files: Sequence[Path] = self.reader.truth_files(path) if hasattr(self.reader, "truth_files") else ()
         return files
 
 
-# light fields that a message names
+# most light fields that a message names
 _LISTED = 5
 
 # poses of LLFF, Gaussian splatting and NeuS
@@ -72,37 +71,37 @@ _POSES = ("poses_bounds.npy", "cameras.json", "cameras_sphere.npz")
 
 _ARRAY_OPTIONS = ("grid", "axes", "variable")
 _CAMERAS = "COLMAP model, transforms.json, cameras.csv or cameras.yaml"
-# those that only some formats have a use for
+# options that only some formats use
 _SOME = ("grid", "pattern", "axes", "variable", "images", "reference", "follow_links")
 
 FORMATS = {
-    # before the other folders: its pictures may have any names
+    # before other folders: its images may have any names
     "exported": Format("exported folder", "written by 'sepi export'", "exported", ("follow_links",)),
-    # before folders of pictures, which may lie beside
+    # before folders of images, which may lie beside a model
     "cameras": Format("calibrated cameras", _CAMERAS, "calibrated", ("images", "reference"), scales=False),
     "hci": Format("HCI folder", "input_Cam000.png, ...", "hci", ("grid", "follow_links")),
     "images": Format(
-        "folder of views", "a numbered picture for each", "image_folder", ("grid", "pattern", "follow_links")
+        "folder of views", "a numbered image for each", "image_folder", ("grid", "pattern", "follow_links")
     ),
     "mosaic": Format("mosaic of views", "NAME_qs8x6a0.75.png", "mosaic", ("grid",)),
-    "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", "eslf", ("grid",)),
+    "eslf": Format("Lytro lenslet image", "NAME_eslf.png", "eslf", ("grid",)),
     "tiff-stack": Format("TIFF stack", "a page for each view", "tiff_stack", ("grid",)),
-    # before the other kinds of HDF5: MATLAB's is told by its header or ending
+    # before other kinds of HDF5: MATLAB's has a header or suffix of its own
     "matlab": Format("MATLAB file", ".mat with an array such as LF", "matlab", _ARRAY_OPTIONS),
     "numpy": Format("NumPy file", ".npy or .npz", "numpy_files", _ARRAY_OPTIONS),
-    # before the other kinds with something called LF
+    # before other kinds with something called LF
     "openlf": Format("OpenLF HDF5", "with a group LF", "open_lf"),
     "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", "hci_2013"),
-    # behind those whose arrays have names of their own
+    # after the kinds whose arrays have fixed names
     "hdf5": Format("HDF5 file", "with an array of all views", "hdf5_arrays", _ARRAY_OPTIONS),
-    # last, so that it gets what is too damaged to tell
+    # last, since it takes files too damaged to tell
     "sepi": Format("sepi HDF5", "written by this package", "own_files", scales=False),
 }
-"""Word for ``--format`` to format; the first that matches reads."""
+"""Word for ``--format`` to format; the first format that matches reads."""
 
 
 def format_of(path: Path, file_format: str | None = None) -> Format:
-    """Find the format of a light field by looking at it.
+    """Format of a light field, from its content.
 
     Parameters
     ----------
@@ -113,7 +112,7 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
     Raises
     ------
     SepiError
-        If there is nothing at ``path``, or it is of no known format, or ``file_format`` is none.
+        If ``path`` does not exist or has no known format, or ``file_format`` is unknown.
     """
     if file_format is not None:
         require_known("format", [file_format], FORMATS)
@@ -142,7 +141,7 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
 
 
 def read(path: Path, options: ReadOptions, file_format: str | None = None, *, truth: bool = True) -> LightField:
-    """Read a light field of any known format as its files have it.
+    """Read a light field of any known format.
 
     Parameters
     ----------
@@ -152,12 +151,12 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None, *, tr
     file_format : str, optional
         Key of :data:`FORMATS`, in place of looking.
     truth : bool
-        False: without ground truth and masks, as if there were none.
+        False: read no ground truth and masks.
 
     Returns
     -------
     LightField
-        Its ``disparity_range`` is None if the scene gives none.
+        ``disparity_range`` is None if the files do not give it.
     """
     known = format_of(path, file_format)
     _require_used(path, known, options)
@@ -174,7 +173,7 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None, *, tr
 
 
 def read_truth(path: Path, options: ReadOptions, file_format: str | None = None) -> Truth:
-    """Ground truth and masks of the light field that :func:`read` reads without them."""
+    """Ground truth and masks of the light field that :func:`read` gives with ``truth=False``."""
     known = format_of(path, file_format)
     if not hasattr(known.reader, "read_truth"):
         light_field = read(path, options, file_format)
@@ -185,7 +184,7 @@ def read_truth(path: Path, options: ReadOptions, file_format: str | None = None)
 
 
 def _require_used(path: Path, known: Format, options: ReadOptions) -> None:
-    """Raise where an option is given that a format has no use for: the user would think that it did something."""
+    """Raise if an option is given that the format does not use."""
     for name in _SOME:
         if getattr(options, name) not in (None, False) and name not in known.options:
             others = ", ".join(other.name for other in FORMATS.values() if name in other.options)
@@ -194,13 +193,13 @@ def _require_used(path: Path, known: Format, options: ReadOptions) -> None:
 
 
 def _what_else(path: Path) -> str:
-    """What a path that is no light field seems to be, for who gave the wrong one of several."""
+    """Kind of a path that is not a light field, for the message."""
     if _is_result(path):
         return "holds a disparity map, not a light field"
     if any(one.suffix.lower() in (".lfr", ".lfp", ".raw") and one.is_file() for one in (path, *path.glob("*"))):
         return "raw data of a Lytro camera; decode it with the Light Field Toolbox (MATLAB) or PlenoptiCam (Python)"
     if path.is_file() and path.suffix.lower() in SUFFIXES:
-        return "a single picture; give the folder of all views, or --format mosaic or eslf with --grid ROWSxCOLUMNS"
+        return "a single image; give the folder of all views, or --format mosaic or eslf with --grid ROWSxCOLUMNS"
     if path.is_file() and h5py.is_hdf5(path):
         with suppress(SepiError):
             arrays = hdf5_shapes(path)
@@ -214,13 +213,13 @@ def _is_result(path: Path) -> bool:
 
 
 def _inside(folder: Path, depth: int = 1) -> Iterator[Path]:
-    """The light fields in a folder, and in folders of it, as far as they may be read."""
+    """Light fields in a folder and its subfolders, as far as they are readable."""
     with suppress(OSError):
         for entry in sorted(folder.iterdir()):
-            # a file without bytes may be waited for without end: of some a system gives others
+            # reading an empty special file may never end
             if entry.name.startswith(".") or (entry.is_file() and not entry.stat().st_size):
                 continue
-            # tables of numbers are none, such as poses
+            # tables of numbers, such as poses, are not light fields
             table = entry.suffix.lower() in (".npy", ".npz") and is_disparity(entry)
             if not table and any(known.reader.matches(entry) for known in FORMATS.values()):
                 yield entry
@@ -228,7 +227,7 @@ def _inside(folder: Path, depth: int = 1) -> Iterator[Path]:
                 yield from _inside(entry, depth - 1)
 
 
-# what is taken where no header tells: a view of the benchmark
+# assumed where no header tells: a view of the benchmark
 _USUAL_SIDE = 512
 _USUAL_VIEWS = 81
 _RGB = 3
@@ -244,7 +243,7 @@ class Size(NamedTuple):
     height, width : int
         Size of a view in pixels.
     pixel_bytes : int
-        Bytes that a pixel of a view takes as its file holds it, unpacked: 3 for RGB of 8 bit.
+        Bytes of a decoded pixel: 3 for RGB of 8 bit.
     """
 
     views: int
@@ -256,10 +255,9 @@ class Size(NamedTuple):
 def size_of(files: Sequence[Path]) -> Size:
     """Size of the light field that these files hold together; no values are read.
 
-    Several pictures are a view each; a single one is a stack of them, or a lenslet picture, of which the usual views
-    are read. Of other files it is the largest array in them, and its two longest axes those of a view. Where nothing
-    tells, the largest file is taken for what it would be unpacked; damaged ones are left to the reader, which will say
-    so.
+    Each of several images is a view. A single image is a stack, or a lenslet image of which the default views count.
+    In other files, the largest array counts, and its two longest axes are those of a view. If nothing tells, the
+    largest file is taken as uncompressed pixels. The reader reports damaged files.
     """
     pictures = [path for path in files if path.suffix.lower() in SUFFIXES]
     try:
@@ -284,7 +282,7 @@ def size_of(files: Sequence[Path]) -> Size:
 def _of_lenslets(path: Path) -> Size:
     header = picture_header(path)
     height, width = max(1, header.height // eslf.BLOCK[0]), max(1, header.width // eslf.BLOCK[1])
-    # all of the picture is decoded
+    # all of the image is decoded
     values = header.height * header.width * header.pixel_bytes
     return Size(_USUAL_VIEWS, height, width, -(-values // (_USUAL_VIEWS * height * width)))
 
@@ -293,7 +291,7 @@ def _of_array(shape: tuple[int, ...], itemsize: int) -> Size:
     """Size of the views in an array of 4 or 5 axes."""
     first, second = sorted(sorted(range(len(shape)), key=lambda axis: shape[axis])[-2:])
     others = [size for axis, size in enumerate(shape) if axis not in (first, second)]
-    # colours are an axis of 5, or the last one behind a row of views
+    # colours are the last of 5 axes, or of 4 after a single axis of views
     coloured = others if len(others) == 3 else others[1:] if others[0] > 4 else []
     channels = next((size for size in reversed(coloured) if size in (3, 4)), 1)
     return Size(max(1, math.prod(others) // channels), shape[first], shape[second], itemsize * channels)
@@ -307,7 +305,7 @@ def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
         if reader is None and open_lf.matches(path):
             shapes = {"LF": open_lf.views_shape(path)}
         else:
-            # the size alone, of many: whoever reads the views checks the file
+            # no digest check for many files: whoever reads the views checks the file
             shapes = hdf5_shapes(path, check=False) if reader is None else reader.array_shapes(path)
     most = path.stat().st_size * DEFLATE_RATIO
     sized = [(shape, kind.itemsize) for shape, kind in shapes.values() if is_likely(shape)]

@@ -1,9 +1,9 @@
 """Folders in the layout of the HCI 4D light field benchmark.
 
-``input_CamNNN.png`` is view ``NNN = S * t + s``. Views may be missing, but for the one whose depth is made.
-``parameters.cfg``, ``gt_disp_lowres.pfm`` (disparity of the centre view) and ``mask_NAME.png`` (white regions) are read
-where present. ``baseline_mm`` is the distance of neighbouring cameras, of rows as of columns. ``sensor_size_mm``
-belongs to the picture of ``image_resolution``, of which the views may be a part (``crop_of``).
+``input_CamNNN.png`` is view ``NNN = S * t + s``. Views may be missing, except the reference view. ``parameters.cfg``,
+``gt_disp_lowres.pfm`` (disparity of the centre view) and ``mask_NAME.png`` (white regions) are read if present.
+``baseline_mm`` is the distance of neighbouring cameras, in rows and columns. ``sensor_size_mm`` belongs to the image of
+``image_resolution``, of which the views may be a crop (``crop_of``).
 
 References
 ----------
@@ -40,12 +40,12 @@ TRUTH = "gt_disp_lowres.pfm"
 _CAMERA = ("focal_length_mm", "baseline_mm", "focus_distance_m", "sensor_size_mm")
 
 _VIEW = re.compile(r"input_Cam(\d{1,6})\.png")
-# the masks that evaluation uses: any fault in them is an error; other masks are left out if they do not fit
+# masks that scores need: any fault in them is an error; other masks are left out if they do not fit
 _EVALUATED = ("occluded", "textureless")
 
 
 class _Parameters(BaseModel, defer_build=True):
-    """What this package uses of ``parameters.cfg``; None where the file does not say."""
+    """Parameters that this package uses of ``parameters.cfg``; None if missing."""
 
     scene: str | None = None
     num_cams_y: PositiveInt | None = None
@@ -60,7 +60,7 @@ class _Parameters(BaseModel, defer_build=True):
     sensor_size_mm: float | None = None
 
     def pair(self, *keys: str) -> tuple[Any, Any] | None:
-        """Two numbers that come together or not at all."""
+        """Two numbers that must be given both or not at all."""
         first, second = (getattr(self, key) for key in keys)
         if (first is None) != (second is None):
             raise SepiError(f"expected both {' and '.join(keys)}, or neither")
@@ -68,17 +68,17 @@ class _Parameters(BaseModel, defer_build=True):
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a folder with views or parameters of the benchmark's names."""
+    """Whether ``path`` is a folder with views or parameters named as in the benchmark."""
     return path.is_dir() and ((path / PARAMETERS).is_file() or any(path.glob("input_Cam*.png")))
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read a folder.
+    """Read a benchmark folder.
 
     Returns
     -------
     LightField
-        With the scene's own disparity range, ground truth and masks where the folder has them.
+        With the scene's own disparity range, ground truth and masks if the folder has them.
     """
     light_field = read_views(path, options)
     of, _ = _view_of_truth(path, options)
@@ -89,7 +89,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
 
 
 def read_truth(path: Path, options: ReadOptions) -> Truth:
-    """Ground truth and masks of a folder alone, where they are of the reference view of :func:`read_views`."""
+    """Ground truth and masks of a folder, if they belong to the reference view of :func:`read_views`."""
     of, (rows, columns) = _view_of_truth(path, options)
     reference = options.view or (rows // 2, columns // 2)
     if of == reference:
@@ -103,12 +103,12 @@ def read_truth(path: Path, options: ReadOptions) -> Truth:
 
 
 def truth_files(folder: Path) -> list[Path]:
-    """The files of a folder with ground truth and masks."""
+    """Files of a folder with ground truth and masks."""
     return sorted(path for name in (TRUTH, "mask_*.png") for path in folder.glob(name) if path.is_file())
 
 
 def read_views(path: Path, options: ReadOptions) -> LightField:
-    """Read a folder but for its ground truth and masks, on which nothing else depends then."""
+    """Light field of a folder without ground truth and masks, so that a change in these affects no map."""
     file = path / PARAMETERS
     parameters = _parameters_of(path)
     with naming(file):
@@ -122,13 +122,13 @@ def read_views(path: Path, options: ReadOptions) -> LightField:
     if given_shape not in (None, whole):
         size = f"{given_shape[1]}x{given_shape[0]}"
         raise SepiError(
-            f"{file}: image_resolution is {size}, but the pictures are {whole[1]}x{whole[0]} (x, y); give --crop-of "
-            f"{size}+X+Y where they were cut out, and where they were scaled, set it, disp_min and disp_max anew"
+            f"{file}: image_resolution is {size}, but the views are {whole[1]}x{whole[0]} (x, y); for cropped views "
+            f"give --crop-of {size}+X+Y, for scaled ones correct image_resolution, disp_min and disp_max"
         )
     known = parameters.model_dump(include=set(_CAMERA))
     with naming(file):
         camera = None if None in known.values() else camera_from(**known, shape=shape, crop_of=options.part)
-    # one number for both directions: rows are as far apart as columns
+    # baseline_mm holds for both directions: rows are as far apart as columns
     settled, name, view = parameters.baseline_mm is not None, parameters.scene or str(name_of(path)), options.view
     return LightField(
         views, name, str(path), present, disparity_range, view=view, camera=camera, settled=settled, files=names
@@ -136,14 +136,14 @@ def read_views(path: Path, options: ReadOptions) -> LightField:
 
 
 def _views_in(path: Path, options: ReadOptions, parameters: _Parameters) -> tuple[dict[int, Path], tuple[int, int]]:
-    """The views by their numbers, and their grid."""
+    """View files by number, and the grid."""
     with naming(path / PARAMETERS):
         given = parameters.pair("num_cams_y", "num_cams_x")
     files = _numbered_views(path)
     side = math.isqrt(max(files) + 1)
     grid = options.grid or given or (side, side)
     if options.grid is given is None and side**2 != max(files) + 1:
-        what = f"{path}: views up to {files[max(files)].name} make {max(files) + 1}, which is no square grid"
+        what = f"{path}: views up to {files[max(files)].name} make {max(files) + 1}, which is not a square grid"
         raise SepiError(f"{what}; give --grid ROWSxCOLUMNS, or num_cams_x and num_cams_y in {PARAMETERS}")
     if max(files) >= grid[0] * grid[1]:
         source = "--grid" if options.grid else PARAMETERS
@@ -152,14 +152,14 @@ def _views_in(path: Path, options: ReadOptions, parameters: _Parameters) -> tupl
 
 
 def _view_of_truth(path: Path, options: ReadOptions) -> tuple[tuple[int, int] | None, tuple[int, ...]]:
-    """Where the centre view of the folder's own grid stands, to which ground truth and masks belong; the grid."""
+    """Position of the centre view of the folder's own grid, the view of the ground truth and masks; and the grid."""
     _, grid = _views_in(path, options, _parameters_of(path))
     numbers = arrange_numbers(str(path), grid, replace(options, exclude=()))
     return position_of(numbers, grid[0] // 2 * grid[1] + grid[1] // 2), numbers.shape
 
 
 def _truth_of(folder: Path, shape: tuple[int, int], part: Part | None) -> Truth:
-    """What is known of views of a shape; what is of the whole picture is cut as they were."""
+    """Ground truth and masks for views of a shape; those of the whole image are cropped like the views."""
     path = folder / TRUTH
     ground_truth = cut_like_views(read_pfm(path), shape, part) if path.is_file() else None
     if ground_truth is not None and ground_truth.shape != shape:
@@ -170,17 +170,17 @@ def _truth_of(folder: Path, shape: tuple[int, int], part: Part | None) -> Truth:
         if (header.height, header.width) in (shape, None if part is None else part[1::-1]):
             picture = read_picture(path)
             values, highest = (cut_like_views(of(picture, axis=2), shape, part) for of in (np.min, np.max))
-            # white on black; anything else is not a region
+            # a region is white on black
             if values.shape == shape and (values == highest).all() and np.isin(values, (0, picture.max())).all():
                 masks[name] = values > 0
                 continue
         if name in _EVALUATED:
-            raise SepiError(f"{path}: expected a black and white picture of the views' size {shape} (height, width)")
+            raise SepiError(f"{path}: expected a black and white image of the views' size {shape} (height, width)")
     return ground_truth, masks
 
 
 def _numbered_views(folder: Path) -> dict[int, Path]:
-    """Number of each view and its file."""
+    """Files of the views by number."""
     views: dict[int, Path] = {}
     for path in sorted(folder.glob("input_Cam*.png")):
         match = _VIEW.fullmatch(path.name)
@@ -196,7 +196,7 @@ def _numbered_views(folder: Path) -> dict[int, Path]:
 
 
 def _parameters_of(folder: Path) -> _Parameters:
-    """Keys of all sections together."""
+    """Parameters from all sections of ``parameters.cfg``."""
     path = folder / PARAMETERS
     if not path.is_file():
         return _Parameters()
@@ -206,7 +206,7 @@ def _parameters_of(folder: Path) -> _Parameters:
         try:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
-            # editors of other systems write comments so
+            # some editors write comments in this encoding
             text = data.decode("latin-1")
         parser.read_string(text, source=path.name)
     values = {key: value for section in parser.sections() for key, value in parser.items(section)}

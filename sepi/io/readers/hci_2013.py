@@ -1,8 +1,8 @@
 """HDF5 files in the layout of the first HCI light field benchmark [1]_.
 
-``LF (T, S, H, W, 3)`` uint8 holds the views, ``GT_DEPTH (T, S, H, W)`` the depth of every view, or ``(H, W)`` that of
-the centre view. With the file's attributes ``dH`` (distance of cameras), ``focalLength`` (pixels) and ``shift``, depth
-``Z`` has the disparity ``dH focalLength / Z - shift``.
+``LF (T, S, H, W, 3)`` uint8 holds the views. ``GT_DEPTH`` is the depth of every view, ``(T, S, H, W)``, or of the
+centre view, ``(H, W)``. With the file's attributes ``dH`` (camera distance), ``focalLength`` (pixels) and ``shift``,
+depth ``Z`` has the disparity ``dH focalLength / Z - shift``.
 
 References
 ----------
@@ -42,13 +42,13 @@ def matches(path: Path) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read such a file.
+    """Read an HDF5 file of the first benchmark.
 
     Returns
     -------
     LightField
-        With the ground truth of its reference view, NaN where the file's depth is not a positive number, and with the
-        camera, where the file gives them.
+        With the camera and the ground truth of the reference view if the file has them; NaN where the file's depth is
+        not a positive number.
     """
     with open_hdf5(path, "file of the first HCI benchmark") as file:
         if isinstance(file.get(VIEWS), h5py.Group):
@@ -79,18 +79,18 @@ def _is_layout(shape: tuple[int, ...]) -> bool:
 
 
 def _read_camera(file: h5py.File) -> tuple[Camera | None, str]:
-    """The camera, or the reason why there is none."""
+    """Camera, or the reason why there is none."""
     missing = [key for key in _GEOMETRY if key not in file.attrs]
     if missing:
         return None, f"the file has no attribute {', '.join(missing)}"
     baseline, focal_length, shift = (number_of(file, key) for key in _GEOMETRY)
     if not (0 < baseline < math.inf and 0 < focal_length < math.inf and math.isfinite(shift)):
-        return None, f"dH {baseline:g}, focalLength {focal_length:g}, shift {shift:g} are no camera's"
+        return None, f"dH {baseline:g}, focalLength {focal_length:g}, shift {shift:g} are not valid for a camera"
     return Camera(baseline * focal_length, shift, focal_length), ""
 
 
 def _read_depth(path: Path, file: h5py.File, shape: tuple[int, ...], view: tuple[int, int]) -> DepthMap | None:
-    """Depth of one view of the given grid; None where the file does not have it."""
+    """Depth of one view of the given grid; None if the file does not have it."""
     dataset = file[DEPTH]
     if dataset.shape == shape[2:4]:
         centre = shape[0] // 2, shape[1] // 2
@@ -102,7 +102,7 @@ def _read_depth(path: Path, file: h5py.File, shape: tuple[int, ...], view: tuple
 
 def _disparity(depth: DepthMap, camera: Camera) -> FloatMap:
     """Disparity of a depth map; NaN where the depth is not a positive number."""
-    # a number that is none may be of a sort that is warned of
+    # NaN may be a signalling one, of which NumPy warns
     with np.errstate(over="ignore", invalid="ignore"):
         depth = depth.astype(np.float64)
         known = np.isfinite(depth) & (depth > 0)

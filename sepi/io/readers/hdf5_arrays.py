@@ -1,4 +1,4 @@
-"""HDF5 files of other programs: an array of any name, at the top or in groups."""
+"""HDF5 files of other programs: an array of any name, at the root or in groups."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sepi.lightfield import LightField
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is an HDF5 file with an array that may be a light field, and none of this package's."""
+    """Whether ``path`` is an HDF5 file of another program, with an array that may be a light field."""
     try:
         return has_dataset(path, "/", lambda root: not is_own(root)) and any(
             is_likely(shape) for shape, _ in hdf5_shapes(path).values()
@@ -24,5 +24,5 @@ def matches(path: Path) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read the array ``options.variable`` of such a file; without it, what can be a light field."""
+    """Light field from the array ``options.variable``; default: the array that can be a light field."""
     return light_field_from_arrays(path, hdf5_shapes(path), options, functools.partial(read_hdf5, path))

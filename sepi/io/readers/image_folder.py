@@ -1,7 +1,7 @@
-"""Folders with one picture for each view, under any names that count or sort them.
+"""Folders with one image for each view, under any names that count or sort them.
 
-Names give row and column, ``view_03_07.png`` or ``row_3/col_7.png``, or number the views through, ``img_034.jpg``. They
-may also say where the cameras stood, ``out_00_01_-703.002197_468.153625.png``.
+Names give row and column, ``view_03_07.png`` or ``row_3/col_7.png``, or a running number, ``img_034.jpg``. They may
+also give camera positions, ``out_00_01_-703.002197_468.153625.png``.
 """
 
 from __future__ import annotations
@@ -30,29 +30,29 @@ from sepi.io.readers.view_names import ViewNumbers
 from sepi.lightfield import LightField
 
 _POSITIONS_PER_PICTURE = 100
-# part of what it filled before that a grid must still be filled when it is widened for views that are left out
+# share of its former filling that a grid must keep when it is widened for views that are left out
 _AS_FULL = 0.8
-# part of the grid of the names from which on they are taken for row and column, and a --grid that differs for an error
+# filled share of the grid above which names count as row and column, and a --grid that differs is an error
 _WELL_FILLED = 0.5
 
 Numbers = dict[str, tuple[int, ...]]
-"""Name of a view to its row and column, or its number."""
+"""Name of a view to its row and column, or its running number."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where views stand.
+    """Positions of the views in the given grid.
 
     Attributes
     ----------
     grid : tuple of int
         Rows and columns of the given grid.
     positions : dict of str to int
-        Name to number ``t * S + s`` in it.
+        Name to number ``t * S + s`` in the grid.
     notes : list of str
-        What was assumed.
+        Assumptions that were made.
     arranged : bool
-        False: one row of views, whose grid the names do not tell.
+        False: one row of views, since the names do not tell the grid.
     """
 
     grid: tuple[int, int]
@@ -62,34 +62,34 @@ class Layout:
 
     @property
     def fill(self) -> float:
-        """How much of the grid has a view."""
+        """Share of the grid that has a view."""
         return len(self.positions) / (self.grid[0] * self.grid[1])
 
 
 def laid_out(folder: Path, named: ViewNumbers, numbers: Numbers, options: ReadOptions) -> Layout:
-    """Put views where their numbers say.
+    """Layout of views by their numbers.
 
     Parameters
     ----------
     folder : Path
         For messages.
     named : ViewNumbers
-        How the names of the folder were understood.
+        Interpretation of the names in the folder.
     numbers : dict of str to tuple of int
-        The views; no two have the same numbers.
+        Numbers of the views; no two views have the same.
     options : ReadOptions
         ``grid`` and ``pattern`` are used.
 
     Raises
     ------
     SepiError
-        If the grid that is given does not hold them, or they make none that is likely.
+        If the given grid does not hold the views, or they make no likely grid.
     """
     if named.kind is Kind.GRID:
         try:
             return _by_row_and_column(folder, named, numbers, options)
         except SepiError:
-            # times, such as minute and second
+            # two numbers may be a time, such as minute and second
             rows, columns = zip(*numbers.values(), strict=True)
             if options.grid is None or len(numbers) != prod(options.grid) or fill(rows, columns) >= _WELL_FILLED:
                 raise
@@ -100,9 +100,9 @@ def laid_out(folder: Path, named: ViewNumbers, numbers: Numbers, options: ReadOp
 
 
 def widened(folder: Path, named: ViewNumbers, numbers: Numbers, others: Numbers, options: ReadOptions) -> Layout:
-    """The layout of views, and of others that are not read if those have places among them.
+    """Layout of views, widened for views that are left out if these belong to the grid.
 
-    A corner or an edge that is left out is part of the grid still; a picture numbered beyond a full grid is not.
+    A corner or an edge that is left out is still part of the grid; an image numbered beyond a full grid is not.
     """
     layout = laid_out(folder, named, numbers, options)
     others = {name: values for name, values in others.items() if values not in numbers.values()}
@@ -115,7 +115,7 @@ def widened(folder: Path, named: ViewNumbers, numbers: Numbers, others: Numbers,
     if whole.arranged:
         fits = whole.fill == 1 or 1 > layout.fill <= whole.fill / _AS_FULL
     else:
-        # the ends of a sequence are ambiguous, but sequences usually fill a square
+        # the ends of a sequence are unclear, but sequences usually fill a square
         fits = not _is_square(layout.grid[1]) and _is_square(whole.grid[1])
     return whole if fits else layout
 
@@ -131,14 +131,14 @@ def _by_row_and_column(folder: Path, named: ViewNumbers, numbers: Numbers, optio
     spread = max(rows) - top, max(columns) - left
     if options.grid is not None:
         grid = options.grid
-        # views that are missing, if the grid has a position for them
+        # gaps are missing views if the grid has positions for them
         step = 1 if spread[0] < grid[0] and spread[1] < grid[1] else step
     else:
         grid = spread[0] // step + 1, spread[1] // step + 1
         if grid[0] * grid[1] > min(MAX_VIEWS, _POSITIONS_PER_PICTURE * len(numbers)):
             raise SepiError(
                 f"{folder}: the names ({next(iter(numbers))}) give a grid of {grid[0]}x{grid[1]} for {len(numbers)} "
-                f"pictures; say which numbers are row and column with --pattern, such as {EXAMPLES}"
+                f"images; say which numbers are row and column with --pattern, such as {EXAMPLES}"
             )
     if spread[0] // step >= grid[0] or spread[1] // step >= grid[1]:
         raise SepiError(
@@ -159,7 +159,7 @@ def _by_row_and_column(folder: Path, named: ViewNumbers, numbers: Numbers, optio
 
 
 def _in_one_row(named: ViewNumbers, numbers: Numbers) -> Layout:
-    """A sequence of views whose grid the names do not tell."""
+    """Layout in one row: the names number the views, and do not tell the grid."""
     values = [number for (number,) in numbers.values()]
     lowest, step = origin(values)
     count = (max(values) - lowest) // step + 1
@@ -171,13 +171,13 @@ def _in_one_row(named: ViewNumbers, numbers: Numbers) -> Layout:
 
 
 def _by_number(folder: Path, named: ViewNumbers, numbers: Numbers, grid: tuple[int, int]) -> Layout:
-    """Views numbered through a grid that is given, row by row."""
+    """Layout of views numbered row by row through a given grid."""
     count = grid[0] * grid[1]
     values = [number for (number,) in numbers.values()]
     lowest, highest = min(values), max(values)
-    # 0 or 1 is the number of the first position where only that lets the numbers end with the grid
+    # the first position has number 0 or 1 if only then the last number ends the grid
     base = highest - count + 1 if lowest > 1 and highest in (count - 1, count) else lowest
-    # numbers that are missing, if the grid has a position for them
+    # gaps are missing views if the grid has positions for them
     step = 1 if highest - base < count else origin(values)[1]
     fits = (highest - base) // step < count
     if named.kind is Kind.SORT or (not fits and len(values) == count):
@@ -195,9 +195,9 @@ def _by_number(folder: Path, named: ViewNumbers, numbers: Numbers, grid: tuple[i
 
 
 def _sorted(folder: Path, numbers: Numbers, grid: tuple[int, int]) -> Layout:
-    """Views one after the other, row by row."""
+    """Layout of views in the order of their names, row by row."""
     if len(numbers) != grid[0] * grid[1]:
-        raise SepiError(f"{folder}: the names only sort the {len(numbers)} pictures; --grid gives {grid[0]}x{grid[1]}")
+        raise SepiError(f"{folder}: the names only sort the {len(numbers)} images; --grid gives {grid[0]}x{grid[1]}")
     ranked = sorted(numbers, key=lambda name: numbers[name])
     notes = [f"{_sorted_note(numbers)}, taken row by row; --order transpose if by columns"]
     return Layout(grid, {name: rank for rank, name in enumerate(ranked)}, notes)
@@ -215,12 +215,12 @@ def _step_notes(step: int) -> list[str]:
     return [f"the numbers go up in steps of {step}, taken for neighbouring views"] if step > 1 else []
 
 
-# steps by which cameras that stand on the grid may seem to miss it: decimals are rounded
+# largest deviation in steps of cameras on the grid, from rounded decimals
 _ON_GRID = 1e-3
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a folder with at least two pictures that have numbers in their names, or a folder of rows."""
+    """Whether ``path`` is a folder with at least two images with numbers in their names, or a folder of rows."""
     try:
         return len(numbered(files_in(path))) >= 2 or has_rows(path, surely=True)
     except OSError:
@@ -228,13 +228,13 @@ def matches(path: Path) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read a folder.
+    """Read a folder of views.
 
     Returns
     -------
     LightField
-        Its notes say how the names were understood. Not arranged where they only number or sort the views and no grid
-        is given.
+        Its notes say how the names were interpreted. The views stay in one row if the names only number or sort them
+        and no grid is given.
     """
     if not path.is_dir():
         raise SepiError(f"{path}: not a folder of views")
@@ -264,13 +264,13 @@ def read(path: Path, options: ReadOptions) -> LightField:
 
 
 def _views(folder: Path, names: Sequence[str], options: ReadOptions) -> tuple[ViewNumbers, dict[str, str]]:
-    """What the names of the views say, and the pictures that are set apart for their size, with what is odd about them.
+    """Interpretation of the names, and the images left out for their size, each with the reason.
 
-    They are set apart first: the name of a thumbnail may differ in a number that all views share.
+    Images of odd sizes are left out first: the name of a thumbnail may differ in a number that all views share.
     """
     odd = odd_pictures(folder, filter(_is_picture, names))
     named = _named(folder, [name for name in names if name not in odd], options)
-    # among pictures of other names, such as small copies of all views, none may stand out
+    # with images of other names, such as small copies of all views, no size may prevail
     if not odd and (odd := odd_pictures(folder, named.numbers)):
         named = _named(folder, [name for name in names if name not in odd], options)
     return named, odd
@@ -282,7 +282,7 @@ def _named(folder: Path, names: Sequence[str], options: ReadOptions) -> ViewNumb
     try:
         return view_names.pair_view_numbers(names) or view_names.infer_view_numbers(str(folder), names)
     except SepiError:
-        # a grid that is given and filled needs no more than an order
+        # a given grid that is filled needs only an order
         if options.grid is None or math.prod(options.grid) != len(names):
             raise
         return view_names.sorted_view_numbers(names)
@@ -293,12 +293,12 @@ def _is_picture(name: str) -> bool:
 
 
 def _numbers_of(named: ViewNumbers, names: Iterable[str]) -> Numbers:
-    """Numbers of names that are like those of the views."""
+    """Numbers of the names that match those of the views."""
     return {name: numbers for name in sorted(names) if (numbers := named.numbers_of(name)) is not None}
 
 
 def _with_positions(light_field: LightField, layout: Layout, numbers: npt.NDArray[np.int64]) -> LightField:
-    """The light field with the positions of its cameras where two decimal numbers of the names fit its grid."""
+    """Light field with camera positions, if two decimal numbers in the names fit its grid."""
     decimals = view_names.decimals_in(list(layout.positions))
     given = np.full((layout.grid[0] * layout.grid[1], len(decimals[0])), np.nan)
     given[list(layout.positions.values())] = decimals
@@ -319,7 +319,7 @@ def _with_positions(light_field: LightField, layout: Layout, numbers: npt.NDArra
 def _left_out(names: Sequence[str], singular: str, plural: str) -> list[str]:
     if not names:
         return []
-    pictures = f"1 picture {singular} was" if len(names) == 1 else f"{len(names)} pictures {plural} were"
+    pictures = f"1 image {singular} was" if len(names) == 1 else f"{len(names)} images {plural} were"
     return [f"{pictures} left out: {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}"]
 
 
@@ -331,14 +331,14 @@ def _require_different(path: Path, named: ViewNumbers) -> None:
             raise SepiError(f"{path / name}: view {where} is given twice, also as {seen[numbers]}")
 
 
-# part of the pictures, or one, that may be odd where all others agree
+# share of the images, or one image, that may differ if all others agree
 _ODD = 0.1
 
 
 def odd_pictures(folder: Path, names: Iterable[str]) -> dict[str, str]:
-    """The few pictures of another size than all others, and what is odd about them; none where no size prevails.
+    """The few images of another size than all others, each with its size; empty if no size prevails.
 
-    Pictures that cannot be read, and links, are left to those that read them.
+    Reading reports unreadable images and links.
     """
     sizes: dict[str, tuple[int, int]] = {}
     for name in names:

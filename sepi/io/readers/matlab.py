@@ -1,14 +1,14 @@
 """MATLAB files, ``.mat``: version 5 (``save -v6``, ``-v7``) and version 7.3 (``save -v7.3``), which is HDF5.
 
-The axes are those that MATLAB shows. It drops trailing axes of size 1, so grey views have no axis of colours; version
-7.3 stores the axes in reverse. The Light Field Toolbox [1]_ saves ``LF`` with the axes T S H W C and a weight as the
-fourth channel.
+Axes are in the order that MATLAB shows. MATLAB drops trailing axes of size 1, so grey views have no axis of colours.
+Version 7.3 stores the axes in reverse. The Light Field Toolbox [1]_ saves ``LF`` with the axes T S H W C and a weight
+as the fourth channel.
 
-Version 5 is read without SciPy, which ends the program with a segmentation fault where the type of the values is none
-that there is, and reads an array in a structure only with all else that is in there. After a header of 128 bytes come
-elements, each a tag of type and length and then data; a variable is a *matrix* element, or that compressed by zlib, and
-begins with the elements flags, dimensions and name. The values of an array follow; of a structure the length of its
-fields' names, the names, and a matrix element for each field of each of its elements. No word of theirs takes memory.
+SciPy is not used for version 5: it crashes on unknown value types, and reads whole structures for one array in them. A
+file has a header of 128 bytes and then elements. An element is a tag of type and length, and data. A variable is a
+*matrix* element, or one compressed by zlib; it begins with the elements flags, dimensions and name. In an array the
+values follow. In a structure follow the length of the field names, the names, and a matrix element for each field of
+each of its elements. Lengths are checked before any memory is taken.
 
 References
 ----------
@@ -37,26 +37,26 @@ from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
 _HEADER = 128
-"""Bytes before the first element; the last four are version and byte order."""
+"""Bytes of the file's header; the last four are version and byte order."""
 
 _ORDERS = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
-"""These four to NumPy's word for the order."""
+"""Version and byte order to NumPy's sign for the order."""
 
 _MATRIX, _COMPRESSED = 14, 15
 _COMPLEX, _LOGICAL = 0x800, 0x200
-# classes of variables: cell arrays, structures, and arrays of numbers, as which the values are read
+# classes of variables: cell arrays, structures, and arrays of numbers with their types
 _CELLS, _STRUCTURE = 1, 2
 _CLASSES = dict(zip(range(6, 16), ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"), strict=True))
 # types in which values may be stored
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-# enough for all that comes before the values: names have at most 63 letters
+# enough for all elements before the values: names have at most 63 letters
 _PREFIX = 4096
-# elements before the values of an array
+# number of elements before the values of an array
 _BEFORE = 3
 
 
 class _Part(NamedTuple):
-    """An element: its type, the length that its tag states, and as much of its data as was looked at."""
+    """An element: its type, the length in its tag, and as much of its data as was read."""
 
     kind: int
     length: int
@@ -64,7 +64,7 @@ class _Part(NamedTuple):
 
 
 class _Variable(NamedTuple):
-    """A variable: its first elements, its place and length in the file, and how many bytes it may be unpacked."""
+    """A variable: its first elements, its place and length in the file, and its greatest unpacked size."""
 
     order: str
     parts: list[_Part]
@@ -76,11 +76,11 @@ class _Variable(NamedTuple):
 
     @property
     def flags(self) -> int:
-        """Class and kind of the values; 0 for what is no matrix."""
+        """Class and kind of the values; 0 if it is not a matrix."""
         return _flags(self.order, self.parts) if self.parts else 0
 
     def content(self) -> bytes:
-        """The data of the matrix element."""
+        """Data of the matrix element."""
         self.file.seek(self.start)
         stored = self.file.read(self.length)
         if not self.compressed:
@@ -95,8 +95,8 @@ class _Variable(NamedTuple):
 def shapes_of_version_5(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
     """Shape and type of the arrays of real numbers, as MATLAB shows them.
 
-    Those in structures, ``scene/LF`` or ``scene(2)/LF``, and cell arrays of pictures that are alike, only where no
-    other may be a light field.
+    Arrays in structures, ``scene/LF`` or ``scene(2)/LF``, and cell arrays of equal shapes count only if no other array
+    may be a light field.
 
     Raises
     ------
@@ -117,12 +117,12 @@ def shapes_of_version_5(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype
 
 
 def read_version_5(path: Path, name: str) -> npt.NDArray[Any]:
-    """One of the arrays that :func:`shapes_of_version_5` found."""
+    """Array of a name from :func:`shapes_of_version_5`."""
     return next(array for found, array in _arrays(path, name) if found == name)
 
 
 def _arrays(path: Path, wanted: str = "") -> Iterator[tuple[str, npt.NDArray[Any]]]:
-    """The arrays in structures and cells, and the one that is wanted."""
+    """Arrays in structures and cells, and the wanted one."""
     with path.open("rb") as file:
         for variable in _variables(path, file):
             name = _text(variable.parts[2]) if variable.parts else ""
@@ -131,7 +131,7 @@ def _arrays(path: Path, wanted: str = "") -> Iterator[tuple[str, npt.NDArray[Any
 
 
 def _form(order: str, parts: list[_Part]) -> tuple[tuple[int, ...], np.dtype[Any], np.dtype[Any]]:
-    """Shape and type of an array, and the type as which its values are stored."""
+    """Shape and type of an array, and the type in which its values are stored."""
     _, dimensions, name, values = parts[: _BEFORE + 1]
     if values.kind not in _TYPES:
         raise SepiError(f"damaged MATLAB file: an array with values of type {values.kind}")
@@ -142,7 +142,7 @@ def _form(order: str, parts: list[_Part]) -> tuple[tuple[int, ...], np.dtype[Any
 
 
 def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.NDArray[Any]]]:
-    """Arrays in a matrix element, which a structure or a cell array may be."""
+    """Arrays in a matrix element, which may be a structure or a cell array."""
     parts = _parts(order, data)
     if any(part.length != len(part.data) for part in parts):
         raise ValueError(f"{name} is cut off")
@@ -154,7 +154,7 @@ def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.
         values = parts[5:]
         for number, value in enumerate(values):
             element, field = divmod(number, len(fields))
-            # an empty one has no data at all
+            # an empty matrix has no data at all
             if value.kind == _MATRIX and value.length:
                 which = f"({element + 1})" if len(values) > len(fields) else ""
                 yield from _fields(order, memoryview(value.data), f"{name}{which}/{fields[field]}")
@@ -165,7 +165,7 @@ def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.
             yield name, np.stack(cells)[np.arange(len(cells)).reshape(shape, order="F").squeeze()]
     elif _is_real(flags):
         shape, kind, stored = _form(order, parts)
-        # MATLAB saves doubles that are small whole numbers as bytes
+        # MATLAB stores doubles that are small whole numbers as bytes
         yield name, np.frombuffer(parts[_BEFORE].data, stored).reshape(shape, order="F").astype(kind, copy=False)
 
 
@@ -182,7 +182,7 @@ def _variables(path: Path, file: BinaryIO) -> Iterator[_Variable]:
             head = zlib.decompressobj().decompress(head, _PREFIX)
             kind, head = struct.unpack_from(order + "I", head)[0], head[8:]
         parts = _parts(order, head, _BEFORE + 1) if kind == _MATRIX else []
-        # SciPy takes memory on the word of each, of variables that nobody asks for, too
+        # SciPy would allocate these lengths, even for variables that nobody asks for
         if any(part.length > len(part.data) for part in parts[:_BEFORE]):
             raise ValueError("a variable whose head is longer than the file")
         yield _Variable(order, parts, file, start, length, compressed, most)
@@ -190,14 +190,14 @@ def _variables(path: Path, file: BinaryIO) -> Iterator[_Variable]:
 
 
 def _parts(order: str, data: bytes | memoryview, most: int | None = None) -> list[_Part]:
-    """The elements in the data of a matrix, the first ones alone or all."""
+    """Elements in the data of a matrix: the first ``most``, or all."""
     parts: list[_Part] = []
     at = 0
     while at + 8 <= len(data) and (most is None or len(parts) < most):
         kind, length = struct.unpack_from(order + "II", data, at)
         start, after = at + 8, at + 8 + -(-length // 8) * 8
         if kind >> 16:
-            # up to four bytes of data stand in the tag itself
+            # the tag itself holds up to four bytes of data
             kind, length, start, after = kind & 0xFFFF, kind >> 16, at + 4, at + 8
         parts.append(_Part(kind, length, data[start : start + length]))
         at = after
@@ -220,7 +220,7 @@ _KIND = "MATLAB file"
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a file with MATLAB's header or its ending ``.mat``."""
+    """Whether ``path`` is a file with MATLAB's header or the suffix ``.mat``."""
     if path.suffix.lower() == ".mat" or not path.is_file():
         return path.is_file()
     try:
@@ -231,12 +231,12 @@ def matches(path: Path) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read the array ``options.variable`` of a MATLAB file; without it, what can be a light field."""
+    """Light field from the array ``options.variable``; default: the array that can be a light field."""
 
     def load(name: str) -> Array:
         with reading(path, _KIND):
             array: Array = (read_hdf5 if h5py.is_hdf5(path) else read_version_5)(path, name)
-        # the axes that MATLAB dropped
+        # restore the axes that MATLAB dropped
         while array.ndim < len(options.axes or "") <= 5:
             array = array[..., None]
         return array
@@ -245,9 +245,9 @@ def read(path: Path, options: ReadOptions) -> LightField:
 
 
 def array_shapes(path: Path) -> Shapes:
-    """Shape and type, as MATLAB shows them, of each array of real numbers in a file; their values are not read."""
+    """Shape and type, as MATLAB shows them, of each array of real numbers in a file; no values are read."""
     head = _head(path)
-    # what begins with a zero is of version 4
+    # version 4 begins with a zero
     if head[-4:] in _ORDERS and 0 not in head[:4]:
         with reading(path, _KIND):
             return shapes_of_version_5(path)

@@ -1,7 +1,7 @@
-"""One picture of all views side by side: a mosaic of the grid, or a quilt of a Looking Glass display [1]_.
+"""One image of all views side by side: a mosaic of the grid, or a quilt of a Looking Glass display [1]_.
 
-A quilt has its layout in its name: ``_qs8x6a0.75`` are 8 columns, 6 rows and the aspect of a view. Its views are a
-single row of cameras, from the leftmost at the lower left, row by row, to the rightmost at the upper right.
+The name of a quilt gives its layout: ``_qs8x6a0.75`` means 8 columns, 6 rows and the aspect ratio of a view. Its views
+are a single row of cameras, from the leftmost at the lower left, row by row, to the rightmost at the upper right.
 
 References
 ----------
@@ -24,16 +24,16 @@ _QUILT = re.compile(r".*_qs([0-9]{1,4})x([0-9]{1,4})a[0-9.]+", re.IGNORECASE)
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a picture with the name of a quilt."""
+    """Whether ``path`` is an image with the name of a quilt."""
     return _QUILT.fullmatch(path.stem) is not None and path.suffix.lower() in SUFFIXES and path.is_file()
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read a picture; its grid is that of the options, or of its name."""
+    """Light field from a mosaic; the options or its name give the grid."""
     quilt = _QUILT.fullmatch(path.stem)
     grid = options.grid or (quilt and (int(quilt[2]), int(quilt[1])))
     if grid is None:
-        raise SepiError(f"{path}: --format mosaic needs --grid ROWSxCOLUMNS, how many views lie in the picture")
+        raise SepiError(f"{path}: --format mosaic needs --grid ROWSxCOLUMNS, the views in the image")
     rows, columns = grid
     picture = read_picture(path, any_floats=options.white is not None)
     height, width = picture.shape[:2]
@@ -44,6 +44,6 @@ def read(path: Path, options: ReadOptions) -> LightField:
         views = views[::-1].reshape(1, rows * columns, *views.shape[2:])
         note = f"a quilt of {columns} columns and {rows} rows, by its name: a row of views from the lower left"
     else:
-        note = f"the picture is cut into {rows}x{columns} views, row by row from the upper left"
+        note = f"the image is cut into {rows}x{columns} views, row by row from the upper left"
     light_field = light_field_from_array(views, path, replace(options, grid=None), axes="TSHWC")
     return replace(light_field, notes=(note, *light_field.notes))

@@ -1,4 +1,4 @@
-"""Names of pictures that are alike but for their numbers, and which of these numbers count the views."""
+"""Groups of image names that differ only in their numbers, and which of these numbers count the views."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from typing import TypeVar
 from sepi.errors import SepiError
 
 Values = tuple[int, ...]
-"""The value of one number in each name."""
+"""Value of one number in each name."""
 
-# Least part of the positions between the first and the last that must be taken: of a running number (the others are
-# missing views, not a measure such as the time), and of a grid whose row and column are two of several numbers
+# Least share of the positions between the first and the last that must be filled: of a running number (else it is a
+# measure such as the time), and of a grid whose row and column are two of several numbers
 _COUNTED = 2 / 3
 _FILLED = 0.5
-# how many times better two numbers must fill their grid than any other two
+# factor by which two numbers must fill their grid better than any other two
 _CLEARLY = 1.5
 
 
 class Kind(Enum):
-    """What numbers say about the views."""
+    """Meaning of the numbers in the names of views."""
 
     GRID = "row and column"
     COUNT = "a running number"
@@ -35,13 +35,13 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Counting:
-    """How the names count the views.
+    """Numbers by which the names count the views.
 
     Attributes
     ----------
     kind : Kind
     columns : tuple of int
-        Which of the numbers: row and column, or the running number; those by which names are sorted.
+        Indices of the numbers: row and column, the running number, or those that sort the names.
     """
 
     kind: Kind
@@ -49,23 +49,23 @@ class Counting:
 
 
 def counting(numbers: Sequence[Values]) -> Counting | None:
-    """How names count views by the numbers in them.
+    """Numbers by which names count views.
 
     Parameters
     ----------
     numbers : sequence of tuple of int
-        For each number in the names its value in each name.
+        For each number in the names, its value in each name.
 
     Returns
     -------
     Counting or None
-        None where the numbers leave it open. No columns where none differs from name to name.
+        None if ambiguous. No columns if no number differs from name to name.
     """
     columns = {at: numbers[at] for at in _independent(numbers)}
     varying = tuple(columns)
     if len(varying) < 2:
         return Counting(Kind.COUNT if all(map(is_count, columns.values())) else Kind.SORT, varying)
-    # numbers of which each picture has another: they count or date the pictures
+    # numbers that are different in each name: they count or date the images
     single = [at for at in varying if len(set(columns[at])) == len(columns[at])]
     others = [at for at in varying if at not in single]
     pair = (others[0], others[1]) if len(varying) == len(others) == 2 else _filling_pair(numbers, others)
@@ -78,19 +78,19 @@ def counting(numbers: Sequence[Values]) -> Counting | None:
 
 
 def is_count(values: Sequence[int]) -> bool:
-    """Whether numbers, if some of them are missing, count something one by one."""
+    """Whether numbers, perhaps with gaps, count one by one."""
     lowest, step = origin(values)
     return len(values) >= _COUNTED * ((max(values) - lowest) // step + 1)
 
 
 def origin(values: Sequence[int]) -> tuple[int, int]:
-    """Least of some numbers, and the largest step in which all others follow; 1 where there is none."""
+    """Least number, and the largest step of which all others are multiples from there; 1 for a single number."""
     lowest = min(values)
     return lowest, math.gcd(*(value - lowest for value in values)) or 1
 
 
 def _independent(numbers: Sequence[Values]) -> list[int]:
-    """Which numbers differ from name to name; of those that count the same, in other steps or backwards, the first."""
+    """Indices of numbers that differ from name to name; of equivalent ones (other step or sign) only the first."""
     first: dict[Values, int] = {}
     for at, values in enumerate(numbers):
         if len(set(values)) > 1:
@@ -102,7 +102,7 @@ def _independent(numbers: Sequence[Values]) -> list[int]:
 
 
 def _filling_pair(numbers: Sequence[Values], among: Sequence[int]) -> tuple[int, int] | None:
-    """The two of some numbers that fill a grid, and clearly better than any other two."""
+    """The two numbers that fill a grid clearly better than any other two."""
     fills = {pair: fill(numbers[pair[0]], numbers[pair[1]]) for pair in combinations(among, 2)}
     ranked = sorted(fills, key=lambda pair: fills[pair], reverse=True)
     if not ranked or fills[ranked[0]] < _FILLED:
@@ -112,7 +112,7 @@ def _filling_pair(numbers: Sequence[Values], among: Sequence[int]) -> tuple[int,
 
 
 def fill(rows: Values, columns: Values) -> float:
-    """How much of its grid two numbers fill; 0 where two names share a place."""
+    """Share of its grid that two numbers fill; 0 if two names share a place."""
     places = set(zip(rows, columns, strict=True))
     if len(places) < len(rows):
         return 0.0
@@ -124,30 +124,30 @@ def fill(rows: Values, columns: Values) -> float:
 EXAMPLES = "'view_{row}_{column}.png' or 'img{number}.jpg'"
 
 CAMERAS = ("cam", "camera")
-"""Words for a camera in names of folders and pictures."""
+"""Words for a camera in names of folders and images."""
 
 MAX_DIGITS = 18
-"""Of a number in a name."""
+"""Most digits of a number in a name."""
 
 DECIMAL = r"(?P<decimal>[+-]*+(?<![0-9.])[0-9]++\.[0-9]++(?![0-9.]))"
-"""Regular expression of a decimal number in a name, with the signs before it."""
+"""Regular expression of a decimal number in a name, with its signs."""
 
 Number = TypeVar("Number", int, float)
 
-# decimals of a decimal number that counts views
+# most decimals of a decimal number that counts views
 _FINE = 6
-# part of the largest group of names from which on another group is as likely the views
+# share of the largest group of names at which another group may also be the views
 _RIVAL = 0.5
-# last word before a number, what says which number it is, and what says that it is no place
+# last word before a number, words for row and column, and words for other things
 _WORD = re.compile(r"([A-Z]?[a-z]+|[A-Z]+)[ _.=(\[-]*$")
 _AXES = {"x": "column", "c": "column", "col": "column", "column": "column", "y": "row", "r": "row", "row": "row"}
 _NO_PLACE = frozenset(["frame", "frm", "time", "t", "exp", "exposure", "ev", "iso", "focus", "ch", "channel"])
-# in place of a decimal number; no name has it
+# stands for a decimal number; no name has it
 _MARK = "\0"
 
 
 class NameGroup:
-    """The largest group of names that are alike but for their numbers.
+    """The largest group of names that differ only in their numbers.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class NameGroup:
         For messages.
     names : sequence of str
     form : pattern
-        Of the numbers.
+        Regular expression of a number.
     decimals_count : bool
         Whether decimal numbers may count views.
     """
@@ -173,12 +173,12 @@ class NameGroup:
         self._origins = [(0, 1)] * len(self._first)
         self.columns = self._values()
         if decimals_count:
-            # decimals that count do so in steps of their own
+            # decimals count in their own steps
             self._origins = [origin(values) for values in self.columns]
             self.columns = self._values()
         self._words = [word[1].lower() if (word := _WORD.search(text)) else "" for text in self._texts[:-2]]
         self._beside = self._no_places()
-        # what counts something else than places is the same for all of them
+        # numbers that count other things than places are ignored
         self.places = [(0,) * len(values) if at in self._beside else values for at, values in enumerate(self.columns)]
 
     def _values(self) -> list[Values]:
@@ -186,10 +186,10 @@ class NameGroup:
         return list(zip(*(self.numbers_of(name, columns) or () for name in self.names), strict=True))
 
     def _no_places(self) -> list[int]:
-        """Numbers that count frames, exposures and the like, where others differ, too.
+        """Indices of numbers that count frames, exposures and the like, if other numbers differ too.
 
-        A word at the start of the names is one of all numbers unless each has a word: ``frame_03_07``. Axes of a light
-        field may be called t and s. Pictures in a camera's folder are its own.
+        In ``frame_03_07`` the word belongs to all numbers, since not each has its own. Axes of a light field may be
+        called t and s. Numbers of images in a camera's folder do not count places.
         """
         words = {at: self._words[at] for at, values in enumerate(self.columns) if len(set(values)) > 1}
         other = _NO_PLACE - {"t"} if "s" in words.values() else _NO_PLACE
@@ -202,19 +202,19 @@ class NameGroup:
         return found if len(found) < len(words) else []
 
     def counting(self) -> Counting | None:
-        """How its numbers count views; None where they leave it open, or views have several pictures."""
+        """Numbers that count the views; None if ambiguous, or if views have several images."""
         several = len(set(zip(*self.places, strict=True))) < len(set(zip(*self.columns, strict=True)))
         return None if several else counting(self.places)
 
     def why_open(self) -> str:
-        """What is unclear where nothing is counted."""
+        """Why :meth:`counting` is None, for the message."""
         if not self._beside:
             return "several numbers differ from name to name, and no two of them alone fill a grid"
         words = " and ".join(f"'{self._words[at] or self._texts[at]}'" for at in self._beside)
-        return f"the numbers after {words} count no views, so that one value of each is to be chosen"
+        return f"the numbers after {words} count no views; choose one value of each"
 
     def numbers_of(self, name: str, columns: Sequence[int]) -> tuple[int, ...] | None:
-        """Some of the numbers of a name; None where it is unlike those of the group."""
+        """Numbers of a name at ``columns``; None if the name does not match the group."""
         texts, numbers = self._cut(name)
         if texts != self._texts:
             return None
@@ -222,12 +222,12 @@ class NameGroup:
         return tuple((value - self._origins[at][0]) // self._origins[at][1] for at, value in values.items())
 
     def row_first(self, columns: tuple[int, ...]) -> tuple[tuple[int, ...], bool]:
-        """Row and column in that order, and whether the words before them say so: ``x3_y7``, ``c3r7``."""
+        """Row and column in that order, and whether words in the names say so: ``x3_y7``, ``c3r7``."""
         said = [_AXES.get(self._words[at], "") for at in columns]
         return (columns[::-1] if said == ["column", "row"] else columns), sorted(said) == ["column", "row"]
 
     def pattern(self, columns: Sequence[int], fixed: bool = False) -> str:
-        """The pattern that takes these numbers; others that differ are free, or ``fixed`` as in the first name."""
+        """Pattern with these numbers; others that differ are ``*``, or ``fixed`` as in the first name."""
         fields = dict(zip(columns, ("{row}", "{column}") if len(columns) == 2 else ("{number}",), strict=True))
         parts = [self._texts[0]]
         for at, number in enumerate(self._first):
@@ -238,14 +238,14 @@ class NameGroup:
         return ("".join(parts) + ("." + ending if ending else "")).replace(_MARK, "*")
 
     def suggestion(self) -> str:
-        """A pattern in quotes: of the first number of which each picture has another, else of the last two places."""
+        """Pattern in quotes: of the first number that is different in each name, else of the last two places."""
         varying = [at for at, values in enumerate(self.places) if len(set(values)) > 1]
         single = [at for at in varying if len(set(self.places[at])) == len(self.names)]
         columns = single[:1] or self.row_first(tuple(varying[-2:]))[0]
         return f"'{self.pattern(columns, fixed=not single)}'"
 
     def _cut(self, name: str) -> tuple[tuple[str, ...], list[tuple[str, str]]]:
-        """The texts between the numbers of a name, and the numbers, each with what stands before it of + and -."""
+        """Texts between the numbers of a name, and the numbers, each with the signs before it."""
         stem, dot, suffix = name.rpartition(".")
         if not dot:
             stem, suffix = name, ""
@@ -255,7 +255,7 @@ class NameGroup:
             texts[-1] += stem[at : match.start()]
             at, digits = match.end(), match[0].lstrip("+-")
             if match.lastgroup == "decimal" and not self._decimals_count:
-                # names with other decimals are alike
+                # names that differ in decimals are alike
                 texts[-1] += _MARK
             elif len(digits) > MAX_DIGITS:
                 texts[-1] += match[0]
@@ -269,30 +269,30 @@ class NameGroup:
 def _largest(source: str, groups: Mapping[tuple[str, ...], list[str]]) -> list[str]:
     ranked = sorted(groups.values(), key=len, reverse=True)
     if not ranked:
-        raise SepiError(f"{source}: no picture's name has a number; expected names such as {EXAMPLES}")
-    # one stray picture is none of two views; of more, half as many may be the views of something else
+        raise SepiError(f"{source}: no image name has a number; expected names such as {EXAMPLES}")
+    # a single stray image is not a second group; half as many as the largest group may be
     if len(ranked) > 1 and len(ranked[1]) >= min(len(ranked[0]), max(2, _RIVAL * len(ranked[0]))):
         raise SepiError(
-            f"{source}: about as many pictures are named like {ranked[0][0]} as like {ranked[1][0]} ({len(ranked[0])} "
+            f"{source}: about as many images are named like {ranked[0][0]} as like {ranked[1][0]} ({len(ranked[0])} "
             f"and {len(ranked[1])}); say which are the views with --pattern, such as {EXAMPLES}"
         )
     return ranked[0]
 
 
 def hyphens(signs: Iterable[Sequence[str]]) -> list[str]:
-    """Of the signs before each number, those that all names have: hyphens, where no sign is a plus."""
+    """Signs before each number that all names share: hyphens rather than minus signs, unless a sign is a plus."""
     columns = [list(column) for column in zip(*signs, strict=True)]
     signed = any("+" in sign for column in columns for sign in column)
-    # of texts that are no paths
+    # these texts are not paths
     return [commonprefix([sign[:-1] for sign in column] if signed else column) for column in columns]  # noqa: RUF071
 
 
 def signed(signs: str, text: str, separator: str, convert: Callable[[str], Number]) -> Number:
-    """A number, negative where there is a minus behind the separator."""
+    """Number, negative if a minus follows the separator."""
     return -convert(text) if "-" in signs[len(separator) :] else convert(text)
 
 
 def _whole(text: str) -> int:
-    # the digits of a decimal that counts, as those of all others of its place in thousandths of thousandths
+    # decimals that count become whole millionths
     whole, _, part = text.partition(".")
     return int(whole) * 10**_FINE + int(part.ljust(_FINE, "0")[:_FINE]) if part else int(whole)

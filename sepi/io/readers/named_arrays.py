@@ -1,4 +1,4 @@
-"""Files that hold arrays by name: which of them is the light field."""
+"""Files with named arrays: which of them is the light field."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from sepi.validation import require_known
 Shapes = Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]
 """Name of each array in a file to its shape and type."""
 
-# words for the channels; how the first of them may be written
+# words for the channels, long and short
 _COLOURS = (("red", "green", "blue"), ("r", "g", "b"))
 _STYLES = (str.lower, str.upper, str.capitalize)
-# arrays that a message names
+# most arrays that a message names
 _LISTED = 12
 
 
 def light_field_from_arrays(
     path: Path, shapes: Shapes, options: ReadOptions, load: Callable[[str], Array]
 ) -> LightField:
-    """The light field of a file with arrays: the one that is it, or three that are its channels.
+    """Light field from one of a file's arrays, or from three that are its channels.
 
     Parameters
     ----------
@@ -40,14 +40,14 @@ def light_field_from_arrays(
     shapes : mapping of str to tuple
         Name of each array to its shape and type.
     options : ReadOptions
-        ``variable`` names one; the others as :func:`sepi.io.readers.arrays.light_field_from_array` uses them.
+        ``variable`` names an array; for others see :func:`sepi.io.readers.arrays.light_field_from_array`.
     load : callable
-        Reads the array of a name.
+        Reads an array by name.
 
     Raises
     ------
     SepiError
-        If no array, or several, can be the light field, or it cannot be read.
+        If no array or several can be the light field, or it cannot be read.
     """
     names = _arrays_of(path, shapes, options.variable)
     if len(names) == 1:
@@ -60,24 +60,23 @@ def light_field_from_arrays(
 
 
 def _channels_from(red: str) -> Iterator[tuple[str, ...]]:
-    """Names of three channels of which the first is this one: ``lfr lfg lfb``, ``LF_Red LF_Green LF_Blue``."""
+    """Possible names of three channels with this first one: ``lfr lfg lfb``, ``LF_Red LF_Green LF_Blue``."""
     for red_word, *others in dict.fromkeys((*map(style, words),) for words in _COLOURS for style in _STYLES):
         for match in re.finditer(red_word, red):
             yield red, *(red[: match.start()] + word + red[match.end() :] for word in others)
 
 
 def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, ...]:
-    """Name of the array that is the light field, of those in a file, or names of its red, green and blue one.
+    """Name of the array that is the light field, or names of its red, green and blue arrays.
 
-    Without the user's choice it is the only array that may be one by its axes, or among several the only ``LF``, or
-    three channels.
+    Unless the user chooses, it is the only array whose axes fit, or among several the only ``LF``, or three channels.
     """
     shapes = {name: shape for name, (shape, kind) in arrays.items() if kind.kind in "iuf" or name == requested}
     if requested is not None:
         require_known(f"{path}: --variable", [requested], shapes)
         return (requested,)
     likely = [name for name, shape in shapes.items() if is_likely(shape)]
-    # a stack of grey pictures beside one of light fields may be anything
+    # beside arrays with a grid, a stack of grey images may be anything
     fitting = [name for name in likely if len(shapes[name]) > len("NHW")] or likely
     if len(fitting) == 1:
         return (fitting[0],)
@@ -90,14 +89,14 @@ def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, 
         return triples[0]
     if fitting:
         several = _listed({name: arrays[name] for name in fitting})
-        raise SepiError(f"{path}: holds several arrays that may be one; choose one with --variable: {several}")
+        raise SepiError(f"{path}: several arrays may be the light field; choose one with --variable: {several}")
     raise SepiError(f"{path}: {no_light_field(arrays)}")
 
 
 def no_light_field(arrays: Shapes) -> str:
-    """What to say of a file whose arrays are no light field: what they are."""
+    """Message for a file without a light field: the arrays that it holds."""
     found = _listed(arrays) or "nothing"
-    return f"holds no array of numbers of 4 or 5 axes (found: {found}); a picture of all views takes --format mosaic"
+    return f"holds no array of numbers of 4 or 5 axes (found: {found}); for an image of all views pass --format mosaic"
 
 
 def _listed(arrays: Shapes) -> str:
@@ -108,24 +107,24 @@ def _listed(arrays: Shapes) -> str:
 
 
 MATLAB_HDF5 = b"MATLAB 7.3 MAT-file"
-"""First bytes of a file of MATLAB's."""
+"""First bytes of a MATLAB file of version 7.3."""
 
 _CLASS = "MATLAB_class"
-# other classes are text, logical values, ...
+# MATLAB's classes of numbers; others are text, logical values, ...
 _NUMBERS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "single", "uint64", "int64", "double")
 _CELL, _MOST_CELLS = "cell", 8 * MAX_VIEWS
 
 
 def hdf5_shapes(path: Path, check: bool = True) -> Shapes:
-    """Shape and type of each array of numbers; those in groups only where none outside of them may be a light field.
+    """Shape and type of each array of numbers; arrays in groups only if none outside may be a light field.
 
-    Values are not read; unchecked, nor is the whole file for its digest.
+    No values are read; ``check=False`` does not read the whole file for its digest.
     """
     found: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {}
     with open_hdf5(path, check=check) as file:
 
         def take(name: str, entry: object) -> None:
-            # what cells refer to lies in such groups
+            # '#refs#' holds the contents of cells
             if not name.startswith("#") and (cells := _cells(entry)):
                 found[name] = (*_outer(entry), *cells[0].shape[:: _turn(path, cells[0])]), cells[0].dtype
 
@@ -137,7 +136,7 @@ def hdf5_shapes(path: Path, check: bool = True) -> Shapes:
 
 
 def read_hdf5(path: Path, name: str) -> Array:
-    """One of the arrays that :func:`hdf5_shapes` found."""
+    """Array of a name from :func:`hdf5_shapes`."""
     with open_hdf5(path) as file:
         cells = _cells(file[name])
         arrays = [read_dataset(path, cell).transpose([*range(cell.ndim)][:: _turn(path, cell)]) for cell in cells]
@@ -145,7 +144,7 @@ def read_hdf5(path: Path, name: str) -> Array:
 
 
 def _cells(entry: Any) -> list[h5py.Dataset]:
-    """The array of numbers that an entry is, or those of the cells of a cell array if they are alike; else none."""
+    """The entry itself if it is an array of numbers, or the arrays of a cell array if all are alike; else empty."""
     if not isinstance(entry, h5py.Dataset) or entry.shape is None:
         return []
     if entry.dtype != h5py.ref_dtype:
@@ -155,19 +154,19 @@ def _cells(entry: Any) -> list[h5py.Dataset]:
     try:
         cells = [entry.file[reference] for reference in entry[()].T.ravel()]
     except ValueError:
-        # a reference to nothing
+        # a null reference
         return []
     alike = all(map(_is_numbers, cells)) and len({(cell.shape, cell.dtype) for cell in cells}) == 1
     return cells if alike else []
 
 
 def _outer(entry: Any) -> tuple[int, ...]:
-    """The axes of a cell array as MATLAB shows them, without those of one."""
+    """Axes of a cell array as MATLAB shows them, without those of size 1."""
     return tuple(n for n in entry.shape[::-1] if n > 1) if entry.dtype == h5py.ref_dtype else ()
 
 
 def _turn(path: Path, dataset: h5py.Dataset) -> int:
-    """-1 where the axes are in reverse, as MATLAB writes them; other programs do not."""
+    """-1 if the axes are in reverse, as only MATLAB writes them; else 1."""
     with path.open("rb") as file:
         return -1 if _CLASS in dataset.attrs or file.read(len(MATLAB_HDF5)) == MATLAB_HDF5 else 1
 

@@ -1,4 +1,4 @@
-"""NumPy files: an array in ``.npy``, or one of those in ``.npz``."""
+"""NumPy files: the array in ``.npy``, or one of the arrays in ``.npz``."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
 _KIND = "NumPy file"
-# of a ZIP archive with members, and of an empty one
+# first bytes of a ZIP archive with members, and of an empty one
 _ZIP_MAGICS = (b"PK\x03\x04", b"PK\x05\x06")
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a file with NumPy's header, an archive of such, or has the ending ``.npy`` or ``.npz``."""
+    """Whether ``path`` is a file or an archive of NumPy, by its content or its suffix ``.npy`` or ``.npz``."""
     if not path.is_file():
         return False
     try:
@@ -35,16 +35,16 @@ def matches(path: Path) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read the array of a NumPy file; of an archive, ``options.variable`` or what can be a light field."""
+    """Light field from the array of a NumPy file; of an archive, ``options.variable`` or the array that fits."""
     return light_field_from_arrays(path, array_shapes(path), options, functools.partial(read_named, path))
 
 
 def read_array(path: Path) -> Array:
-    """The array of a ``.npy`` file, mapped: its values are read when they are used."""
+    """Array of a ``.npy`` file, memory-mapped: values are read when used."""
     with reading(path, _KIND), warnings.catch_warnings(action="ignore"):
         with path.open("rb") as file:
             start = file.read(12)
-        # two bytes in version 1, four in later ones: NumPy takes memory for it before it reads
+        # NumPy allocates this length before it reads; two bytes in version 1, four in later ones
         length = int.from_bytes(start[8:10] if start[6:7] == b"\x01" else start[8:12], "little")
         if length > path.stat().st_size:
             raise ValueError(f"a header of {length} bytes")
@@ -53,7 +53,7 @@ def read_array(path: Path) -> Array:
 
 
 def array_shapes(path: Path) -> Shapes:
-    """Shape and type of each array in a file by its name, the file's own in ``.npy``; values are not read."""
+    """Shape and type of each array by name; a ``.npy`` has the file's own name. No values are read."""
     found = {}
     if not _is_zipped(path):
         array = read_array(path)
@@ -64,7 +64,7 @@ def array_shapes(path: Path) -> Shapes:
                 _require_room(path, info)
                 with archive.open(info) as file:
                     shape, _, kind = _HEADERS[npy.read_magic(file)](file)
-                # NumPy takes memory for it before it reads
+                # NumPy allocates this shape before it reads
                 if math.prod(shape) * kind.itemsize > info.file_size:
                     raise ValueError(f"{info.filename} of shape {shape} cannot lie in {info.file_size} bytes")
                 found[info.filename.removesuffix(".npy")] = shape, kind
@@ -72,7 +72,7 @@ def array_shapes(path: Path) -> Shapes:
 
 
 def read_named(path: Path, name: str) -> Array:
-    """One of the arrays that :func:`array_shapes` found."""
+    """Array of a name from :func:`array_shapes`."""
     if not _is_zipped(path):
         return read_array(path)
     with reading(path, _KIND), np.load(path, allow_pickle=False) as archive:
@@ -86,7 +86,7 @@ def _is_zipped(path: Path) -> bool:
 
 
 def _require_room(path: Path, info: zipfile.ZipInfo) -> None:
-    """Raise unless a member of an archive can be as large as the archive says."""
+    """Raise if a member of an archive cannot have the size that the archive states."""
     held = min(info.compress_size, path.stat().st_size)
     if info.file_size > held * (1 if info.compress_type == zipfile.ZIP_STORED else DEFLATE_RATIO):
         raise SepiError(f"damaged NumPy file: {printable(info.filename)}: {info.file_size} bytes cannot lie in {held}")

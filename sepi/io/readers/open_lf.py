@@ -1,8 +1,8 @@
-"""HDF5 files of OpenLF [1]_: a group ``LF`` with one picture of all views side by side for each channel.
+"""HDF5 files of OpenLF [1]_: a group ``LF`` with a mosaic of all views for each channel.
 
-Attributes of the group give the number of views, ``cams_h`` in a row and ``cams_v`` in a column, the size of the
-picture, ``width`` and ``height``, and the kind of light field, ``LF_TYPE``. The picture of a single column of views may
-lie on its side.
+Attributes of the group give the number of views in a row, ``cams_h``, and in a column, ``cams_v``, the size of the
+mosaic, ``width`` and ``height``, and the kind of light field, ``LF_TYPE``. The mosaic of a single column of views may
+be transposed.
 
 References
 ----------
@@ -35,13 +35,13 @@ _COUNTS = ("LF_TYPE", "cams_h", "cams_v", "height", "width")
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a readable HDF5 file with a group ``LF`` of OpenLF's attributes or channels."""
+    """Whether ``path`` is a readable HDF5 file with a group ``LF`` that has OpenLF's attributes or channels."""
     known = {*_COLOURS, *_GREY, *_COUNTS}
     return has_dataset(path, GROUP, lambda lf: isinstance(lf, h5py.Group) and known.intersection((*lf, *lf.attrs)))
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read such a file; its baselines, whose unit it does not say, give the distance of rows in steps of columns."""
+    """Light field of an OpenLF file; its baselines, of unknown unit, give the distance of rows in view steps."""
     with _opened(path) as group:
         (rows, columns, H, W), kind, names = _form(path, group)
         mosaic = np.stack([_mosaic(path, group[name], (rows * H, columns * W), kind) for name in names], axis=2)
@@ -51,12 +51,12 @@ def read(path: Path, options: ReadOptions) -> LightField:
     if min(rows, columns) < 2 or not (0 < down < math.inf and 0 < across < math.inf):
         return light_field
     spacing = down / across
-    # rows of the light field's own grid are the file's columns if the order exchanges them
+    # a transposed grid has the file's columns as rows
     return replace(light_field, row_spacing=1 / spacing if "transpose" in options.order else spacing)
 
 
 def views_shape(path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Shape (T, S, H, W), and C if in colour, and type of the views of such a file; their values are not read."""
+    """Shape (T, S, H, W), or (T, S, H, W, C) in colour, and type of the views; no values are read."""
     with _opened(path) as group:
         shape, _, names = _form(path, group)
         return (*shape, len(names)) if len(names) > 1 else shape, group[names[0]].dtype
@@ -84,10 +84,10 @@ def _form(path: Path, group: h5py.Group) -> tuple[tuple[int, int, int, int], int
             raise SepiError(f"{path}: expected the attribute '{key}' to be a whole number, got {count:g}")
     kind, columns, rows, height, width = map(int, counts)
     if kind == _CROSS:
-        raise SepiError(f"{path}: LF_TYPE {kind}, a cross of views, is not read; give OpenLF's pictures of the views")
+        raise SepiError(f"{path}: LF_TYPE {kind}, a cross of views, is not supported; give a folder of the views")
     expected = {_GRID: rows * columns > 1, _ROW: rows == 1 < columns, _COLUMN: columns == 1 < rows}
     if kind not in expected:
-        raise SepiError(f"{path}: LF_TYPE {kind} is none that is known; expected 1 (grid), 2 (row) or 3 (column)")
+        raise SepiError(f"{path}: LF_TYPE {kind} is unknown; expected 1 (grid), 2 (row) or 3 (column)")
     if min(rows, columns) < 1 or not expected[kind]:
         raise SepiError(f"{path}: {rows}x{columns} views (cams_v x cams_h) do not fit LF_TYPE {kind}")
     if height % rows or width % columns:

@@ -1,13 +1,12 @@
-"""How to read a light field where its files do not say it all, and how its views are put in their positions.
+"""Options for reading a light field, and the arrangement of its views in a grid.
 
-Readers find a grid of views in the files, the *given* grid. What :class:`ReadOptions` asks for turns it into the
-light field's grid: ``central`` cuts out its middle, ``order`` flips and transposes it, ``exclude`` leaves views out.
-Positions that a user gives (``exclude``, ``view``) are always those in the light field's own grid, as ``sepi info``
-counts them.
+Readers find a grid of views in the files, the *given* grid. :class:`ReadOptions` turn it into the light field's grid:
+``central`` keeps its middle, ``order`` flips and transposes it, ``exclude`` leaves views out. The positions in
+``exclude`` and ``view`` are those in the light field's grid, as ``sepi info`` counts them.
 
 Examples
 --------
-What the orders do to a grid of 2 x 3 views:
+Two orders of a grid of 2 x 3 views:
 
 >>> import numpy as np
 >>> from sepi.io.readers.options import ORDERS
@@ -56,7 +55,7 @@ ORDERS: dict[str, Callable[[Numbers], Numbers]] = {
     "transpose-flip-columns": lambda grid: grid.T[:, ::-1],
     "transpose-flip-both": lambda grid: grid.T[::-1, ::-1],
 }
-"""The eight ways to lay out a grid: each takes the given grid to the light field's."""
+"""The eight orders of a grid: functions from the given grid to the light field's."""
 
 _PART = re.compile(r"(\d{1,6})[xX](\d{1,6})\+(\d{1,6})\+(\d{1,6})")
 _POSITION = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*")
@@ -64,17 +63,18 @@ _POSITION = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*")
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What the user says about a light field; None or empty where the reader is to find out.
+    """Options that the user gives for a light field; None or empty: the reader decides.
 
     Attributes
     ----------
     grid : tuple of int, optional
         Rows and columns of the given grid.
     pattern : str, optional
-        File name of a view with ``{row}`` and ``{column}``, or ``{number}``, for folders of pictures; ``*`` stands for
-        anything.
+        File name of a view with ``{row}`` and ``{column}``, or ``{number}``, for folders of images; ``*`` matches any
+        text.
     axes : str, optional
-        Axes of an array in order, of the letters T, S (view row and column; N for both in one), H, W, C: ``"HWTSC"``.
+        Order of the axes of an array, such as ``"HWTSC"``: T, S (row and column of the view) or N (both in one); H, W
+        (of the pixel); C (colour).
     variable : str, optional
         Name of the array in a file that holds several.
     central : int, optional
@@ -84,31 +84,29 @@ class ReadOptions:
     exclude : tuple of str
         Views to leave out: positions ``"T,S"`` or file names.
     view : tuple of int, optional
-        Position ``(t, s)`` of the view whose depth is made; the centre view unless given.
+        Position ``(t, s)`` of the reference view; default: the centre view.
     row_spacing : float, optional
-        Distance from one row of views to the next in the light field's grid, as a multiple of that from one column to
-        the next.
+        Distance of neighbouring rows of views in the light field's grid, in view steps.
     white : float, optional
-        Value that stands for white where it is not the highest of the type: 1023 in files of 10 bits.
+        Value of white if it is not the highest of the type: 1023 in files of 10 bits.
     images : str, optional
-        Folder of the pictures of calibrated cameras, where the model's own folder does not lead to them.
+        Folder of the images of calibrated cameras, if they are not beside the model.
     reference : str, optional
-        Picture of a calibrated camera whose depth is made; that of the most central one unless given.
+        Image of a calibrated camera that becomes the reference view; default: the most central one.
     crop_of : str, optional
-        Where the views were cut out of the pictures that the camera took: the size of those, and the column and row in
-        them of a view's first pixel, ``"512x512+100+80"``. Sensor size, principal point and ``parameters.cfg`` belong
-        to the whole picture.
+        For cropped views: size of the whole image, and column and row in it of a view's first pixel,
+        ``"512x512+100+80"``. Sensor size, principal point and ``parameters.cfg`` belong to the whole image.
     follow_links : bool
         Read views that are links to files outside their folder.
 
     Raises
     ------
     SepiError
-        If a value is of another type, or a number that it cannot be.
+        If a value is of another type or out of range.
 
     Examples
     --------
-    Pictures named by column and row, of which the corner ones are left out:
+    Images named by column and row, without the corners:
 
     >>> from pathlib import Path
     >>> import cv2
@@ -162,15 +160,15 @@ class ReadOptions:
 
     @property
     def part(self) -> Part | None:
-        """What ``crop_of`` says, as :func:`sepi.camera.camera_from` takes it."""
+        """``crop_of`` as :func:`sepi.camera.camera_from` takes it."""
         found = _PART.fullmatch(self.crop_of or "")
         return None if found is None else (int(found[1]), int(found[2]), int(found[3]), int(found[4]))
 
 
 def cut_like_views(values: Map, shape: tuple[int, int], part: Part | None) -> Map:
-    """A map of the whole picture cut as views of this ``shape`` were, which :attr:`ReadOptions.part` says; else itself.
+    """Map of the whole image, cropped like views of this ``shape`` (:attr:`ReadOptions.part`).
 
-    It stays as it is where it has another size than the whole picture.
+    A map that does not have the size of the whole image stays unchanged.
     """
     if part is None or values.shape == shape or values.shape != part[1::-1]:
         return values
@@ -181,7 +179,7 @@ def cut_like_views(values: Map, shape: tuple[int, int], part: Part | None) -> Ma
 def arrange_numbers(
     source: str, grid: tuple[int, int], options: ReadOptions, names: Mapping[str, int] | None = None
 ) -> Numbers:
-    """Which view of the given grid stands at each position of the light field's grid.
+    """Number in the given grid of the view at each position of the light field's grid.
 
     Parameters
     ----------
@@ -191,7 +189,7 @@ def arrange_numbers(
         Rows and columns ``(T, S)`` of the given grid.
     options : ReadOptions
     names : mapping of str to int, optional
-        Number ``t * S + s`` of each file, so that views can be excluded by name; -1 for files that are no views.
+        Number ``t * S + s`` of each file, for views excluded by name; -1 for files that are not views.
 
     Returns
     -------
@@ -207,7 +205,7 @@ def arrange_numbers(
     require_known("order", [options.order], ORDERS)
     numbers, side = np.arange(T * S).reshape(T, S), options.central
     if side is not None:
-        # around the centre view, as the light field's convention has it; an even grid has one row more before it
+        # around the centre view of the light field; an even grid has one more row before it than after it
         top, left = T // 2 - side // 2, S // 2 - side // 2
         if side < 1 or side % 2 == 0 or top < 0 or left < 0 or top + side > T or left + side > S:
             raise SepiError(f"{source}: the central {side}x{side} views of {T}x{S}; expected an odd number that fits")
@@ -225,18 +223,18 @@ def is_position(view: str) -> bool:
 
 
 def unarranged(options: ReadOptions) -> ReadOptions:
-    """What of the options means something before the grid of the views is known."""
+    """Options that apply before the grid of the views is known."""
     names = tuple(view for view in options.exclude if not is_position(view))
     return replace(options, central=None, order=AS_GIVEN, exclude=names, view=None)
 
 
 def in_grid(options: ReadOptions) -> ReadOptions:
-    """What of the options is left to do when the grid of the views is found: files were excluded before."""
+    """Options that still apply once the grid is found: files were excluded before."""
     return replace(options, exclude=tuple(filter(is_position, options.exclude)))
 
 
 def position_of(numbers: Numbers, number: int) -> tuple[int, int] | None:
-    """Where a view of the given grid stands, ``(t, s)``; None where it was left out."""
+    """Position ``(t, s)`` of a view of the given grid; None if it was left out."""
     positions = np.argwhere(numbers == number)
     return (int(positions[0][0]), int(positions[0][1])) if len(positions) else None
 
@@ -249,7 +247,7 @@ def _excluded(source: str, view: str, numbers: Numbers, names: Mapping[str, int]
         return int(numbers[position])
     if view not in names:
         found = f" (found: {', '.join(sorted(names)[:3])}, ...)" if names else ""
-        raise SepiError(f"{source}: view '{view}' to exclude: expected a position ROW,COLUMN or a view's file{found}")
+        raise SepiError(f"{source}: --exclude {view}: expected a position ROW,COLUMN or the file of a view{found}")
     return names[view]
 
 

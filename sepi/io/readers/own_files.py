@@ -1,4 +1,4 @@
-"""Light fields as HDF5 files that this package wrote."""
+"""HDF5 files of light fields that this package wrote."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from sepi.lightfield import LightField
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is such a file, or an HDF5 file that is too damaged to tell."""
+    """Whether ``path`` is a light field of this package, or an HDF5 file too damaged to tell."""
     return has_dataset(path, "views", is_own, if_damaged=True)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read the light field as it was written; its views are then arranged as the options ask."""
+    """Light field as it was written, with its views arranged as the options ask."""
     light_field = read_light_field(path)
     return rearrange(light_field if light_field.source else replace(light_field, source=str(path)), options)
 

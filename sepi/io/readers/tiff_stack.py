@@ -1,7 +1,7 @@
-"""TIFFs of several pages, each a view.
+"""TIFF stacks: each page is a view.
 
-ImageJ, OME and tifffile write how the pages are counted: along two axes, such as time and depth, they are a grid of
-views, and an axis of three channels holds their colours. Otherwise the pages are a sequence.
+ImageJ, OME and tifffile store the axes of the pages. Two axes, such as time and depth, are a grid of views, and an axis
+of three channels holds colours. Without axes the pages are a sequence.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from sepi.lightfield import LightField
 _SUFFIXES = (".tif", ".tiff")
 _KIND = "TIFF stack"
 _RGB = 3
-# bytes that all pages of a small file may take
+# bytes that the pages of any file may take, however small the file
 _SMALL = 2**24
 
 
 def matches(path: Path) -> bool:
     """Whether ``path`` is a TIFF whose first pages are alike, or a damaged one.
 
-    Others hold a picture, or one and a small copy of it.
+    Other TIFFs hold one image, perhaps with a thumbnail.
     """
     if path.suffix.lower() not in _SUFFIXES or not path.is_file():
         return False
@@ -46,18 +46,18 @@ def matches(path: Path) -> bool:
                     (page.shape, page.dtype) == (first.shape, first.dtype) for page in others
                 )
     except SepiError:
-        # what reads it will say so
+        # reading reports the damage
         return True
 
 
 def form_of(path: Path) -> tuple[int, int, int, int]:
-    """Number of pages, all alike, height, width and bytes of a pixel; no pixels are read."""
+    """Number of pages, height, width and bytes of a pixel; no pixels are read."""
     with reading(path, _KIND), path.open("rb") as file, open_tiff(file) as pictures:
         return _form(pictures, path.stat().st_size)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read a stack; its grid is that of the options, else that of the file, else it is yet to be found."""
+    """Light field from a stack; the options or the file give its grid, else the views stay in one row."""
     with reading(path, _KIND), path.open("rb") as file, open_tiff(file) as pictures:
         count = _form(pictures, path.stat().st_size)[0]
         first = page_pixels(pictures.pages[0].aspage())
@@ -69,7 +69,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     if prod(n for _, n in counted) != count:
         counted = [("I", count)]
     if len(counted) > 1 and ("C", _RGB) in counted and stack.shape[3] == 1:
-        # a page for each colour
+        # each colour has a page
         stack = stack.reshape(*(n for _, n in counted), *stack.shape[1:3])
         colour = counted.index(("C", _RGB))
         stack = np.moveaxis(stack, colour, -1)
@@ -78,18 +78,18 @@ def read(path: Path, options: ReadOptions) -> LightField:
         return light_field_from_array(stack.reshape(-1, *stack.shape[-3:]), path, options, axes="NHWC")
     rows, columns = (n for _, n in counted)
     light_field = light_field_from_array(stack.reshape(rows, columns, *stack.shape[-3:]), path, options, axes="TSHWC")
-    note = f"the file counts its pages as {rows}x{columns}, taken for rows and columns; --order transpose if not"
+    note = f"the file has {rows}x{columns} pages, taken as rows and columns; --order transpose exchanges them"
     return replace(light_field, notes=(note, *light_field.notes))
 
 
 def _is_whole(pictures: Any) -> bool:
-    """Whether no page follows the last that can be read: tifffile leaves out what lies beyond the end of a file."""
+    """Whether no page follows the last readable one: tifffile leaves out pages beyond the end of a file."""
     return directory_of(pictures.pages[len(pictures.pages) - 1])[1]
 
 
 def _form(pictures: Any, size: int) -> tuple[int, int, int, int]:
     if not _is_whole(pictures):
-        raise SepiError(f"damaged TIFF: pages behind the {len(pictures.pages)}. are cut off")
+        raise SepiError(f"damaged TIFF: pages after page {len(pictures.pages)} are cut off")
     count = len(pictures.pages)
     if count > MAX_VIEWS:
         raise SepiError(f"more than {MAX_VIEWS} pages")

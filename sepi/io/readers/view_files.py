@@ -1,6 +1,6 @@
-"""Light fields that arrive as one picture file for each view, in one folder or in a folder for each row of views.
+"""Image files of views, in one folder or in a folder for each row of the grid.
 
-Folders of rows, ``row_0/col_0.png`` or ``0/0.png``, are told from folders of light fields.
+Folders of rows, ``row_0/col_0.png`` or ``0/0.png``, are distinguished from folders of light fields.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers
 from sepi.io.readers.view_names import infer_view_numbers, pair_view_numbers
 from sepi.lightfield import BoolMap
 
-# the number of a row, or of a column, behind a word for it or alone
+# number of a row or of a column, alone or after a word for it
 _NAME = re.compile(
     rf"(?:.*[^a-z])?(?:row|line|r|t|v|y|column|col|c|s|u|x|{'|'.join(CAMERAS)})[^a-z0-9]*[0-9]+|([^a-z]*[0-9]+)"
 )
-# pictures in a folder from which on a square number of them is rather a grid of its own
+# number of images in a folder from which a square number is rather a grid of its own
 _SQUARE = 9
 
 
 def view_files(folder: Path) -> list[Path]:
-    """Files of a folder that may be views, or of the folders that may be its rows where it has no views itself.
+    """Files of a folder that may be views; if it has none, files of the subfolders that may be its rows.
 
     Raises
     ------
@@ -45,9 +45,9 @@ def view_files(folder: Path) -> list[Path]:
 
 
 def has_rows(folder: Path, *, surely: bool) -> bool:
-    """Whether there are folders that may be the rows of one light field; ``surely``, that are hardly light fields.
+    """Whether a folder has subfolders that may be rows of one light field; ``surely``: hardly light fields.
 
-    Folders with no more than a number for a name may be either: each is one if it has a square number of pictures.
+    Folders named by just a number may be either: with a square number of images, each is a light field.
     """
     rows = _rows(folder)
     if not rows or not surely:
@@ -58,13 +58,13 @@ def has_rows(folder: Path, *, surely: bool) -> bool:
 
 
 def files_in(folder: Path) -> list[Path]:
-    """Files and links that lead to no folder; hidden ones are not views."""
+    """Files, and links that do not lead to a folder, without hidden ones."""
     shown = (file for file in folder.iterdir() if not file.name.startswith("."))
     return sorted(file for file in shown if file.is_file() or (file.is_symlink() and not file.is_dir()))
 
 
 def numbered(files: list[Path]) -> list[str]:
-    """Names of pictures that have numbers, or of a pair; several lenslet pictures are several light fields."""
+    """Names of images with numbers, or of a pair; lenslet images are left out, since each is a light field."""
     names = [file.name for file in files if file.suffix.lower() in SUFFIXES]
     if pair := pair_view_numbers(names):
         return list(pair.numbers)
@@ -72,7 +72,7 @@ def numbered(files: list[Path]) -> list[str]:
 
 
 def _rows(folder: Path) -> list[Path]:
-    """The folders in a folder, if there are several, and each has the name and the pictures of a row."""
+    """Subfolders, if there are several and each has the name and the images of a row."""
     inner = sorted(row for row in folder.iterdir() if row.is_dir() and not row.name.startswith("."))
     rows = [row for row in inner if _is_row(row)]
     return rows if len(rows) > 1 and len(rows) == len(inner) else []
@@ -84,7 +84,7 @@ def _is_row(folder: Path) -> bool:
         return False
     try:
         files = [file for file in files_in(folder) if file.suffix.lower() in SUFFIXES]
-        # one picture of each camera; whose names give row and column is a light field itself
+        # one image of each camera; a folder whose names give row and column is a light field itself
         return (len(files) == 1 and match[1] is None) or (
             infer_view_numbers(str(folder), numbered(files)).kind is not Kind.GRID
         )
@@ -93,20 +93,20 @@ def _is_row(folder: Path) -> bool:
 
 
 MAX_VIEWS = 10_000
-"""More views than any grid has."""
+"""Most views of a grid."""
 
 
 def read_grid(
     folder: Path, files: Mapping[int, Path], grid: tuple[int, int], options: ReadOptions
 ) -> tuple[Array, BoolMap, Numbers, npt.NDArray[np.str_]]:
-    """Read the views of a grid and put them in their positions; those left out are not even opened.
+    """Read the views of a grid and put them in their positions; excluded views are not opened.
 
     Parameters
     ----------
     folder : Path
-        For messages; no view may be a link out of it unless the options say so.
+        For messages; views may be links out of it only if the options allow it.
     files : mapping of int to Path
-        Number ``t * S + s`` in the given grid to file; numbers without a file are missing views.
+        Number ``t * S + s`` in the given grid to file; views without a file are missing.
     grid : (int, int)
         Rows and columns of the given grid.
     options : ReadOptions
@@ -119,17 +119,17 @@ def read_grid(
     numbers : ndarray, shape (T, S), int64
         Number of each view in the given grid; -1 for excluded ones.
     names : ndarray, shape (T, S), str
-        File of each view, as it is in the folder; empty where it is missing.
+        File name of each view in the folder; empty where it is missing.
 
     Raises
     ------
     SepiError
         If the options do not fit the grid, no view is left, or a file cannot be read, is a link out of the folder, or
-        is unlike the others.
+        differs from the others in size or type.
     """
     if grid[0] * grid[1] > MAX_VIEWS:
         raise SepiError(f"{folder}: a grid of {grid[0]}x{grid[1]} views; expected at most {MAX_VIEWS} views")
-    # what is no view may be excluded, too
+    # files that are not views may be excluded, too
     names = {name: -1 for name in options.exclude if (folder / name).exists()}
     names |= {path.relative_to(folder).as_posix(): number for number, path in files.items()}
     numbers = arrange_numbers(str(folder), grid, options, names)
@@ -149,7 +149,7 @@ def read_grid(
 
 
 def _require_within(folder: Path, paths: Iterable[Path]) -> None:
-    """Raise if one of the files is a link that leads out of the folder."""
+    """Raise if a file is a link that leads out of the folder."""
     home = folder.resolve()
     for path in filter(Path.is_symlink, paths):
         try:

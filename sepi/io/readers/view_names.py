@@ -11,31 +11,31 @@ from itertools import pairwise
 from sepi.errors import SepiError
 from sepi.io.readers.name_groups import DECIMAL, EXAMPLES, MAX_DIGITS, Counting, Kind, NameGroup, fill, hyphens, signed
 
-# names of the two views of a pair
+# names of the two views of a stereo pair
 _PAIRS = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("l", "r"), ("L", "R"))
 _INTEGER = r"(?P<integer>[+-]*+[0-9]++)"
-# ways to find the numbers, and whether decimals may count: camera positions beside numbers that count, names such as
-# 03.07.png, and names with nothing but positions such as 0.5_1.0.png
+# ways to find the numbers, and whether decimals may count: for camera positions beside counting numbers, for names such
+# as 03.07.png, and for names of positions alone such as 0.5_1.0.png
 _EITHER = re.compile(f"{DECIMAL}|{_INTEGER}")
 _FORMS = ((_EITHER, False), (re.compile(_INTEGER), False), (_EITHER, True))
 
 
 @dataclass(frozen=True)
 class ViewNumbers:
-    """What the names of a folder's views say.
+    """Interpretation of the names of a folder's views.
 
     Attributes
     ----------
     numbers : dict of str to tuple of int
-        Name to ``(row, column)``, or to ``(number,)`` where views are numbered through or only sorted.
+        Name to ``(row, column)``, or to ``(number,)`` for a running number or an order.
     numbers_of : callable
-        The same numbers of any other name that is like those of the views; None for other names.
+        The same numbers of any name that matches those of the views; None for other names.
     unmatched : tuple of str
         Names that were left out.
     kind : Kind
-        What the numbers are.
+        Meaning of the numbers.
     pattern : str
-        What gives the same numbers; empty where the names only sort, or a pattern was given.
+        Pattern that gives the same numbers; empty if the names only sort, or a pattern was given.
     said : bool
         Whether the names say which number is the row and which the column.
     """
@@ -49,7 +49,7 @@ class ViewNumbers:
 
 
 def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewNumbers:
-    """Numbers where a pattern has them.
+    """Numbers of views at the places in a pattern.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewN
         Path of the folder, for messages.
     names : iterable of str
     pattern : str
-        Name of a view with ``{row}`` and ``{column}``, or ``{number}``; ``*`` stands for anything.
+        Name of a view with ``{row}`` and ``{column}``, or ``{number}``; ``*`` matches any text.
     """
     names = sorted(names)
     form = _compiled(source, pattern)
@@ -66,7 +66,7 @@ def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewN
     if not matches:
         found = f"; found: {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}" if names else ""
         raise SepiError(f"{source}: no file has a name like '{pattern}'{found}")
-    # where all have a minus sign it only separates
+    # a minus sign that all names have is a separator
     signs = [all(match[field].startswith("-") for match in matches.values()) for field in fields]
 
     def numbers_of(name: str) -> tuple[int, ...] | None:
@@ -80,7 +80,7 @@ def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewN
 
 
 def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
-    """Numbers that count the views, among names that are alike but for their numbers.
+    """Numbers that count the views, in names that differ only in numbers.
 
     Decimal numbers, such as a camera's position, do not count the views.
 
@@ -107,7 +107,7 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
     if counted.kind is Kind.SORT:
         ranks = {key: rank for rank, key in enumerate(sorted(set(numbers.values())))}
         numbers = {name: (ranks[key],) for name, key in numbers.items()}
-        # of names that only sort, no other has a place among the views
+        # if names only sort, other names have no place among the views
         numbers_of = _no_numbers
     pattern = "" if counted.kind is Kind.SORT else group.pattern(columns)
     others = tuple(sorted({*names}.difference(group.names)))
@@ -115,7 +115,7 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
 
 
 def decimals_in(names: Sequence[str]) -> list[tuple[float, ...]]:
-    """The decimal numbers in each of some names; none where not all names have as many."""
+    """Decimal numbers in each name; empty if names differ in how many they have."""
     stems = (name.rpartition(".")[0] for name in names)
     found = [[re.split("(?=[0-9])", text, maxsplit=1) for text in re.findall(DECIMAL, stem)] for stem in stems]
     if len(set(map(len, found))) != 1:
@@ -128,7 +128,7 @@ def decimals_in(names: Sequence[str]) -> list[tuple[float, ...]]:
 
 
 def sorted_view_numbers(names: Iterable[str]) -> ViewNumbers:
-    """All names in their natural order, ``img9`` before ``img10``."""
+    """Ranks of all names in natural order, ``img9`` before ``img10``."""
 
     def key(name: str) -> tuple[list[int | str], str]:
         return [int(part) if at % 2 else part for at, part in enumerate(re.split(r"([0-9]+)", name))], name
@@ -137,7 +137,7 @@ def sorted_view_numbers(names: Iterable[str]) -> ViewNumbers:
 
 
 def pair_view_numbers(names: Iterable[str]) -> ViewNumbers | None:
-    """A left and a right view, ``left.png`` and ``right.png``, where there is one such pair among names."""
+    """A left and a right view, ``left.png`` and ``right.png``; None unless there is exactly one such pair."""
     names = sorted(names)
     swapped = [
         (name, re.sub(rf"(?<![A-Za-z]){left}(?![A-Za-z])", right, name)) for name in names for left, right in _PAIRS
@@ -154,7 +154,7 @@ def _no_numbers(_: str) -> None:
 
 
 def _best_reading(source: str, names: Sequence[str]) -> tuple[NameGroup, Counting | None]:
-    """The names cut in the way that gives a grid; else in the first that gives any count."""
+    """The first way to read the numbers that gives a grid; else the first that gives any count."""
     readings = []
     for form, decimals_count in _FORMS:
         group = NameGroup(source, names, form, decimals_count)
@@ -167,11 +167,11 @@ def _best_reading(source: str, names: Sequence[str]) -> tuple[NameGroup, Countin
 
 
 def _compiled(source: str, pattern: str) -> re.Pattern[str]:
-    """The pattern as a regular expression that takes no longer than the name's length squared."""
+    """Pattern as a regular expression whose time is at most quadratic in the length of a name."""
     parts = re.findall(r"\{[^{}]*\}|\*|[^{}*]+|[{}]", pattern)
     fields = sorted(part for part in parts if part[0] in "{}")
     touching = any(first[0] == "{" == second[0] for first, second in pairwise(parts))
-    # no file's name is longer
+    # file names have at most 255 characters
     no_name = len(pattern) > 255 or pattern.count("/") > 1 or pattern.startswith(("/", ".")) or "\\" in pattern
     if fields not in (["{column}", "{row}"], ["{number}"]) or touching or no_name:
         raise SepiError(
@@ -188,5 +188,5 @@ def _compiled(source: str, pattern: str) -> re.Pattern[str]:
             segments[-1] += re.escape(part)
     first, *middle = segments
     last = ".*" + middle.pop() if middle else ""
-    # what lies between two stars may be taken where it first occurs: there is no need to come back to it
+    # text between two stars may match at its first occurrence, without backtracking
     return re.compile(first + "".join(f"(?>.*?{segment})" for segment in middle) + last, re.DOTALL)

@@ -293,7 +293,7 @@ def test_what_is_no_view_is_left_out_with_a_note(tmp_path: Path) -> None:
     put(folder / "inner", ["view_7_7.png"])
     light_field = read(folder, ReadOptions())
     assert places_of(light_field) == grid_of(2, 2)
-    assert "2 pictures whose names are unlike the views' were left out: thumb.png, view_0_0_depth.png" in (
+    assert "2 images whose names are unlike the views' were left out: thumb.png, view_0_0_depth.png" in (
         light_field.notes
     )
     with_pattern = read(folder, ReadOptions(pattern="view_{row}_{column}.png"))
@@ -310,7 +310,7 @@ PLACES = by_place("v_{}_{}.png", range(3), range(3))
 BAD: dict[str, Case] = {
     "two sorts of names": case([*PLACES, *by_place("w_{}_{}.png", range(3), range(3))], "v_0_0.png as like"),
     "every name another": case(["a1b.png", "b1a.png", "c3.png"], "--pattern"),
-    "no numbers": case(["a.png", "b.png"], "no picture's name has a number"),
+    "no numbers": case(["a.png", "b.png"], "expected names such as 'view_{row}_{column}.png'"),
     "numbers all alike": case(["a1.png", "a01.png"], "no number in the names counts the views"),
     "several light fields": case(
         [f"f{f}_{t}_{s}.png" for f, t, s in itertools.product(range(2), range(3), range(3))],
@@ -326,7 +326,7 @@ BAD: dict[str, Case] = {
     "two running numbers": case(["1_3.png", "2_1.png", "3_2.png"], "--pattern, such as '{number}_*.png'"),
     "times that do not fill the grid": case(
         by_number("{}.png", (102134, 102138, 102143)),
-        "the names only sort the 3 pictures; --grid gives 2x2",
+        "3 images; --grid gives 2x2",
         grid=(2, 2),
     ),
     "rows and columns of --grid exchanged": case(PLACES[:6], "--grid has 3x2", grid=(3, 2)),
@@ -396,7 +396,7 @@ SPOILT: dict[str, tuple[Callable[[Path], object], str]] = {
     "link out": (outside, "v_0_0.png: a link out of the folder"),
     "link to nothing": (
         lambda f: ((f / "v_1_2.png").unlink(), (f / "v_1_2.png").symlink_to("gone.png")),
-        "v_1_2.png: cannot be read: no plain file, or a link to nothing",
+        "v_1_2.png: cannot be read: ",
     ),
     "link to itself": (lambda f: ((f / "v_1_2.png").unlink(), (f / "v_1_2.png").symlink_to("v_1_2.png")), "v_1_2.png"),
 }
@@ -452,7 +452,7 @@ def test_any_file_can_be_excluded(tmp_path: Path, name: str) -> None:
     (folder / name).write_bytes(b"damaged")
     places = [[-1 if name == f"v_{number}.png" else number for number in range(9)]]
     assert places_of(read(folder, ReadOptions(exclude=(name,)))) == places
-    with pytest.raises(SepiError, match=r"view 'gone\.png' to exclude: expected a position"):
+    with pytest.raises(SepiError, match=r"--exclude gone\.png: "):
         read(folder, ReadOptions(exclude=(name, "gone.png")))
 
 
@@ -726,7 +726,7 @@ def test_pictures_at_several_times_are_no_columns_of_views(tmp_path: Path, form:
     for name in names:
         (tmp_path / name).parent.mkdir(exist_ok=True)
     put(tmp_path, names)
-    with pytest.raises(SepiError, match="count no views, so that one value of each is to be chosen") as caught:
+    with pytest.raises(SepiError, match="--pattern, such as '") as caught:
         read(tmp_path, ReadOptions(), "images")
     pattern = str(caught.value).split("'")[-2]
     assert places_of(read(tmp_path, ReadOptions(pattern=pattern), "images")) == [list(range(0, 27, 3))]
