@@ -1,6 +1,4 @@
-"""The file of the maps of all views, written and read one view after the other: all of them may be more than memory
-holds.
-"""
+"""The file of the maps of all views, written and read view by view, since all maps may exceed the memory."""
 
 from __future__ import annotations
 
@@ -28,7 +26,7 @@ _Maps = Mapping[str, npt.NDArray[Any]]
 _Attributes = Mapping[str, hdf5.Attribute]
 
 _KIND = "file of maps of all views, of this version of 'sepi depth --all-views'"
-# of the datasets the one that no other file has
+# dataset that only this kind of file has
 _MARK = "extended"
 _MISSING = dict.fromkeys(("disparity", *ERROR_BARS), np.nan)
 
@@ -38,18 +36,18 @@ def write_all_views(
 ) -> None:
     """Write the maps of all views, whole or not at all; equal content gives equal bytes.
 
-    The file holds a dataset ``(T, S, H, W)`` for each name, the views' pictures ``picture (T, S, H, W, C)``, and what
-    tells where the views stand: ``present (T, S)`` bool, and ``baselines (T, S, 2)``, down and across from the
-    reference view in view steps, NaN for missing views.
+    The file holds a dataset ``(T, S, H, W)`` for each name, the views as ``picture (T, S, H, W, C)``, and where the
+    views stand: ``present (T, S)`` bool, and ``baselines (T, S, 2)``, down and across from the reference view in view
+    steps, NaN for missing views.
 
     Parameters
     ----------
     path : Path
     light_field : LightField
-        That the maps belong to.
+        The light field of the maps.
     views : iterable of ((int, int), mapping of str to ndarray of shape (H, W))
-        Position in the grid, and maps by name, the same of every view. Of views that do not come, disparity and error
-        bars are NaN and everything else 0.
+        Position in the grid, and maps by name; every view has the same names. For views that are not given, disparity
+        and error bars are NaN and everything else is 0.
     attributes : mapping
         What made the maps.
 
@@ -71,20 +69,20 @@ def write_all_views(
 
 
 def read_result_at(path: Path, view: View | None = None) -> Result:
-    """The result of one of the views.
+    """Result of one view.
 
     Parameters
     ----------
     path : Path
         Folder of a result, its ``result.h5``, or a file of maps of all views.
     view : (int, int), optional
-        Row and column in the grid; that of the result unless given. What is unknown of another one are the pixels that
-        no map shows, and those without any confidence.
+        Row and column in the grid; default: the result's own view. In other views, pixels that no map shows and pixels
+        of confidence 0 are unknown.
 
     Raises
     ------
     SepiError
-        If there is no map of this view, or the file is damaged.
+        If the file has no map of this view, or is damaged.
     """
     file_path = _file_of(path, view)
     if file_path is not None:
@@ -97,12 +95,12 @@ def read_result_at(path: Path, view: View | None = None) -> Result:
 
 
 def read_disparity_at(path: Path, view: View | None) -> FloatMap:
-    """A disparity map, (H, W) float32: that of a view where the file has maps of all views, else the one it holds."""
+    """Disparity map, (H, W) float32: that of ``view`` if the file has maps of all views, else the only one."""
     return read_disparity(path) if _file_of(path, view) is None else read_result_at(path, view).disparity
 
 
 def read_error_bars_at(path: Path, view: View | None) -> StageMaps | None:
-    """The map of :func:`read_disparity_at` with its confidence and error bars; None where it has none."""
+    """The map of :func:`read_disparity_at` with its confidence and error bars; None if there are none."""
     if _file_of(path, view) is None:
         return read_error_bars(path)
     result = read_result_at(path, view)
@@ -112,7 +110,7 @@ def read_error_bars_at(path: Path, view: View | None) -> StageMaps | None:
 
 
 def read_origin_at(path: Path, view: View | None) -> Origin | None:
-    """What a file says of the light field of its map, or of the map of a view where it has those of all views."""
+    """Light field that a map was made from, as its file records it; for ``view`` if the file has maps of all views."""
     file_path = _file_of(path, view)
     origin = read_origin(file_path or path)
     if origin is None or file_path is None:
@@ -121,8 +119,7 @@ def read_origin_at(path: Path, view: View | None) -> Origin | None:
 
 
 def surfaces_of(path: Path, name: str = "disparity") -> Callable[[View], FloatMap] | None:
-    """Function that gives a map of a view, (H, W) float32, NaN where the view is unknown; None without maps of all
-    views.
+    """Function from a view to its map, (H, W) float32, NaN where unknown; None without maps of all views.
 
     Parameters
     ----------
@@ -135,7 +132,7 @@ def surfaces_of(path: Path, name: str = "disparity") -> Callable[[View], FloatMa
     if file_path is None:
         return None
 
-    # checked once, not for each view
+    # check once, not for each view
     with hdf5.open_hdf5(file_path, _KIND) as file:
         if name not in file:
             return None
@@ -148,14 +145,14 @@ def surfaces_of(path: Path, name: str = "disparity") -> Callable[[View], FloatMa
 
 
 def _file_of(path: Path, view: View | None) -> Path | None:
-    """The file of maps of all views that is meant; None: the map of a result's own view, or of another program."""
+    """The file of maps of all views; None: the map of a result's own view, or of another program."""
     path = path / ALL_VIEWS if path.is_dir() and view is not None else path
-    # of a damaged one is told when it is read
+    # reading reports a damaged file
     return path if hdf5.has_dataset(path, _MARK, if_damaged=True) else None
 
 
 def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result:
-    """The maps of a view; unchecked, without reading the whole file for its digest."""
+    """Maps of a view; ``check=False`` does not read the whole file for its digest."""
     with hdf5.open_hdf5(file_path, _KIND, check) as file:
         position = _position(file_path, file, view)
         baseline = hdf5.read_dataset(file_path, file["baselines"])[position]
@@ -172,7 +169,7 @@ def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result
 
 
 def _position(path: Path, file: h5py.File, view: View | None) -> View:
-    """Row and column of a view that is there; the reference view's unless given."""
+    """Row and column of a present view; default: the reference view."""
     t, s = map(int, hdf5.attribute(file, "view_position")) if view is None else view
     present = hdf5.read_dataset(path, file["present"])
     rows, columns = present.shape
@@ -182,9 +179,9 @@ def _position(path: Path, file: h5py.File, view: View | None) -> View:
 
 
 def _dataset(file: h5py.File, name: str, grid: tuple[int, int], values: npt.NDArray[Any]) -> h5py.Dataset:
-    """The dataset for such values of each view, made where it is not there yet; missing views take no room in it."""
+    """Dataset for values of this shape for each view, made at first use; missing views take no room in it."""
     if name not in file:
-        # as in stage files
+        # small types compress well, as in stage files
         packed = hdf5.PACKED if values.dtype.itemsize < 4 else {}
         shape, chunks = (*grid, *values.shape), (1, 1, *values.shape)
         file.create_dataset(name, shape, values.dtype, chunks=chunks, fillvalue=_MISSING.get(name), **packed)

@@ -1,27 +1,26 @@
-"""Light fields as models of COLMAP [1]_, whose poses are exact: no feature is matched, no camera adjusted.
+"""COLMAP models [1]_ of light fields, with exact poses: no features are matched, no cameras adjusted.
 
-Structure from motion rarely works on light fields, whose views stand too close together; their poses are known.
+Structure from motion rarely works on light fields, because their views are too close together. Their poses are known.
 
-The folder is COLMAP's workspace::
+The folder is a COLMAP workspace::
 
     images/view_04_04.png                                     each view, RGB of 8 bit
     sparse/0/cameras.txt, images.txt, points3D.txt            the model as text, where other programs look for it
     sparse/cameras.txt, images.txt, points3D.txt              the same, where stereo_fusion does
-    stereo/depth_maps/view_04_04.png.geometric.bin            depth of each view, 0 where it is not known
-    stereo/normal_maps/view_04_04.png.geometric.bin           the way that surfaces face, 0 where it is not known
+    stereo/depth_maps/view_04_04.png.geometric.bin            depth of each view, 0 where unknown
+    stereo/normal_maps/view_04_04.png.geometric.bin           surface normals, 0 where unknown
     stereo/fusion.cfg                                         the views, for stereo_fusion
 
-Each view has a camera of its own, a ``PINHOLE`` with its principal point. Origin and axes are those of the reference
-view's camera, so there is no rotation; of calibrated cameras they are those of their world. Points are those of the
-reference view, with a track: the pixel at which each view sees them, unless something nearer hides them. Their error is
-how far from there a view of the track sees them on average, in pixels, as the standard deviation of the disparity has
-it; 0 where that is not known.
+Each view has its own ``PINHOLE`` camera, with its principal point. Origin and axes are those of the reference view's
+camera, so there is no rotation; for calibrated cameras they are those of their world. The points are those of the
+reference view. The track of a point lists its pixel in each view that sees it. Its error is the mean reprojection error
+over the track in pixels, from the standard deviation of the disparity; 0 where that is unknown.
 
 References
 ----------
 .. [1] COLMAP's documentation, "Output Format", https://colmap.github.io/format.html: poses go from the world to the
        camera, whose axes point right, down and forward; depth maps begin with ``width&height&channels&``. The middle of
-       a picture's first pixel is (0.5, 0.5).
+       the first pixel is (0.5, 0.5).
 """
 
 from __future__ import annotations
@@ -57,11 +56,11 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
     Parameters
     ----------
     folder : str or Path
-        Made; an empty one may exist.
+        Must not exist, or be empty.
     posed : PosedViews
         From :func:`sepi.applications.posed_views.posed_views`.
     progress : callable
-        Told the fraction that is done.
+        Receives the fraction done.
 
     Raises
     ------
@@ -75,7 +74,7 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
             sees[view] = posed.sees(view, carried)
             write_png(temporary / "images" / f"{name}.png", posed.picture(view))
             if posed.incomplete:
-                # as ``--ImageReader.mask_path`` and ``--StereoFusion.mask_path`` look for them
+                # the names that ``--ImageReader.mask_path`` and ``--StereoFusion.mask_path`` look for
                 write_png(temporary / "masks" / f"{name}.png.png", posed.shown(view))
             stereo = f"{name}.png.geometric.bin"
             _write_maps(temporary / "stereo/depth_maps" / stereo, posed.depth(carried)[None])
@@ -94,7 +93,7 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
 
 
 def _write_maps(path: Path, maps: FloatMap) -> None:
-    """Write maps (C, H, W), one after the other, in COLMAP's binary format."""
+    """Write maps (C, H, W) in COLMAP's binary format."""
     channels, height, width = maps.shape
     with atomic_path(path) as temporary:
         temporary.write_bytes(f"{width}&{height}&{channels}&".encode("ascii") + maps.astype("<f4").tobytes())
@@ -112,7 +111,7 @@ def _cameras(posed: PosedViews) -> Iterator[str]:
 def _images(posed: PosedViews, sees: Flags) -> Iterator[str]:
     numbers = np.arange(1, sees.shape[1] + 1)
     points = posed.points
-    # without rotation the translation is minus the camera's place
+    # without rotation the translation is the negative camera centre
     places = posed.poses.centres if posed.rig is None else posed.in_world(posed.poses.centres) @ posed.rotation.T
     turn = "1 0 0 0" if posed.rig is None else _quaternion(posed.rotation)
     yield "# Image list with two lines of data per image:"

@@ -1,4 +1,4 @@
-"""One disparity map of any program: the place where a file of any kind becomes an array."""
+"""Disparity maps of any program, read from files of any supported kind."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ _TIFF = (".tif", ".tiff")
 _NUMPY = (".npy", ".npz")
 
 SUFFIXES: tuple[str, ...] = (".pfm", *_NUMPY, ".png", ".pgm", *_TIFF, *_HDF5)
-"""Ends of names of the files that are read, in small letters."""
+"""Suffixes of the files that are read, in lower case."""
 
 _DATASET = "disparity"
-# colour type of a PNG, the 26th byte of its header
+# colour type of a grey PNG, byte 26 of its header
 _GREY = 0
 # text chunks of `disparity_16bit.png`
 _SCALE, _OFFSET = "scale", "offset"
 
 
 def map_file(path: Path) -> Path:
-    """The file with the map: ``path`` itself, or ``disparity.pfm`` in a folder that ``sepi depth`` wrote."""
+    """File of the map: ``path`` itself, or ``disparity.pfm`` in a folder that ``sepi depth`` wrote."""
     return path / "disparity.pfm" if path.is_dir() else path
 
 
 def is_disparity(path: Path) -> bool:
     """Whether ``path`` is one disparity map rather than a light field.
 
-    Of a PNG, whether its text chunks say so; of a TIFF, whether it is grey, of floats; of a NumPy file, whether its
-    arrays have two axes.
+    A PNG says so in its text chunks. A TIFF is a map if it is grey with floats, a NumPy file if its arrays have two
+    axes.
     """
     if path.is_dir():
         return map_file(path).is_file()
@@ -73,10 +73,10 @@ def read_disparity(path: str | Path, *, scale: float | None = None, offset: floa
         A one-channel PFM; a NumPy file (``.npy``, ``.npz``) with one array of numbers of shape (H, W); an HDF5 file
         with such a dataset ``disparity``; a grey TIFF of 32-bit floats; a grey PNG, TIFF or PGM of 8 or 16 bit; or a
         folder that ``sepi depth`` wrote. A PNG with the text chunks ``scale`` and ``offset``, as
-        ``disparity_16bit.png`` has them, holds what these say, 0 being unknown.
+        ``disparity_16bit.png`` has them, is decoded by these; 0 is unknown.
     scale, offset : float
-        What the file holds is multiplied by ``scale`` (1 unless given), then ``offset`` is added: -1 turns a map of
-        opposite sign. Other pictures of 8 or 16 bit need a scale; their values are levels, and none means unknown.
+        The disparity is the stored value times ``scale`` (default 1) plus ``offset``; a scale of -1 turns the sign.
+        Images of 8 or 16 bit without these text chunks need a scale; none of their values means unknown.
 
     Returns
     -------
@@ -86,12 +86,11 @@ def read_disparity(path: str | Path, *, scale: float | None = None, offset: floa
     Raises
     ------
     SepiError
-        If there is no such file, it is damaged or no such map, or a picture does not say what its levels mean.
+        If the file is missing, damaged or no disparity map, or an image of levels has no scale.
 
     Examples
     --------
-    Another program's map, whose disparities are larger for what is farther, in pixels between the outermost of nine
-    views:
+    A map of another program, whose disparity grows with distance, in pixels between the outermost of nine views:
 
     >>> from pathlib import Path
     >>> import numpy as np
@@ -108,12 +107,12 @@ def read_disparity(path: str | Path, *, scale: float | None = None, offset: floa
 
 
 def read_error_bars(path: Path) -> StageMaps | None:
-    """Disparity, confidence and error bars of one view; None where there are no error bars, or nothing but a map.
+    """Disparity, confidence and error bars of one view; None if the file has no error bars.
 
     Parameters
     ----------
     path : Path
-        What :func:`read_disparity` reads.
+        As for :func:`read_disparity`.
 
     Raises
     ------
@@ -134,28 +133,28 @@ def read_error_bars(path: Path) -> StageMaps | None:
 
 @dataclass(frozen=True)
 class TruthFile:
-    """A file of ground truth that a user has beside a light field.
+    """A file of ground truth that a user gives for a light field.
 
     Attributes
     ----------
     path : Path
-        What :func:`read_disparity` reads. Of whole numbers 0 is unknown, of others what is not finite.
+        As for :func:`read_disparity`. In whole numbers 0 is unknown, in floats what is not finite.
     scale : float or None
-        Pixels per view step that one of the file's numbers stands for, above 0; 1 where it is not given.
+        Pixels per view step of a stored value of 1, above 0; default: 1.
     """
 
     path: Path
     scale: float | None = None
 
     def read(self, shape: tuple[int, int] | None = None, part: Part | None = None) -> FloatMap:
-        """Disparity in pixels per view step, (H, W) float32, top row first; NaN where it is unknown.
+        """Disparity in pixels per view step, (H, W) float32, top row first; NaN where unknown.
 
-        Of the whole picture it is cut as views of a ``shape`` were, where ``part`` says how.
+        Ground truth of the whole image is cropped to views of this ``shape`` as ``part`` says.
 
         Raises
         ------
         SepiError
-            If it cannot be read, does not have the views' ``shape``, or knows no pixel.
+            If it cannot be read, does not have the views' ``shape``, or all its pixels are unknown.
         """
         path = map_file(self.path)
         stored = _stored(path, self.scale is not None)
@@ -170,23 +169,23 @@ class TruthFile:
 
     @property
     def step(self) -> float:
-        """What the disparities are multiples of, pixels per view step; 0 where the file holds no whole numbers."""
+        """Quantisation step of the disparity, pixels per view step; 0 if the file holds floats."""
         stored = _stored(map_file(self.path), self.scale is not None)
         return 0.0 if stored.dtype.kind == "f" else self.scale or 1.0
 
 
 def _scaled(stored: npt.NDArray[Any], scale: float | None, offset: float = 0.0) -> FloatMap:
-    # numbers beyond float32 become infinite, and count as unknown
+    # numbers beyond float32 become infinite: unknown
     with np.errstate(over="ignore", invalid="ignore"):
         if scale is None and offset == 0:
             return np.asarray(stored, np.float32)
-        # as float32 first, in which all formats hold the same numbers
+        # float32 first, so that all formats give the same numbers
         held = stored.astype(np.float32).astype(np.float64)
         return np.asarray(held * (1 if scale is None else scale) + offset, np.float32)
 
 
 def _stored(path: Path, scaled: bool) -> npt.NDArray[Any]:
-    """The numbers in a file, (H, W), whole ones or floats."""
+    """The stored numbers of a file, (H, W), integers or floats."""
     if not path.is_file():
         raise SepiError(f"{path}: no such file")
     suffix = path.suffix.lower()
@@ -230,12 +229,12 @@ def _read_levels(path: Path, scaled: bool) -> npt.NDArray[Any]:
     if not scaled:
         kind = "a PNG without the text chunks 'scale' and 'offset'" if header.kind == "PNG" else f"a {header.kind}"
         raise SepiError(f"{path}: {kind} does not say what its levels mean; give a scale, or write it as .pfm or .npy")
-    # of a PGM, whose levels end at a white of its own
+    # the levels of a PGM end at a white of its own
     return np.rint(levels * (header.white / full_scale(levels.dtype))).astype(int) if header.white else levels
 
 
 def _is_packed(path: Path) -> bool:
-    """Whether a PNG has levels of fewer bits, which are stretched to 8, or something else than levels."""
+    """Whether a PNG has fewer than 8 bits, which decoding stretches to 8, or is not grey."""
     with path.open("rb") as file:
         head = file.read(26)
     return head[24] not in (8, 16) or head[25] != _GREY

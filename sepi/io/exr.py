@@ -1,4 +1,4 @@
-"""OpenEXR pictures of half and float, grey and in colours, by the format's own library, which is an extra."""
+"""OpenEXR images of half and float, grey or in colour; the OpenEXR library is an optional extra."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from sepi.io.files import atomic_path, naming
 from sepi.lightfield import FloatMap
 
 EXR = (".exr",)
-"""Ends of names, in small letters."""
+"""Suffixes of file names, in lower case."""
 
 SIGNATURE = b"v/1\x01"
 """First bytes of a file."""
 
 _COLOURS = ("R", "G", "B")
 _GREY = "Y"
-# what a message lists
+# most channels that a message lists
 _LISTED = 12
 
 
@@ -45,15 +45,15 @@ def open_exr() -> ModuleType:
 
 
 def exr_form(path: str) -> tuple[int, int, list[str]]:
-    """Height and width of a picture, and the names of the channels that show it.
+    """Height and width of an image, and the names of its grey or colour channels.
 
     Raises
     ------
     SepiError
-        If it is deep or cropped, or has no channels of grey or colours that are read, or several of either.
+        If the image is deep or cropped, or does not have exactly one set of grey or colour channels.
     """
     exr = open_exr()
-    # not by the package's older class InputFile, which crashes on damaged files
+    # the package's older class InputFile crashes on damaged files
     with _quiet(), exr.File(path, header_only=True) as file:
         header = file.header()
         data, display = ([corner.tolist() for corner in header[f"{of}Window"]] for of in ("data", "display"))
@@ -61,19 +61,19 @@ def exr_form(path: str) -> tuple[int, int, list[str]]:
         flat = header.get("type", exr.scanlineimage) in (exr.scanlineimage, exr.tiledimage)
         names = _chosen(list(channels))
     if not flat or data != display:
-        raise SepiError("an OpenEXR of depths, or whose pixels are not those of its frame (data and display windows)")
+        raise SepiError("a deep or cropped OpenEXR; expected a flat one whose data and display windows are the same")
     if any(channels[name] != (1, 1) for name in names):
-        raise SepiError("an OpenEXR with channels of other sizes; save all of them in full")
+        raise SepiError("an OpenEXR with subsampled channels; save all channels in full size")
     (left, top), (right, bottom) = data
     return bottom - top + 1, right - left + 1, names
 
 
 def exr_pixels(path: str) -> npt.NDArray[np.float32]:
-    """Pixels (H, W, C) of a file whose size was looked at; half becomes float, transparency is left out."""
+    """Pixels (H, W, C) of a file whose size was checked; half becomes float, transparency is left out."""
     height, width, names = exr_form(path)
     with _quiet(), open_exr().File(path, separate_channels=True) as file:
         channels = file.channels()
-        # of a part whose pixels are damaged there is no channel
+        # a part with damaged pixels has no channels
         stored = [channels[name].pixels for name in names]
     if any(values.dtype not in (np.float16, np.float32) for values in stored):
         raise SepiError("an OpenEXR of integers; expected half or float")
@@ -81,7 +81,7 @@ def exr_pixels(path: str) -> npt.NDArray[np.float32]:
 
 
 def _chosen(names: list[str]) -> list[str]:
-    """Channels of colours, those of the only layer that has some, or the only grey one."""
+    """The colour channels of the only layer that has them, or the only grey channel."""
     layers = dict.fromkeys(name.removesuffix("R") for name in names if name.endswith("R"))
     coloured = [layer for layer in layers if {f"{layer}{colour}" for colour in _COLOURS} <= set(names)]
     if "" in coloured or len(coloured) == 1:
@@ -98,9 +98,9 @@ _terminal = threading.Lock()
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the library from printing about damage, which is told as an error; it has no other way to be silent."""
+    """Keep the library from printing about damage, which is raised as an error; it has no switch for that."""
     with _terminal, redirect_stdout(io.StringIO()), ExitStack() as after:
-        # nothing to print to where standard error is closed
+        # standard error may be closed
         with suppress(OSError):
             kept = os.dup(2)
             after.callback(os.close, kept)
@@ -111,7 +111,7 @@ def _quiet() -> Iterator[None]:
 
 
 def write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> None:
-    """Write maps as channels of one OpenEXR file, compressed without loss; equal content gives equal bytes.
+    """Write maps as channels of an OpenEXR file, losslessly compressed; equal content gives equal bytes.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> Non
     channels : mapping of str to ndarray, shape (H, W), float32
         Name to map, all of one shape; NaN and infinity stay. Programs know the names ``Z`` (depth) and ``Y`` (grey).
     comment : str
-        What the numbers are.
+        Meaning and unit of the numbers.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""Reads files or raises one clear error; writes files whole or not at all.
+"""Reading files with one clear error, and writing them whole or not at all.
 
-They are written under a temporary name in the same folder, then renamed.
+A file is written under a temporary name in the same folder, then renamed.
 """
 
 from __future__ import annotations
@@ -19,17 +19,16 @@ from typing import Any
 from sepi.errors import SepiError, one_line, printable
 
 DEFLATE_RATIO = 1100
-"""Bytes that a byte can unpack to; zlib's limit is 1032."""
+"""Most bytes that a compressed byte can unpack to; zlib's limit is 1032."""
 
-# an interrupt may strike between any two instructions, also where no `finally` is in force: what is still listed when
-# the program ends was not finished, and is removed
+# an interrupt may come where no `finally` is in force; what is still listed at the end of the program is removed
 _unfinished: set[Path] = set()
 _TOKEN_BYTES = 6
 _TEMPORARY = re.compile(rf"\..+-[0-9a-f]{{{2 * _TOKEN_BYTES}}}(\.[^.]*)?")
 
 
 def name_of(path: Path) -> Path:
-    """The name by which a path was given, be it that of a link; of ``.`` and the like the name of the folder."""
+    """Name by which a path was given, even of a link; for ``.`` the name of the folder."""
     return Path(Path(os.path.abspath(path)).name)
 
 
@@ -45,28 +44,28 @@ def naming(path: Path | str) -> Iterator[None]:
         yield
     except SepiError as error:
         if str(error).startswith(one_line(str(path))):
-            # not from itself: who follows the causes of an error would never end
+            # raising it from itself would make an endless chain of causes
             raise
         raise SepiError(f"{path}: {error}") from error
 
 
 @contextmanager
 def reading(path: Path, kind: str) -> Iterator[None]:
-    """Turn whatever goes wrong while a file is read into one error that names it.
+    """Turn any failure while a file is read into one error that names the file.
 
-    Libraries stumble over damage in many ways; what they say of it follows in brackets.
+    Libraries fail on damage in many ways; their message follows in brackets.
 
     Parameters
     ----------
     path : Path
     kind : str
-        What the file should be, after "not a".
+        What the file should be; the message says "not a ``kind``".
     """
     try:
         with naming(path):
             yield
     except (SepiError, AssertionError, NameError, MemoryError):
-        # what is no fault of the file
+        # not the file's fault
         raise
     except Exception as error:
         if isinstance(error, OSError) and error.strerror:
@@ -79,7 +78,7 @@ def reading(path: Path, kind: str) -> Iterator[None]:
 def atomic_path(path: Path) -> Iterator[Path]:
     """Give a temporary path beside ``path`` to write to; rename it on success, remove it on any failure.
 
-    The temporary file exists, empty. A link of that name is replaced, not followed.
+    The temporary file exists and is empty. If ``path`` is a link, the link is replaced.
 
     Raises
     ------
@@ -99,7 +98,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
 def atomic_folder(path: Path, replace: bool = False) -> Iterator[Path]:
     """Give a temporary folder beside ``path`` to fill; rename it on success, remove it on any failure.
 
-    With ``replace``, it takes the place of a folder that is there. A link leads to where there is room.
+    With ``replace``, it replaces an existing folder. If ``path`` is a link, the folder that it leads to is written.
 
     Raises
     ------
@@ -120,14 +119,14 @@ def atomic_folder(path: Path, replace: bool = False) -> Iterator[Path]:
 
 @contextmanager
 def filled_folder(folder: Path) -> Iterator[Path]:
-    """Give a temporary folder to fill: it becomes ``folder``, or its files are moved there where others are already.
+    """Give a temporary folder to fill: it becomes ``folder``, or its files move into a ``folder`` that has files.
 
-    They are moved in the order of their making. The folder itself may be a link to where there is room.
+    Files move in the order in which they were made. ``folder`` may be a link.
 
     Raises
     ------
     SepiError
-        As :func:`atomic_folder`, but for files that are there.
+        As :func:`atomic_folder`, except that ``folder`` may have files.
     """
     folder = folder.resolve()
     if not (folder.is_dir() and any(folder.iterdir())):
@@ -142,7 +141,7 @@ def filled_folder(folder: Path) -> Iterator[Path]:
 
 
 def remove_files(folder: Path, names: Iterable[str]) -> None:
-    """Remove files that an earlier run wrote, as far as they are there."""
+    """Remove files that an earlier run wrote, if they exist."""
     for name in names:
         try:
             (folder / name).unlink(missing_ok=True)
@@ -152,8 +151,8 @@ def remove_files(folder: Path, names: Iterable[str]) -> None:
 
 @contextmanager
 def _temporary_beside(path: Path, suffix: str, target: Path) -> Iterator[Path]:
-    """A name for a temporary file or folder, removed at the end; an error of the system is one about ``target``."""
-    # the token keeps two programs that write the same file apart; a long name is cut so that the whole fits
+    """Name for a temporary file or folder, removed at the end; system errors are reported for ``target``."""
+    # the token keeps programs apart that write the same file; a long stem is cut to leave room for it
     temporary = path.parent / f".{path.stem[:40]}-{secrets.token_hex(_TOKEN_BYTES)}{suffix}"
     _unfinished.add(temporary)
     interrupted = False
@@ -165,12 +164,12 @@ def _temporary_beside(path: Path, suffix: str, target: Path) -> Iterator[Path]:
     except OSError as error:
         raise SepiError(f"{target}: cannot be written ({error.strerror or error})") from error
     except SepiError as error:
-        # of a file inside a temporary folder: under the name that it was to have
+        # name the final file, not the temporary one
         raise SepiError(str(error).replace(str(temporary), str(target))) from error
     finally:
         remove_temporary(temporary)
         if interrupted:
-            # of a thread that was being started nobody knows: it may write there yet, and is over when the program ends
+            # a thread that was just started may still write there; it has ended when the program ends
             _unfinished.add(temporary)
 
 
@@ -179,7 +178,7 @@ def remove_temporary(temporary: Path) -> None:
     if temporary.is_dir():
         shutil.rmtree(temporary, ignore_errors=True)
     else:
-        # where the folder could not even be made there is nothing to remove
+        # the folder may never have been made
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
     _unfinished.discard(temporary)
@@ -192,7 +191,7 @@ def _remove_unfinished() -> None:
 
 
 class PatientFile(io.FileIO):
-    """A file that keeps the first failure to itself: HDF5 crashes the program on a full disk."""
+    """A file that stores its first write error instead of raising it, since HDF5 crashes on a full disk."""
 
     failure: OSError | None = None
 

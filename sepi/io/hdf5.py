@@ -1,11 +1,11 @@
-"""All HDF5 reading and writing: light fields and stage files.
+"""HDF5 files of this package: light fields and stage files.
 
-Each file begins with a digest of all bytes that follow, in what HDF5 calls the user block, which other programs skip:
-from a damaged file HDF5 may read other numbers, crash, or hang, so a file is checked before anything is made of it.
+Each file begins with a digest of all bytes that follow. It lies in the user block of HDF5, which other programs skip.
+From a damaged file HDF5 may read wrong numbers, crash, or hang, so the digest is checked first.
 
 A stage file holds ``disparity (H, W) float32`` in pixels per view step, ``confidence (H, W) float32`` in 0..1, the
-stage's own maps, and attributes that say what made them; where a later stage is to choose among candidates, their costs
-``cost_volume (K, H, W) float16`` and ``candidates (K,) float32``, too. Equal content gives equal bytes.
+stage's own maps, and attributes that say what made them. If a later stage chooses among candidates, it also holds
+``cost_volume (K, H, W) float16`` and ``candidates (K,) float32``. Equal content gives equal bytes.
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ from sepi.stage import ERROR_BARS, CostVolume, StageMaps
 from sepi.validation import require_known, require_path
 
 BLOCK = 512
-"""Bytes of the user block; HDF5 wants a power of two, 512 at least."""
+"""Bytes of the user block; HDF5 wants a power of two, at least 512."""
 
 _MARK = b"sepi sha256 "
-# a file's time tells a later change when it is so many seconds old, as disks keep times no finer
+# seconds after which a file's time stamp shows a later change; some disks keep times no finer
 _SETTLED = 2
 
-# whether files are sound, by device, number, size and time
+# whether files are sound, by device, inode, size and time
 _sound: dict[tuple[int, int, int, int], bool] = {}
 
 
 def members(group: h5py.Group | Mapping[str, Any]) -> list[tuple[str, Any]]:
     """Names and entries of a group, all at once.
 
-    h5py's own iterator holds its lock until it is exhausted. If an error ends a loop early, the lock stays as long as
-    anyone keeps that error: another thread that needs HDF5, even to release a file, would wait for ever.
+    The iterator of h5py holds a lock until it is exhausted. If an error ends a loop early, the lock stays as long as
+    the error object lives, and other threads that use HDF5 wait for ever.
     """
     return list(group.items())
 
 
 def require_sound(path: Path) -> None:
-    """Refuse a file of this package that does not hold what was written, once looked at by this process."""
+    """Raise if a file of this package has changed since it was written; each process checks a file once."""
     status = path.stat()
     now = (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
     sound = _sound.get(now)
@@ -69,7 +69,7 @@ def require_sound(path: Path) -> None:
 
 
 def is_own(entry: h5py.Group | h5py.Dataset | None) -> bool:
-    """Whether a group or dataset is in a file that this package wrote: others may call theirs so, too."""
+    """Whether a group or dataset lies in a file that this package wrote; other programs may use the same names."""
     if entry is None:
         return False
     with Path(entry.file.filename).open("rb") as file:
@@ -77,20 +77,20 @@ def is_own(entry: h5py.Group | h5py.Dataset | None) -> bool:
 
 
 def digest_block(file: io.BufferedReader | io.BufferedRandom) -> bytes:
-    """The user block for what follows in a file."""
+    """User block with the digest of what follows in a file."""
     file.seek(BLOCK)
     return (_MARK + hashlib.file_digest(file, "sha256").hexdigest().encode()).ljust(BLOCK, b"\0")
 
 
 def fixed_text(text: str) -> np.bytes_:
-    """Text to be stored at a fixed length; HDF5 may hang on a damaged file that holds text of variable length."""
+    """Text of fixed length to store; HDF5 may hang on damaged files with text of variable length."""
     return np.bytes_(text.encode() or b"\0")
 
 
 Attribute = str | float | int | tuple[float, ...]
 
 RIG = "rig"
-"""Dataset of a light field, or attribute of a result: where rectified cameras stood, as JSON."""
+"""Dataset of a light field, or attribute of a result: poses of the calibrated cameras, as JSON."""
 
 # datasets of a cost volume
 _COSTS, _CANDIDATES = "cost_volume", "candidates"
@@ -105,7 +105,7 @@ UNITS = {
 """Units of arrays, by their names."""
 
 PACKED = {"compression": "gzip", "compression_opts": 1}
-"""How arrays that shrink to almost nothing are stored, for h5py."""
+"""Arguments for h5py to compress arrays that shrink to almost nothing."""
 
 
 def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:
@@ -116,7 +116,7 @@ def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]
 
 
 def put(group: h5py.Group, name: str, values: npt.NDArray[Any], **attributes: Any) -> h5py.Dataset:
-    """Write an array with its units; small integers and masks are packed, since float maps hardly compress."""
+    """Write an array with its units; only small integers and masks are compressed, since float maps hardly shrink."""
     dataset = group.create_dataset(name, data=values, **(PACKED if values.dtype.itemsize < 4 else {}))
     dataset.attrs.update(({"units": UNITS[name]} if name in UNITS else {}) | attributes)
     return dataset
@@ -124,7 +124,7 @@ def put(group: h5py.Group, name: str, values: npt.NDArray[Any], **attributes: An
 
 def put_maps(file: h5py.File, maps: StageMaps) -> None:
     """Write a stage's maps."""
-    # in the order in which they are read back: the file does not tell whether they came from one
+    # sorted, as they are read back, so that a copy has the same bytes
     for name, values in sorted(maps.all().items()):
         dataset = put(file, name, values)
         if name == "view_subset":
@@ -146,18 +146,18 @@ def read_stage(path: Path) -> StageMaps:
 
 
 def read_attributes(path: Path, check: bool = True) -> dict[str, Any]:
-    """Attributes of an HDF5 file; unchecked, without reading the whole file for its digest."""
+    """Attributes of an HDF5 file; ``check=False`` does not read the whole file for its digest."""
     with open_hdf5(path, check=check) as file:
         return {name: attribute(file, name) for name in file.attrs}
 
 
 def write_light_field(path: str | Path, light_field: LightField) -> None:
-    """Write a light field with all that is known about it, whole or not at all; reading gives it back unchanged.
+    """Write a light field with all its properties, whole or not at all; reading gives it back unchanged.
 
     Parameters
     ----------
     path : str or Path
-        HDF5 file to write; :func:`sepi.read_light_field` knows it by its content. Equal content gives equal bytes.
+        HDF5 file to write; :func:`sepi.read_light_field` reads it. Equal content gives equal bytes.
     light_field : LightField
 
     Raises
@@ -167,7 +167,7 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
 
     Examples
     --------
-    One file in place of a folder of pictures, with positions of the views that no other format holds:
+    One file instead of a folder of images, with view positions that no other format holds:
 
     >>> from pathlib import Path
     >>> import numpy as np
@@ -185,7 +185,7 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
     require_light_field(light_field)
     known, rig = light_field.disparity_range, light_field.rig
     with create_hdf5(path) as file:
-        # gzip would cost 1.8 s and save half of 64 MB for a benchmark scene: not worth it for an intermediate file
+        # gzip takes 1.8 s to halve the 64 MB of a benchmark scene: too slow for an intermediate file
         file.create_dataset("views", data=light_field.views).attrs["axes"] = "t s y x channel"
         put(file, "present", light_field.present)
         if light_field.missing is not None:
@@ -195,7 +195,7 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
         if rig is not None:
             put(file, RIG, np.frombuffer(rig.to_text().encode(), np.uint8))
         texts = {"name": light_field.name, "source": light_field.source, "reading": light_field.reading or None}
-        # the reach is what jobs on this file need: told without reading it
+        # jobs on this file need the reach, and must not read the views for it
         numbers: dict[str, Any] = {"reach": light_field.reach, "row_spacing": light_field.row_spacing}
         numbers |= {"view": light_field.view, "camera": light_field.camera and numbers_of(light_field.camera)}
         if known is not None:
@@ -208,13 +208,13 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
 
 
 def float_maps(path: Path, file: h5py.File, part: Any = ...) -> dict[str, npt.NDArray[np.float32]]:
-    """Disparity, confidence and error bars, or a part of each, as far as a file has them."""
+    """Those of disparity, confidence and error bars that a file has, or a part of each."""
     names = ("disparity", "confidence", *ERROR_BARS)
     return {name: read_dataset(path, file[name], part).astype(np.float32) for name in names if name in file}
 
 
 def put_truth(file: h5py.File, truth: Truth) -> None:
-    """Write what scores are made with, as far as there is any."""
+    """Write ground truth and masks, if there are any."""
     ground_truth, masks = truth
     if ground_truth is not None:
         put(file, "ground_truth", ground_truth)
@@ -223,13 +223,13 @@ def put_truth(file: h5py.File, truth: Truth) -> None:
 
 
 def truth_in(path: Path, file: h5py.File) -> Truth:
-    """What :func:`put_truth` wrote."""
+    """Ground truth and masks that :func:`put_truth` wrote."""
     ground_truth = read_dataset(path, file["ground_truth"]).astype(np.float32) if "ground_truth" in file else None
     return ground_truth, {name: read_dataset(path, mask).astype(bool) for name, mask in members(file.get("masks", {}))}
 
 
 def has_dataset(path: Path, name: str, wanted: Callable[[Any], object] = bool, *, if_damaged: bool = False) -> bool:
-    """Whether ``path`` is an HDF5 file with an entry that is wanted; ``if_damaged`` where it cannot be told."""
+    """Whether ``path`` is an HDF5 file with an entry that is ``wanted``; ``if_damaged`` if it cannot be read."""
     if not path.is_file() or not h5py.is_hdf5(path):
         return False
     try:
@@ -244,7 +244,7 @@ def read_light_field(path: Path) -> LightField:
     """Read a light field written by ``write_light_field``."""
     with open_hdf5(path, "light field of this package") as file:
         if "render" in file.attrs:
-            raise SepiError(f"{path}: light of a path-traced scene, no light field; give the scene's folder beside it")
+            raise SepiError(f"{path}: light of a path-traced scene, not a light field; give the scene's folder instead")
         known_arrays = ("views", "present", "missing", "positions", RIG)
         arrays = {name: read_dataset(path, file[name]) for name in known_arrays if name in file}
         known = {key: attribute(file, key) for key in file.attrs}
@@ -276,17 +276,17 @@ def read_light_field(path: Path) -> LightField:
 
 
 def read_camera(file: h5py.File) -> Camera | None:
-    """The camera of a light field's or a result's file, where it has one."""
+    """Camera of a light field or a result; None if the file has none."""
     return Camera(*map(float, attribute(file, "camera"))) if "camera" in file.attrs else None
 
 
 def read_rig(file: h5py.File) -> Rig | None:
-    """Where the view of a result's file stands in the world, if it says so."""
+    """Rig of a result's view; None if the file has none."""
     return Rig.from_text(str(attribute(file, RIG))) if RIG in file.attrs else None
 
 
 def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
-    """The value of an attribute; text of fixed length as text, too.
+    """Value of an attribute; text of fixed length becomes str.
 
     Raises
     ------
@@ -295,7 +295,7 @@ def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
     SepiError
         If it is text of variable length, in a file of another program.
     """
-    # HDF5 may hang on such, or crash, where the file is damaged; our own files were looked at when they were opened
+    # on a damaged file HDF5 may hang or crash at such text; own files were checked when they were opened
     if holder.attrs.get_id(key).dtype.hasobject and not is_own(holder):
         raise SepiError(f"attribute '{printable(key)}': expected numbers, or text of fixed length")
     value = holder.attrs[key]
@@ -303,12 +303,12 @@ def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
 
 
 def number_of(holder: h5py.Group, key: str) -> float:
-    """An attribute that is a number, or an array or text of one; NaN where there is none.
+    """Number in an attribute, even as text or in an array of one; NaN if there is no such attribute.
 
     Raises
     ------
     SepiError
-        If it is something else.
+        If the attribute is not one number.
     """
     given = attribute(holder, key) if key in holder.attrs else math.nan
     try:
@@ -319,24 +319,24 @@ def number_of(holder: h5py.Group, key: str) -> float:
 
 
 def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDArray[Any]:
-    """The values of a dataset, or a part of them, unless its bytes in the file cannot hold as many.
+    """Values of a dataset, or a part of them.
 
     Raises
     ------
     SepiError
-        If ``dataset`` is none, lies in another file, or claims more values than it can have: no memory is taken on the
-        word of its shape.
+        If ``dataset`` is not a dataset, lies in another file, or its bytes in the file cannot hold its shape; memory is
+        only taken after this check.
     """
     name = printable(str(dataset.name).lstrip("/"))
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
-        raise SepiError(f"{path}: damaged HDF5 file: '{name}' is no array")
+        raise SepiError(f"{path}: damaged HDF5 file: '{name}' is not an array")
     if dataset.is_virtual or dataset.external or dataset.file.filename != str(path):
         raise SepiError(f"{path}: the values of '{name}' lie in another file; copy them into this one")
     if dataset.dtype.hasobject:
-        # as of such attributes
+        # HDF5 may hang or crash, as at such attributes
         raise SepiError(f"{path}: the values of '{name}' are of variable length; expected numbers")
     held = dataset.id.get_storage_size()
-    # what is not compressed is stored as it is, but for chunks never written
+    # uncompressed values take their full size, except chunks that were never written
     if held > path.stat().st_size or dataset.nbytes > held * (DEFLATE_RATIO if dataset.chunks else 1):
         raise SepiError(f"{path}: damaged HDF5 file: '{name}' of shape {dataset.shape} cannot lie in {held} bytes")
     return np.asarray(dataset[part])
@@ -344,12 +344,12 @@ def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDAr
 
 @contextmanager
 def open_hdf5(path: Path, kind: str = "readable HDF5 file", check: bool = True) -> Iterator[h5py.File]:
-    """Open an HDF5 file for reading; ``kind`` is what it should be.
+    """Open an HDF5 file for reading; messages call it ``kind``.
 
     Raises
     ------
     SepiError
-        If it is none, or its digest, where it has one, is not that of its content.
+        If it is missing, not HDF5, or has a digest that differs from that of its content.
     """
     if not path.is_file():
         raise SepiError(f"{path}: no such file")

@@ -1,4 +1,4 @@
-"""Pictures: views and masks in, views and maps out."""
+"""Image files: reads views and masks, writes views and maps."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Pixels = npt.NDArray[np.integer[Any] | np.floating[Any]]
 
 _ENDS = ("png", "jpg", "jpeg", "tif", "tiff", "exr", "bmp", "webp", "pgm", "ppm", "pnm", "gif", "jp2", "j2k", "avif")
 SUFFIXES = frozenset(f".{end}" for end in _ENDS)
-"""Ends of names, in small letters, of the pictures that can be read."""
+"""Suffixes of the images that can be read, in lower case."""
 
 _MAX_BYTES = 2**32
 _SILENT = logging.NullHandler()
@@ -39,35 +39,35 @@ _LAST_CHUNK = b"IEND" + zlib.crc32(b"IEND").to_bytes(4, "big")
 
 
 def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
-    """Read a picture of a kind in :data:`SUFFIXES`; its content tells which, not its name.
+    """Read an image of any supported kind; the content tells the kind, not the name.
 
     Parameters
     ----------
     path : Path
     any_floats : bool
-        Whether float pixels may be any numbers, NaN and infinity among them, rather than brightness in 0..1.
+        Whether float pixels may be any numbers, even NaN and infinity, instead of brightness in 0..1.
 
     Returns
     -------
     ndarray, shape (H, W, C), uint8, uint16 or float32
-        C is 1 for grey, 3 for RGB; transparency is left out. Pixels are as stored: neither turned as a camera's
-        orientation says nor changed in brightness, but integers that end at another white, as in some PGM, span their
-        whole range, and where white is zero, as in some TIFF, black becomes it.
+        C is 1 for grey, 3 for RGB; transparency is left out. Pixels are as stored: the orientation tag is not applied
+        and brightness is not changed, with two exceptions. Integers with a lower white, as in some PGM files, are
+        scaled to their whole range. Where white is zero, as in some TIFF files, values are inverted.
 
     Raises
     ------
     SepiError
-        If the file is unreadable, no picture of these kinds, cut off or damaged, of other numbers than 8 or 16 bit or
-        float32, or has float pixels that are not finite or far outside 0..1.
+        If the file is unreadable, not an image of these kinds, cut off or damaged, its pixels are neither 8 or 16 bit
+        nor float32, or its float pixels are not finite or far outside 0..1.
     """
-    # of what is told as an error, or does not matter
+    # libraries warn of what is raised as an error here, or does not matter
     with warnings.catch_warnings(action="ignore"):
         return _read(path, any_floats)
 
 
 def _read(path: Path, any_floats: bool) -> Pixels:
     with _opened(path) as file:
-        # all of it at once: each of many small reads would let go of Python's lock, for which others wait
+        # in one read: each of many small ones would release Python's lock and wait for it again
         data = file.read()
     header = read_header(path, io.BytesIO(data))
     with reading(path, header.kind):
@@ -80,7 +80,7 @@ def _read(path: Path, any_floats: bool) -> Pixels:
     # grey with transparency may be decoded to colours
     image = np.ascontiguousarray(channels[:, :, : 1 if header.grey else 3])
     if image.dtype == np.float32 and not any_floats and not (image.min() >= LOWEST and image.max() <= HIGHEST):
-        what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinite ones"
+        what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinity"
         raise SepiError(f"{path}: float pixels must be finite and within 0..1, got {what}; --white says what white is")
     return image
 
@@ -88,28 +88,28 @@ def _read(path: Path, any_floats: bool) -> Pixels:
 def read_views(
     paths: Sequence[Path], positions: Sequence[int] | None = None, count: int | None = None, *, any_floats: bool = False
 ) -> Pixels:
-    """Read pictures that must be alike, several at a time.
+    """Read images of one size and type, several at a time.
 
     Parameters
     ----------
     paths : sequence of Path
     positions : sequence of int, optional
-        Index of each in the result; one after the other unless given.
+        Index of each image in the result; default: in order.
     count : int, optional
-        Length of the result; as many as ``paths`` unless given.
+        Length of the result; default: the number of paths.
     any_floats : bool
         As in :func:`read_picture`.
 
     Returns
     -------
     ndarray, shape (count, H, W, C), uint8, uint16 or float32
-        Zero at positions that no picture has.
+        Zero at positions without an image.
 
     Raises
     ------
     SepiError
-        If a file cannot be read, or is not of the same size, depth and number of channels as the first, or they take
-        more memory together than there is.
+        If a file cannot be read, differs from the first in size, bit depth or number of channels, or all together take
+        more memory than the machine has.
     """
     first = read_picture(paths[0], any_floats=any_floats)
     positions = range(len(paths)) if positions is None else positions
@@ -123,37 +123,37 @@ def read_views(
             raise SepiError(f"{paths[index]}: {_described(image)}, but {paths[0].name} is {_described(first)}")
         views[positions[index]] = image
 
-    # decoding runs outside Python's lock, so threads share the work; the list of filters for warnings is one for all
+    # decoding runs outside Python's lock, so threads share the work; all threads share the warning filters
     with warnings.catch_warnings(action="ignore"), ThreadPoolExecutor(min(8, available_cores())) as pool:
         try:
             for _ in pool.map(fill, range(len(paths))):
                 pass
         except BaseException:
-            # an interrupted command does not wait for the rest
+            # an interrupted command must not wait for the rest
             pool.shutdown(wait=False, cancel_futures=True)
             raise
     return views
 
 
 def picture_header(path: Path) -> Header:
-    """Header of a picture of any supported kind, without decoding it."""
+    """Header of an image of any supported kind; its pixels are not decoded."""
     with _opened(path) as file:
         return read_header(path, file)
 
 
 def png_texts(path: Path) -> dict[str, str]:
-    """Key to text of a PNG's text chunks; none of what is no undamaged PNG."""
+    """Text chunks of a PNG by key; empty if the file is damaged or not a PNG."""
     from PIL import PngImagePlugin
 
     if not path.is_file():
         return {}
     try:
-        # whose size is looked at first: Pillow decodes all of it for the texts behind its pixels
+        # check the size first: Pillow decodes the whole image to find texts behind the pixels
         picture_header(path)
         with PngImagePlugin.PngImageFile(path) as image:
             return {key: str(text) for key, text in image.text.items()}
     except Exception:
-        # Pillow stumbles over damage in many ways
+        # Pillow fails on damage in many ways
         return {}
 
 
@@ -166,7 +166,7 @@ def write_png(path: Path, pixels: Pixels | BoolMap, texts: Mapping[str, str] | N
     pixels : ndarray, shape (H, W) or (H, W, 3), uint8, uint16 or bool
         Grey or RGB; bool becomes 0 and 255.
     texts : mapping of str to str, optional
-        Text chunks; for grey only.
+        Text chunks, for grey images only.
     """
     values: npt.NDArray[Any] = np.asarray(255 * pixels, np.uint8) if pixels.dtype == bool else pixels
     with atomic_path(path) as temporary:
@@ -176,7 +176,7 @@ def write_png(path: Path, pixels: Pixels | BoolMap, texts: Mapping[str, str] | N
             chunks = PngImagePlugin.PngInfo()
             for key, text in texts.items():
                 chunks.add_text(key, text)
-            # a quarter of the time for a twentieth more bytes; OpenCV packs so, too
+            # a quarter of the time for 5 % more bytes; OpenCV does the same
             Image.fromarray(values).save(temporary, "PNG", pnginfo=chunks, compress_level=1)
             return
         done, data = cv2.imencode(".png", values[:, :, ::-1] if values.ndim == 3 else values)
@@ -187,19 +187,19 @@ def write_png(path: Path, pixels: Pixels | BoolMap, texts: Mapping[str, str] | N
 
 @contextmanager
 def _opened(path: Path) -> Iterator[IO[bytes]]:
-    with reading(path, "picture"):
-        # a pipe would be waited for
+    with reading(path, "readable image"):
+        # reading a pipe would wait for ever
         if not path.is_file():
-            raise SepiError("cannot be read: no plain file, or a link to nothing")
+            raise SepiError("cannot be read: not a regular file, or a broken link")
         with path.open("rb") as file:
             size = os.fstat(file.fileno()).st_size
             if size > _MAX_BYTES:
-                raise SepiError(f"{size} bytes are more than a picture has")
+                raise SepiError(f"{size} bytes are more than an image has")
             yield file
 
 
 def _decoded(path: Path, data: bytes, kind: str) -> Pixels:
-    """Pixels (H, W) or (H, W, C) in the order RGB; damage is told, and nothing is printed about it."""
+    """Pixels (H, W) or (H, W, C) in the order RGB; damage raises an error and prints nothing."""
     if kind == "OpenEXR":
         return exr_pixels(str(path))
     if kind == "PNM":
@@ -215,7 +215,7 @@ def _decoded(path: Path, data: bytes, kind: str) -> Pixels:
             return np.asarray(image.convert("L" if image.mode == "L" else "RGB"))
     import imagecodecs
 
-    # what it warns of leaves the pixels as they are
+    # its warnings do not concern the pixels
     logging.getLogger("imagecodecs").addHandler(_SILENT)
     try:
         pixels: Pixels = getattr(imagecodecs, f"{_CODECS[kind]}_decode")(data)
@@ -225,7 +225,7 @@ def _decoded(path: Path, data: bytes, kind: str) -> Pixels:
 
 
 def _require_memory(folder: Path, view: Pixels, count: int) -> None:
-    """Raise where so many views like this take more memory than the machine has."""
+    """Raise if ``count`` views like this take more memory than the machine has."""
     try:
         there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):  # not all systems tell

@@ -1,4 +1,4 @@
-"""Pictures of a map: levels and colours for people, 16-bit grey levels for programs.
+"""Images of maps: colours and grey levels for people, 16-bit grey levels for programs.
 
 docs/reference/outputs.md describes them.
 """
@@ -26,23 +26,23 @@ from sepi.validation import require_map
 Picture = npt.NDArray[np.uint8]
 
 BEYOND = 0.005
-"""Part of the pixels beyond each end of a colour scale, so that a few wrong pixels do not use it up."""
+"""Share of pixels beyond each end of a colour scale, so that a few outliers do not compress it."""
 
-# none of the colours of the scale
+# not a colour of the scale
 _GREY = 128
 _FORMULA = "disparity = (value - 1) * scale + offset; value 0: unknown"
 _STEPS = "pixels per view step"
 
 
 def colour_code(values: FloatMap, unknown: BoolMap | None = None) -> Picture:
-    """A map in perceptually uniform colours, from dark blue (least) to yellow (greatest).
+    """Map in perceptually uniform colours, from dark blue (least) to yellow (greatest).
 
     Parameters
     ----------
     values : ndarray, shape (H, W), float32
-        Disparity, or anything else. The colours span its values but for half a percent at either end.
+        Disparity, or any other map. The colours span its values except half a percent at either end.
     unknown : ndarray, shape (H, W), bool, optional
-        Pixels to be shown grey, which take no part of the colour scale.
+        Pixels shown grey and not counted in the colour scale.
 
     Returns
     -------
@@ -61,22 +61,22 @@ def colour_code(values: FloatMap, unknown: BoolMap | None = None) -> Picture:
     """
     require_map("map to colour", values)
     finite = np.isfinite(values)
-    # what is unknown takes no part of the scale
+    # unknown pixels do not count in the scale
     counted = finite if unknown is None else finite & ~unknown
     return in_colours(np.where(finite, _spread(values, counted), np.nan), unknown)
 
 
 def colour_and_depth(picture: npt.NDArray[np.generic], disparity: FloatMap, unknown: BoolMap) -> Picture:
-    """The view and, beside it, its disparity from far, black, to near, white: RGB (H, 2 W, 3), as displays take it."""
+    """View and disparity side by side, RGB (H, 2 W, 3), as light field displays take it; far is black, near white."""
     colours = np.broadcast_to(levels(as_unit_float(picture)), (*disparity.shape, 3))
     depth = levels(_spread(disparity, ~unknown & np.isfinite(disparity)))
     return np.hstack([colours, np.repeat(depth[:, :, None], 3, axis=2)])
 
 
 def _spread(values: FloatMap, counted: BoolMap) -> npt.NDArray[np.floating[Any]]:
-    """A map as 0..1, which span what is counted of it, but for a few pixels."""
+    """Map scaled so that 0..1 spans the ``counted`` values, except a few outliers."""
     low, high = np.quantile(values[counted], (BEYOND, 1 - BEYOND)) if counted.any() else (0.0, 0.0)
-    # a constant map gets the middle
+    # a constant map becomes 0.5
     return (values - low) / (high - low) if high > low else np.full(values.shape, 0.5)
 
 
@@ -90,7 +90,7 @@ def in_colours(unit: npt.NDArray[np.floating[Any]], unknown: BoolMap | None = No
 
 
 def levels(unit: npt.NDArray[np.floating[Any]]) -> Picture:
-    """0..1 as 0..255; not finite as 0."""
+    """0..1 as 0..255; 0 where not finite."""
     known = np.nan_to_num(unit, posinf=0, neginf=0)
     return np.asarray(np.rint(255 * np.clip(known, 0, 1)), np.uint8)
 
@@ -106,16 +106,16 @@ def write_16bit(path: Path, disparity: FloatMap) -> None:
     write_png(path, levels, {"Description": _FORMULA, "scale": repr(scale), "offset": repr(low), "units": _STEPS})
 
 
-# a scale of less than a decade would make differences of a map that has none
+# a scale of less than a decade would exaggerate the differences of an almost constant map
 _LEAST_SPAN = 10.0
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
-# pixels, of a picture of this height; letters grow with the root of a greater one
+# pixels, at this height of the image; letters grow with the square root of the height
 _LEAST_HEIGHT, _BAR, _GAP, _LETTERS = 160, 14, 8, 0.4
 _TITLE = "px / view step"
 
 
 def bars_in_metres(maps: StageMaps, camera: Camera | None) -> dict[str, FloatMap]:
-    """Error bars of the depth by their names; none where there are none of the disparity, or no camera.
+    """Error bars of the depth by name; empty without a camera or without error bars of the disparity.
 
     Parameters
     ----------
@@ -125,8 +125,8 @@ def bars_in_metres(maps: StageMaps, camera: Camera | None) -> dict[str, FloatMap
     Returns
     -------
     dict of str to ndarray, shape (H, W), float32
-        ``depth_sigma``, by the derivative of the depth after the disparity; ``nearest`` and ``farthest``, the depths of
-        the bounds, of which the latter may be infinite. Metres.
+        In metres: ``depth_sigma``, by the derivative of depth with respect to disparity; ``nearest`` and ``farthest``,
+        the depths of the bounds; ``farthest`` may be infinite.
     """
     if camera is None or maps.sigma is None or maps.low is None or maps.high is None:
         return {}
@@ -136,21 +136,21 @@ def bars_in_metres(maps: StageMaps, camera: Camera | None) -> dict[str, FloatMap
 
 
 def names_of_error_bars(maps: StageMaps, *, in_metres: bool) -> tuple[str, ...]:
-    """Names of the files of error bars, those of the depth among them or not; none where maps have no bars."""
+    """File names of error bars, with those of the depth if ``in_metres``; empty if the maps have none."""
     return () if maps.sigma is None else (*ERROR_FILES, *((DEPTH_SIGMA,) if in_metres else ()))
 
 
 def write_error_bars(folder: Path, maps: StageMaps, metres: Mapping[str, FloatMap], unknown: BoolMap) -> None:
-    """Write the error bars of maps, where they have any; equal content gives equal bytes.
+    """Write the error bars of maps, if they have any; equal content gives equal bytes.
 
     Parameters
     ----------
     folder : Path
     maps : StageMaps
     metres : mapping of str to ndarray
-        Those of the depth, from :func:`bars_in_metres`.
+        Error bars of the depth, from :func:`bars_in_metres`.
     unknown : ndarray, shape (H, W), bool
-        Pixels that no view knows anything about.
+        Pixels for whose depth no view has evidence.
 
     Raises
     ------
@@ -164,26 +164,26 @@ def write_error_bars(folder: Path, maps: StageMaps, metres: Mapping[str, FloatMa
     bounds: dict[str, Any] = {"low": maps.low, "high": maps.high}
     bounds |= {name: values for name, values in metres.items() if name != "depth_sigma"}
     with atomic_path(folder / INTERVAL) as temporary, temporary.open("wb") as file:
-        # by name NumPy would put its own end to the temporary file's; it stamps no time
+        # given a name, NumPy would append its own suffix; it stores no time
         np.savez(file, **{name: values.astype("<f4") for name, values in bounds.items()})
     if metres:
         write_pfm(folder / DEPTH_SIGMA, metres["depth_sigma"])
 
 
 def sigma_picture(sigma: FloatMap, unknown: BoolMap | None = None) -> Picture:
-    """A standard deviation in colours, dark blue (least) to yellow (greatest) on a logarithmic scale, and that scale.
+    """Standard deviation in colours on a logarithmic scale, dark blue (least) to yellow (greatest), and the scale.
 
     Parameters
     ----------
     sigma : ndarray, shape (H, W), float32
-        Pixels per view step. The colours span its values but for half a percent at either end, and a decade at least.
+        Pixels per view step. The colours span its values except half a percent at either end, and at least a decade.
     unknown : ndarray, shape (H, W), bool, optional
-        Pixels to be shown grey, which take no part of the scale.
+        Pixels shown grey and not counted in the scale.
 
     Returns
     -------
     ndarray, shape (at least H, more than W, 3), uint8
-        RGB; the map's pixels at the upper left, black where they are not finite, and a bar with numbers on their right.
+        RGB; the map at the upper left, black where not finite, and on its right a bar with numbers.
     """
     finite = np.isfinite(sigma)
     counted = finite & (sigma > 0)
@@ -197,14 +197,14 @@ def sigma_picture(sigma: FloatMap, unknown: BoolMap | None = None) -> Picture:
 
 
 def _span(values: FloatMap) -> tuple[float, float]:
-    """Ends of the scale."""
+    """Least and greatest value of the scale."""
     low, high = np.quantile(values.astype(np.float64), (BEYOND, 1 - BEYOND)) if values.size else (0.01, 0.01)
     wider = math.sqrt(max(1.0, _LEAST_SPAN / float(high / low)))
     return float(low) / wider, float(high) * wider
 
 
 def _beside_scale(colours: Picture, low: float, high: float) -> Picture:
-    """A picture with the scale of its colours on the right, on white."""
+    """Image with its colour scale on the right, on white."""
     height, width = colours.shape[:2]
     total = max(height, _LEAST_HEIGHT)
     size = math.sqrt(total / _LEAST_HEIGHT)
@@ -229,11 +229,11 @@ def _beside_scale(colours: Picture, low: float, high: float) -> Picture:
 
 
 def _ticks(low: float, high: float, most: int) -> list[float]:
-    """Round numbers within the scale: powers of ten, and 3, or 2 and 5 times them as long as they have room."""
+    """Round numbers within the scale: powers of ten, with 3, or 2 and 5, times them if there is room."""
     powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     ticks: list[float] = []
     for digits in ((1,), (1, 3), (1, 2, 5)):
-        # by its text a number is as round as it is written
+        # parsed from text, since a product would have rounding errors
         values = [float(f"{digit}e{power}") for power in powers for digit in digits]
         within = [value for value in values if low <= value <= high]
         if not ticks or len(within) <= most:

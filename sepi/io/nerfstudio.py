@@ -1,21 +1,21 @@
-"""Light fields as data sets of nerfstudio [1]_; instant-ngp [2]_ reads the same file.
+"""Data sets of nerfstudio [1]_ from light fields; instant-ngp [2]_ reads the same file.
 
 ::
 
     transforms.json              cameras: `w h fl_x fl_y cx cy` of each view, camera-to-world matrices
     images/view_04_04.png        each view, RGB of 8 bit
-    depths/view_04_04.npy        depth of each view in millimetres, float32; 0 where it is not known
-    depth_sigmas/view_04_04.npy  its standard deviation, likewise; where the map has error bars
-    points.ply                   coloured points, for methods that begin with some
+    depths/view_04_04.npy        depth of each view in millimetres, float32; 0 where unknown
+    depth_sigmas/view_04_04.npy  its standard deviation in millimetres; only if the map has error bars
+    points.ply                   coloured points, for methods that start from points
 
-A camera's axes point right, up and back. The world's z points up; y points the way that the cameras look, and the
-origin is the reference view's camera. Principal points are counted from the corner of the picture. No key for the error
-of depth is known to the programs: ``depth_sigma_file_path`` is for those who weigh it themselves.
+A camera's axes point right, up and back. The world's z points up, y in the viewing direction; the origin is the
+reference view's camera. Principal points are counted from the corner of the image. Neither program has a key for the
+error of depth; ``depth_sigma_file_path`` is for programs that weight depth by it.
 
 References
 ----------
 .. [1] "Data conventions", https://docs.nerf.studio/quickstart/data_conventions.html: the axes; depth of 16 or 32 bit in
-       millimetres, zero being unknown, for every frame or for none.
+       millimetres, zero where unknown, for every frame or for none.
 .. [2] ``src/nerf_loader.cu`` of https://github.com/NVlabs/instant-ngp: principal points of single frames need `w` and
        `h` beside them; it ignores this depth.
 """
@@ -51,11 +51,11 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
     Parameters
     ----------
     folder : str or Path
-        Made; an empty one may exist.
+        Must not exist, or be empty.
     posed : PosedViews
         From :func:`sepi.applications.posed_views.posed_views`.
     progress : callable
-        Told the fraction that is done.
+        Receives the fraction done.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def _transforms(posed: PosedViews) -> dict[str, Any]:
         {
             "file_path": f"images/{name}.png",
             "depth_file_path": f"depths/{name}.npy",
-            # of all views, or none
+            # nerfstudio wants it for all views or for none
             **({"depth_sigma_file_path": f"depth_sigmas/{name}.npy"} if posed.sure else {}),
             **({"mask_path": f"masks/{name}.png"} if posed.incomplete else {}),
             **dict(zip(("w", "h", "fl_x", "fl_y", "cx", "cy"), (width, height, focal, focal, x, y), strict=True)),
@@ -107,14 +107,14 @@ def _transforms(posed: PosedViews) -> dict[str, Any]:
 
 
 def _world(posed: PosedViews, points: Points) -> Points:
-    """Points of the reference view's axes in those of the world: of the calibrated cameras, or right, forward, up."""
+    """Points from the reference view's axes to those of the world: the calibrated cameras', or right, forward, up."""
     if posed.rig is not None:
         return posed.in_world(points)
     return np.column_stack([points[:, 0], points[:, 2], 0.0 - points[:, 1]])
 
 
 def _camera_to_world(posed: PosedViews, centre: list[float]) -> list[list[float]]:
-    """Columns: the camera's right, up and back in the world, and its place."""
+    """Camera-to-world matrix; columns: the camera's right, up and back in the world, and its centre."""
     axes = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
     if posed.rig is not None:
         axes = (posed.rotation * [[1], [-1], [-1]]).T.tolist()

@@ -1,4 +1,4 @@
-"""Portable float maps, the benchmark's format for disparity: one channel, rows stored bottom-up."""
+"""Portable float maps (PFM), the benchmark's format for disparity: one channel, rows stored bottom-up."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _HEADER = re.compile(rb"\A(P[fF])\s+(\d{1,9})\s+(\d{1,9})\s+([-+]?[0-9.]+(?:[eE]
 
 
 def read_pfm(path: str | Path) -> FloatMap:
-    """Read a one-channel PFM, of either byte order.
+    """Read a one-channel PFM of either byte order.
 
     Parameters
     ----------
@@ -26,12 +26,12 @@ def read_pfm(path: str | Path) -> FloatMap:
     Returns
     -------
     ndarray, shape (H, W), float32
-        Top row first, as stored otherwise: the scale of the header tells the byte order alone.
+        Top row first. Values are as stored: of the header's scale only the sign counts, which gives the byte order.
 
     Raises
     ------
     SepiError
-        If the file is missing, none, of three channels, or damaged.
+        If the file is missing, not a PFM, of three channels, or damaged.
 
     Examples
     --------
@@ -64,7 +64,7 @@ def write_pfm(path: str | Path, values: FloatMap) -> None:
     Parameters
     ----------
     path : str or Path
-        Its folder is made where it does not exist.
+        Its folder is made if missing.
     values : ndarray, shape (H, W), float32
         Top row first.
 

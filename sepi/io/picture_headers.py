@@ -1,8 +1,8 @@
-"""Header of a picture, read before decoding: its kind, its size, and whether the file is complete.
+"""Header of an image, read before decoding: its kind, its size, and whether the file is complete.
 
-Decoders take memory on a header's word, and some fill with grey what a file that is cut off lacks. Pillow knows most
-kinds; its classes are used one by one: ``Image.open`` warns of pictures larger than half of what is read here, and
-refuses larger ones, as its class for WebP does; that limit cannot be set for one thread alone.
+Decoders take memory for any size in a header, and some fill the missing part of a truncated file with grey. Pillow
+reads most headers, by its class for each kind: ``Image.open`` and the class for WebP refuse images that are allowed
+here, and that limit cannot be set for one thread alone.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _HEADER = re.compile(rb"P([2356])" + _GAP + rb"([0-9]{1,9})" + _GAP + rb"([0-9]{
 
 
 class PnmForm(NamedTuple):
-    """The header of a PGM or PPM: size, channels, value of white, whether digits follow, and where the pixels begin."""
+    """Header of a PGM or PPM: size, channels, value of white, whether pixels are text, and their first byte."""
 
     height: int
     width: int
@@ -45,7 +45,7 @@ def pnm_form(head: bytes, size: int) -> PnmForm:
     Raises
     ------
     SepiError
-        If they are no header, or the file cannot hold the pixels.
+        If the header is not valid, or the file cannot hold the pixels.
     """
     match = _HEADER.match(head)
     if match is None:
@@ -61,7 +61,7 @@ def pnm_form(head: bytes, size: int) -> PnmForm:
 
 
 def pnm_pixels(data: bytes) -> npt.NDArray[np.unsignedinteger]:
-    """Pixels (H, W, C), uint8 or uint16, over the whole range of their type."""
+    """Pixels (H, W, C), uint8 or uint16, scaled to the whole range of their type."""
     height, width, channels, white, digits, start = pnm_form(data, len(data))
     kind = np.dtype("u1" if white < 256 else "u2")
     count, full = height * width * channels, int(np.iinfo(kind).max)
@@ -78,16 +78,16 @@ def pnm_pixels(data: bytes) -> npt.NDArray[np.unsignedinteger]:
 
 
 MAX_PIXELS = 2**28
-"""More pixels than any camera's picture has."""
+"""Most pixels of an image that is read; no camera has more."""
 
-# more than any of the compressions reaches on pictures of 8 bit; small pictures of one colour may shrink further
+# more than any compression reaches on images of 8 bit; small images of one colour may shrink further
 _PIXELS_PER_BYTE = 1100
 _SMALL = 2**24
 
 
 @dataclass(frozen=True)
 class Header:
-    """A picture as its first bytes describe it.
+    """Kind, size and pixel type of an image, from its header.
 
     Attributes
     ----------
@@ -96,9 +96,9 @@ class Header:
     height, width : int
         In pixels.
     pixel_bytes : int
-        Bytes that a pixel takes when it is decoded.
+        Bytes of a decoded pixel.
     grey : bool
-        Whether it has no colours; where the file does not say, False.
+        Whether it has no colours; False if the header does not say.
     white : int
         PNM: the value of white; else 0.
     """
@@ -112,27 +112,27 @@ class Header:
 
 
 def read_header(path: Path, file: IO[bytes]) -> Header:
-    """Find out what picture an open file is; what its name says does not matter.
+    """Header of an open image file; its content tells the kind, not its name.
 
     Parameters
     ----------
     path : Path
         For messages.
     file : binary file
-        Its first bytes are read, or as much as tells whether all of it is there.
+        Only its first bytes are read, or as much as tells whether it is complete.
 
     Raises
     ------
     SepiError
-        If it is no picture of a known kind, is cut off or damaged, of a form that is not read, or claims more pixels
-        than its bytes can hold.
+        If it is not an image of a known kind, is cut off or damaged, of a form that is not supported, or claims more
+        pixels than its bytes can hold.
     """
     size = file.seek(0, io.SEEK_END)
     file.seek(0)
     start = file.read(12)
     kind = next((kind for kind, (signatures, _) in _KINDS.items() if start.startswith(signatures)), None)
     if kind is None:
-        raise SepiError(f"{path}: not a {', '.join(_KINDS)} picture (PNM: PGM or PPM)")
+        raise SepiError(f"{path}: not a {', '.join(_KINDS)} image (PNM: PGM or PPM)")
     file.seek(0)
     with reading(path, kind):
         header = Header(kind, *_KINDS[kind][1](file, path, size))
@@ -141,25 +141,25 @@ def read_header(path: Path, file: IO[bytes]) -> Header:
     return header
 
 
-# height, width, and as much of what else a header tells as is known
+# height, width, and if known: bytes of a pixel, grey, white
 _Form = tuple[int, int] | tuple[int, int, int, bool] | tuple[int, int, int, bool, int]
 
 
 def pillow_class(plugin: str) -> Any:
-    """Pillow's class for pictures of a kind, such as ``"Png"``."""
+    """Pillow's class for images of a kind, such as ``"Png"``."""
     return getattr(import_module(f"PIL.{plugin}ImagePlugin"), f"{plugin}ImageFile")
 
 
 def _by_pillow(plugin: str, file: IO[bytes], path: Path, size: int) -> _Form:
     with pillow_class(plugin)(file) as image:
-        # how the pixels of a PNG are packed: a grey one with transparency has colours once decoded; a palette may, too
+        # how a PNG packs its pixels: decoding turns grey with transparency, or a palette, into colours
         packed = str(image.tile[0].args) if plugin == "Png" else image.mode
         grey = packed.startswith(("1", "I", "L")) if plugin == "Png" else packed in ("L", "LA", "I;16")
         return image.height, image.width, (1 if grey else 3) * (2 if "16" in packed else 1), grey
 
 
 def _avif(file: IO[bytes], path: Path, size: int) -> _Form:
-    # the box with the size of the picture
+    # the box 'ispe' holds the size of the image
     _, _, box = file.read(4096).partition(b"ispe\0\0\0\0")
     return int.from_bytes(box[4:8], "big"), int.from_bytes(box[:4], "big")
 
@@ -177,7 +177,7 @@ def _webp(file: IO[bytes], path: Path, size: int) -> _Form:
 
 
 def _tiff(file: IO[bytes], path: Path, size: int) -> _Form:
-    """The first picture of the file."""
+    """Form of the first page."""
     with open_tiff(file) as pictures:
         return tiff_form(pictures.pages[0].aspage(), size)
 
@@ -200,7 +200,7 @@ _KINDS: dict[str, tuple[bytes | tuple[bytes, ...], Callable[[IO[bytes], Path, in
     "BMP": (b"BM", partial(_by_pillow, "Bmp")),
     "GIF": (b"GIF8", partial(_by_pillow, "Gif")),
     "JPEG 2000": ((b"\0\0\0\x0cjP  ", b"\xff\x4f\xff\x51"), partial(_by_pillow, "Jpeg2K")),
-    # behind the length of its first box
+    # the length of the first box comes before
     "AVIF": (tuple(bytes((0, 0, 0, length)) + b"ftypavif" for length in range(16, 256, 4)), _avif),
     "WebP": (b"RIFF", _webp),
     "PNM": ((b"P2", b"P3", b"P5", b"P6"), _pnm),

@@ -1,4 +1,4 @@
-"""Point clouds as PLY files, which every viewer of 3-D data reads."""
+"""Point clouds as PLY files, which all 3-D viewers read."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sepi.io.files import atomic_path, reading
 from sepi.validation import require_path, require_type
 
 _POINT = np.dtype([("position", "<f4", 3), ("colour", "u1", 3)])
-# words of the format for numbers, where NumPy has others
+# number types of PLY, and NumPy's names for them
 _WORDS = ("char i1", "uchar u1", "short i2", "ushort u2", "int i4", "uint u4", "float f4", "double f8")
 _NUMBERS = dict(word.split() for word in _WORDS)
 _ORDERS: dict[str, Literal["<", ">"]] = {"binary_little_endian": "<", "binary_big_endian": ">"}
@@ -25,7 +25,7 @@ _SIGMA = "sigma"
 
 
 class Cloud(Protocol):
-    """Coloured points, such as :class:`sepi.io.point_cloud.PointCloud`; they may have a ``sigma`` each."""
+    """Coloured points, such as :class:`sepi.io.point_cloud.PointCloud`; may have a ``sigma`` for each point."""
 
     @property
     def positions(self) -> npt.NDArray[np.floating]:
@@ -36,21 +36,21 @@ class Cloud(Protocol):
         """RGB, shape (N, 3)."""
 
     def comments(self) -> tuple[str, ...]:
-        """What the numbers are, for the file's header."""
+        """Axes and units, for the file's header."""
 
 
 def write_ply(path: str | Path, cloud: Cloud, comments: Sequence[str] | None = None) -> None:
-    """Write coloured points as a binary little-endian PLY, whole or not at all; equal points give equal bytes.
+    """Write coloured points as a binary little-endian PLY, whole or not at all; equal content gives equal bytes.
 
     Parameters
     ----------
     path : str or Path
-        MeshLab, CloudCompare, Blender and others open it; comments in its header name the units. Where the cloud has a
+        MeshLab, CloudCompare, Blender and others open it; comments in its header name the units. If the cloud has a
         sigma, each vertex has a property of that name, which CloudCompare shows as a scalar field.
     cloud : Cloud
         Such as a :class:`~sepi.io.point_cloud.PointCloud`.
     comments : sequence of str, optional
-        What the numbers are, where it is not what the cloud says.
+        Axes and units; default: those of the cloud.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def write_ply(path: str | Path, cloud: Cloud, comments: Sequence[str] | None = N
     for name in ("positions", "colours"):
         require_type(f"{path}: {name}", getattr(cloud, name, None), np.ndarray, "an array of the points")
     kind, properties = _POINT, _PROPERTIES
-    # a cloud of one's own need have none
+    # a user's own class need not have it
     sigma = getattr(cloud, _SIGMA, None)
     if sigma is not None:
         kind, properties = np.dtype([*kind.descr, (_SIGMA, "<f4")]), (*properties, f"float {_SIGMA}")
@@ -95,7 +95,7 @@ def write_ply(path: str | Path, cloud: Cloud, comments: Sequence[str] | None = N
 
 
 def read_positions(path: Path) -> npt.NDArray[np.float64]:
-    """Coordinates (N, 3) of the points of a PLY file whose first element are its vertices.
+    """Coordinates (N, 3) of the points of a PLY file whose first element is ``vertex``.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def read_positions(path: Path) -> npt.NDArray[np.float64]:
         kind = next(line[1] for line in lines if line[:1] == ["format"])
         first, *others = [n for n, line in enumerate(lines) if line[:1] == ["element"]]
         if lines[first][1] != "vertex":
-            raise SepiError("not a PLY file of points: its first element is no vertex")
+            raise SepiError("not a PLY file of points: its first element is not 'vertex'")
         count, properties = int(lines[first][2]), lines[first + 1 : others[0] if others else None]
         names = [(line[2], _NUMBERS.get(line[1], line[1])) for line in properties if line[:1] == ["property"]]
         if kind == "ascii":

@@ -3,18 +3,18 @@
 Axes are those of PLY viewers: x to the right, y up, z towards the viewer, so that the scene lies at negative z and
 shows upright and the right way round. The origin is the camera of the view that the disparity map belongs to.
 
-Where the camera is known, positions are in metres. Cameras look the same way and stand a baseline apart; their pictures
-are shifted so that a point at the focus distance is at the same pixel in all of them (:mod:`sepi.camera`). The shift
-moves the principal point: at the grid's centre view it is the middle of the picture ``(cx, cy)``, and in a view ``n``
-view steps to its right ``cx + n * offset``, with the camera's ``offset`` in pixels per view step. So pixel ``(y, x)``
-at depth ``Z`` is the point ::
+With a camera, positions are in metres. The cameras are parallel and a baseline apart; their images are shifted so that
+a point at the focus distance has the same pixel in all of them (:mod:`sepi.camera`). The shift moves the principal
+point: in the grid's centre view it is the middle of the image ``(cx, cy)``, and in a view ``n`` view steps to its right
+``cx + n * offset``, with the camera's ``offset`` in pixels per view step. So pixel ``(y, x)`` at depth ``Z`` is the
+point ::
 
     X = (x - cx - n * offset) * Z / focal_px        Y = (y - cy - m * offset) * Z / focal_px
 
 for a view ``n`` view steps to the right of and ``m`` below the centre view; X to the right and Y down, in metres.
 
-Where it is not known, the cloud is a relief: x and y in pixels from the middle, z the disparity, stretched so that its
-range is a third of the picture's width. Shape and proportions are then not those of the scene.
+Without a camera, the cloud is a relief: x and y in pixels from the middle, z the disparity, stretched so that its range
+is a third of the image width. A relief does not have the proportions of the scene.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ Positions = npt.NDArray[np.float32]
 Colours = npt.NDArray[np.uint8]
 View = npt.NDArray[np.generic]
 
-# depth of a relief as part of the picture's width, and the part of the pixels beyond each end of what counts as its
-# range, so that a few wrong pixels do not flatten it
+# depth of a relief as a share of the image width, and the share of pixels beyond each end of its range, so that a few
+# outliers do not flatten it
 _RELIEF = 1 / 3
 _BEYOND = 0.005
 
@@ -59,14 +59,14 @@ class PointCloud:
     stretch : float
         Pixels per unit of disparity of a relief; 1 for a metric cloud.
     units : str or None
-        Units of the world in whose axes the points are, where calibrated cameras tell; None: axes are as above.
+        Units of the world of the calibrated cameras, in whose axes the points are; None: axes are as above.
     sigma : ndarray, shape (N,), float32, or None
-        Standard deviation of each point's depth, in the unit of a metric cloud, or of its disparity in a relief, pixels
-        per view step; None where nothing tells it.
+        Standard deviation of each point: of its depth in a metric cloud, in the cloud's unit; of its disparity in a
+        relief, in pixels per view step. None if unknown.
 
     Examples
     --------
-    A cloud put together by hand, of one red point two metres before the camera:
+    A cloud of one red point two metres before the camera:
 
     >>> import numpy as np
     >>> from sepi.io.point_cloud import PointCloud
@@ -83,12 +83,12 @@ class PointCloud:
     sigma: FloatMap | None = None
 
     def comments(self) -> tuple[str, ...]:
-        """What the numbers are, for the file's header.
+        """Axes and units, for the file's header.
 
         Returns
         -------
         tuple of str
-            Axes, units, and what ``sigma`` is where there is one.
+            Axes, units, and the unit of ``sigma`` if there is one.
         """
         sigma = f"sigma: standard deviation of the depth along the viewing direction, {self.units or 'metres'}"
         lines = _AXES, "metres; origin: camera of the view"
@@ -117,10 +117,10 @@ def point_cloud(
 ) -> PointCloud:
     """Point cloud of one view; pixels without a finite disparity, and those at or beyond infinity, have no point.
 
-    With a camera ``(f, offset)`` pixel ``(y, x)`` of depth ``Z`` becomes ``X = (x - cx - n offset) Z / f`` and
-    ``Y = (y - cy - m offset) Z / f`` metres, for a view ``n`` view steps to the right of the centre view and ``m``
-    below it, and the middle ``(cx, cy)`` of the picture; the cloud's axes are ``(X, -Y, -Z)``. Without, x and y are
-    pixels from the middle, and z is the disparity, stretched to a third of the picture's width.
+    With a camera, pixel ``(y, x)`` of depth ``Z`` becomes the point ``(X, -Y, -Z)`` in metres, with
+    ``X = (x - cx - n offset) Z / focal_px`` and ``Y = (y - cy - m offset) Z / focal_px``. The middle of the image is
+    ``(cx, cy)``, and the view is ``n`` view steps to the right of the centre view and ``m`` below it. Without a camera,
+    x and y are pixels from the middle, and z is the disparity, stretched to a third of the image width.
 
     Parameters
     ----------
@@ -131,15 +131,15 @@ def point_cloud(
     confidence : ndarray, shape (H, W), float32, optional
         0..1; needed for ``min_confidence``.
     camera : Camera, optional
-        Makes the cloud metric; a relief without.
+        Makes the cloud metric; default: a relief.
     from_centre : (float, float)
         Baseline (down, across) from the grid's centre view to this view, in view steps.
     min_confidence : float
         Leave out pixels of lower confidence.
     max_depth : float, optional
-        Leave out points more distant than this, metres.
+        Leave out points farther away than this, in metres.
     step : int
-        Use every so-many-th row and column of pixels.
+        Use every ``step``-th row and column of pixels.
     unknown : ndarray, shape (H, W), bool, optional
         Pixels to leave out.
     rig : Rig, optional
@@ -147,8 +147,8 @@ def point_cloud(
     sigma : ndarray, shape (H, W), float32, optional
         Standard deviation of the disparity, pixels per view step; that of the depth follows by the derivative.
     max_sigma : float, optional
-        Leave out points of a larger standard deviation than this: of the depth in metres with a camera, else of the
-        disparity in pixels per view step.
+        Leave out points of a larger standard deviation: of the depth in metres with a camera, else of the disparity in
+        pixels per view step.
 
     Returns
     -------
@@ -158,7 +158,7 @@ def point_cloud(
     Raises
     ------
     SepiError
-        If the maps are not of the picture's size, a number is out of bounds, ``max_depth`` is given without a camera,
+        If a map differs in size from the view, a number is out of bounds, ``max_depth`` is given without a camera,
         ``min_confidence`` without a confidence, or ``max_sigma`` without a sigma.
 
     Examples
@@ -206,20 +206,20 @@ def point_cloud(
     if min_confidence > 0:
         if confidence is None:
             raise SepiError("point cloud: a least confidence needs a confidence map")
-        # comparison with NaN is false: unknown confidence is none
+        # a comparison with NaN is false: unknown confidence counts as 0
         used &= confidence >= min_confidence
     if camera is not None:
         depth = camera.depth(disparity)
         used &= np.isfinite(depth) & (depth > 0) & (depth <= (max_depth or np.inf))
         sigma = None if sigma is None else camera.depth_sigma(disparity, sigma)
         if sigma is not None and max_sigma is not None:
-            # comparison with NaN is false: unknown error is any
+            # a comparison with NaN is false: pixels of unknown error are left out
             used &= sigma <= max_sigma
         cloud = _metric(picture, disparity, used, camera, from_centre)
         cloud = replace(cloud, sigma=None if sigma is None else sigma[used])
         if rig is None:
             return cloud
-        # from right, up, back
+        # from axes right, up, back to right, down, forward
         points = rig.to_world(cloud.positions.astype(np.float64) * (1, -1, -1))
         return replace(cloud, positions=points.astype(np.float32), units=rig.units)
     if max_depth is not None:
@@ -248,7 +248,7 @@ def _relief(picture: View, disparity: FloatMap, used: BoolMap) -> PointCloud:
 
 
 def _from_middle(used: BoolMap) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Pixels to the right of and below the middle of the picture, of each used pixel."""
+    """Columns and rows of each used pixel, counted from the middle of the image."""
     y, x = np.nonzero(used)
     return x - (used.shape[1] - 1) / 2, y - (used.shape[0] - 1) / 2
 

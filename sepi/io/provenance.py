@@ -1,6 +1,6 @@
-"""Provenance of a file: the attributes of stage files and results, and which light field a result is of.
+"""Provenance of a file: attributes of stage files and results, and the light field that a result belongs to.
 
-The entries (:func:`sepi.stage.entry`) of the stages that led to a map, in order, are its history.
+The history of a map is the list of entries (:func:`sepi.stage.entry`) of the stages that made it, in order.
 """
 
 from __future__ import annotations
@@ -27,34 +27,34 @@ from sepi.stage import Entry, StageMaps
 RESULT = "result.h5"
 
 _FORMAT = "format"
-# a result tells its view anyway; links are followed by leave of who calls, not of who made a file
+# a result stores its view apart; only the caller, not a file, may allow links to be followed
 _NOT_KEPT = ("view", "follow_links")
 
 
 @dataclass(frozen=True)
 class Origin:
-    """The light field that a result was made from, as the result records it.
+    """Light field that a result was made from, as the result records it.
 
     Attributes
     ----------
     scene, source : str
-        Name and path; empty where the result does not say.
+        Name and path; empty if not recorded.
     view, grid : (int, int)
         Position of the view that the maps belong to; rows and columns of views.
     row_spacing : float or None
-        Distance of rows in view steps; None where positions of the views were known, or the result does not say.
+        Distance of rows in view steps; None if the positions of the views were known, or it is not recorded.
     options : ReadOptions
-        What reads the source so that it is this light field.
+        Options with which the source reads as this light field.
     file_format : str or None
-        Word of the format, where it was given.
+        The format, if it was given.
     digest : str
         :func:`digest_of` the light field; empty in results of earlier versions.
     picture : ndarray, shape (H, W, C), or None
         The view.
     rectified : bool
-        Whether the views are not as cameras took them.
+        Whether the views were rectified.
     files : tuple of str
-        Names of the files that were written with it; empty in results of earlier versions.
+        Names of all files of the result; empty in results of earlier versions.
     """
 
     scene: str
@@ -70,12 +70,12 @@ class Origin:
     files: tuple[str, ...]
 
     def is_of(self, light_field: LightField) -> bool:
-        """Whether it is a result of this light field, perhaps as another view, read otherwise, or since changed."""
+        """Whether the result is of this light field, even of another view, read otherwise, or changed since."""
         named = light_field.source != "" and (self.source, self.scene) == (light_field.source, light_field.name)
         return named or self._shows(light_field) or self.digest == digest_of(light_field)
 
     def difference(self, light_field: LightField) -> str | None:
-        """What is other in a light field that should be the very one that the result was made from; None: nothing."""
+        """How a light field differs from the one that the result was made from; None: not at all."""
         places = (self.view, self.grid), (light_field.reference_position, light_field.grid)
         if places[0] != places[1]:
             own, other = (f"{t},{s} of {rows}x{columns}" for (t, s), (rows, columns) in places)
@@ -87,7 +87,7 @@ class Origin:
         return None
 
     def differs(self, other: Origin) -> bool:
-        """Whether another result is of another view, so that its map cannot be held against this one's."""
+        """Whether another result is of another view, so that the maps cannot be compared."""
         if self.picture is None or other.picture is None:
             return (self.view, self.grid) != (other.view, other.grid)
         return not np.array_equal(self.picture, other.picture)
@@ -102,13 +102,13 @@ DIGEST = "light_field"
 
 
 def origin_attributes(light_field: LightField, digest: str | None = None) -> dict[str, Attribute]:
-    """What a file of maps says of the light field that they were made from, as :func:`read_origin` reads it.
+    """Attributes of the light field that maps were made from, as :func:`read_origin` reads them.
 
     Parameters
     ----------
     light_field : LightField
     digest : str, optional
-        Its :func:`digest_of`, where that is known.
+        Its :func:`digest_of`, if known.
     """
     camera, rig = light_field.camera, light_field.reference_rig
     return {
@@ -123,7 +123,7 @@ def origin_attributes(light_field: LightField, digest: str | None = None) -> dic
 
 
 def read_origin(path: Path) -> Origin | None:
-    """What a result says of its light field; None for a file that does not say.
+    """Light field of a result as the result records it; None if it does not.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def read_origin(path: Path) -> Origin | None:
     Raises
     ------
     SepiError
-        If the file is damaged, or what it says is nonsense.
+        If the file is damaged or its record is not valid.
     """
     path = path / RESULT if path.is_dir() else path
     if path.suffix not in (".h5", ".hdf5") or not path.is_file():
@@ -160,7 +160,7 @@ def read_origin(path: Path) -> Origin | None:
 
 
 def digest_of(light_field: LightField) -> str:
-    """Digest of the views in their places; of nothing that other flags may give to the same views."""
+    """Digest of the views and their positions, and of nothing that flags may change without changing the views."""
     present, positions = light_field.present, light_field.positions
     total = hashlib.sha256(f"{light_field.views.shape} {light_field.views.dtype}".encode())
     total.update(present.tobytes())
@@ -172,7 +172,7 @@ def digest_of(light_field: LightField) -> str:
 
 
 def reading_record(options: ReadOptions, file_format: str | None) -> str:
-    """Options and format that a reader does not infer by itself, as JSON; empty if none."""
+    """Options and format that differ from the defaults, as JSON; empty if none."""
     own = {field.name: getattr(options, field.name) for field in fields(options) if field.name not in _NOT_KEPT}
     given: dict[str, Any] = {name: value for name, value in own.items() if value != getattr(ReadOptions(), name)}
     if file_format is not None:
@@ -181,7 +181,7 @@ def reading_record(options: ReadOptions, file_format: str | None) -> str:
 
 
 def _reading(path: Path, record: str) -> tuple[ReadOptions, str | None]:
-    """What :func:`reading_record` made a record of."""
+    """Options and format in a :func:`reading_record`."""
     try:
         given = json.loads(record or "{}")
         file_format = given.pop(_FORMAT, None)
@@ -190,12 +190,12 @@ def _reading(path: Path, record: str) -> tuple[ReadOptions, str | None]:
         options = TypeAdapter(ReadOptions).validate_json(json.dumps(given), strict=True)
         TypeAdapter(str | None).validate_python(file_format)
     except (ValueError, AttributeError, TypeError, RecursionError, ValidationError) as error:
-        raise SepiError(f"{path}: damaged: it does not say how its light field was read ({record[:40]!r})") from error
+        raise SepiError(f"{path}: damaged: options of its light field are not valid ({record[:40]!r})") from error
     return options, file_format
 
 
 def package_version() -> str:
-    """Version of the installed package; ``"unknown"`` in a bare source tree."""
+    """Version of the installed package; ``"unknown"`` in a source tree that is not installed."""
     try:
         return version("sepi")
     except PackageNotFoundError:
@@ -210,7 +210,7 @@ def stage_attributes(light_field: LightField, history: Sequence[Entry]) -> dict[
     light_field : LightField
         With a known disparity range.
     history : sequence of Entry
-        How the maps were made; the last entry is the file's own, the others become ``made_from``.
+        Stages that made the maps; the last entry is the file's own, the others become ``made_from``.
     """
     *before, last = history
     parameters, made_from = (json.dumps(told, sort_keys=True) for told in (last["parameters"], before))
@@ -219,7 +219,7 @@ def stage_attributes(light_field: LightField, history: Sequence[Entry]) -> dict[
 
 
 def result_attributes(light_field: LightField, maps: StageMaps, digest: str | None = None) -> dict[str, Attribute]:
-    """Attributes of finished maps: of which light field, and what made them, as far as they say.
+    """Attributes of finished maps: their light field, and what made them if the maps record it.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def result_attributes(light_field: LightField, maps: StageMaps, digest: str | No
 
 
 def history_of(path: Path | None) -> list[Entry]:
-    """The history of a stage file, its own entry last; none without a file."""
+    """History of a stage file, its own entry last; empty without a file."""
     if path is None:
         return []
     attributes = read_attributes(path)
@@ -244,11 +244,11 @@ def history_of(path: Path | None) -> list[Entry]:
         last = {"stage": str(attributes["stage"]), "choice": str(attributes["choice"])}
         return [*json.loads(attributes["made_from"]), {**last, "parameters": json.loads(attributes["parameters"])}]
     except (KeyError, ValueError, RecursionError) as error:
-        raise SepiError(f"{path}: not a stage file: its attributes do not say what made it ({error})") from error
+        raise SepiError(f"{path}: not a stage file: expected attributes that say what made it ({error})") from error
 
 
 def scene_attributes(light_field: LightField) -> dict[str, Attribute]:
-    """Attributes that tell which light field a file is about, and its disparity range, where that is known."""
+    """Attributes that identify a file's light field, and its disparity range if known."""
     known = light_field.disparity_range
     searched: dict[str, Attribute] = {}
     if known is not None:

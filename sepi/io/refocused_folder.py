@@ -1,4 +1,4 @@
-"""The folder of refocused pictures, and the index that says where each is focused.
+"""The folder of refocused images, with an index of where each is focused.
 
 docs/depth/refocusing.md describes them.
 """
@@ -23,17 +23,17 @@ from sepi.io.images import write_png
 from sepi.lightfield import FloatMap, full_scale
 
 INDEX = "focus.csv"
-"""Name of the index: a row for each picture."""
+"""Name of the index: a row for each image."""
 
 COLUMNS = ("file", "disparity", "depth_m", "x", "y")
-"""Columns of the index; empty: not known, or does not apply."""
+"""Columns of the index; a value is empty if it is unknown or does not apply."""
 
 ALL_IN_FOCUS = "all_in_focus.png"
 
 ANIMATION = "focus.webp"
-"""The focal stack from the nearest to the farthest picture and back, for ever."""
+"""Endless animation of the focal stack from the nearest to the farthest image and back."""
 
-# of a picture of the animation
+# of an image of the animation
 _MILLISECONDS = 120
 _QUALITY = 85
 
@@ -42,16 +42,16 @@ _MADE = re.compile(rf"focus_\d+\.png|{re.escape(ALL_IN_FOCUS)}|{re.escape(ANIMAT
 
 @dataclass(frozen=True)
 class Focus:
-    """Where a picture is focused.
+    """Focus of an image.
 
     Attributes
     ----------
     disparity : float
         Pixels per view step.
     depth : float or None
-        Metres, infinite at and beyond infinity; None where the camera is not known.
+        Metres, infinite at and beyond infinity; None if the camera is unknown.
     at : (int, int) or None
-        Column and row ``(x, y)`` of the pixel whose surface it is, where it was chosen so.
+        Column and row ``(x, y)`` of the pixel whose surface is in focus, if the focus was chosen so.
     """
 
     disparity: float
@@ -60,7 +60,7 @@ class Focus:
 
 
 def stack_names(count: int) -> list[str]:
-    """Names of the pictures of a focal stack: ``focus_01.png`` and so on."""
+    """Names of the images of a focal stack: ``focus_01.png`` and so on."""
     digits = max(2, len(str(count)))
     return [f"focus_{number:0{digits}}.png" for number in range(1, count + 1)]
 
@@ -74,26 +74,25 @@ def write_refocused(
     *,
     animated: bool = False,
 ) -> tuple[str, ...]:
-    """Write a focal stack, the picture in focus everywhere, and their index.
+    """Write a focal stack, the image in focus everywhere, and their index.
 
-    A new folder appears whole or not at all; in an existing one the files that an earlier index names are replaced when
-    all are written, or removed where this one does not name them, and other files are left alone. Equal content gives
-    equal bytes.
+    A new folder appears whole or not at all. In an existing folder, files that an earlier index names are replaced once
+    all new files are written, or removed; other files stay. Equal content gives equal bytes.
 
     Parameters
     ----------
     folder : Path
-        Made where it does not exist.
+        Made if missing.
     foci : sequence of Focus
-        Of each picture of the stack.
+        Focus of each image of the stack.
     pictures : iterable of ndarray, shape (H, W, C), float32
-        In 0..1; taken one after the other.
+        Images in 0..1, consumed one by one.
     sharp : ndarray, shape (H, W, C), float32, or None
-        The picture in focus everywhere.
+        The image in focus everywhere.
     dtype : dtype
-        Of the views: uint8 gives pictures of 8 bit, all others of 16 bit.
+        That of the views: uint8 gives images of 8 bit, all others of 16 bit.
     animated : bool
-        Write the stack as an animation, too.
+        Also write the stack as an animation.
 
     Returns
     -------
@@ -103,8 +102,8 @@ def write_refocused(
     Raises
     ------
     SepiError
-        If the folder is a file, cannot be written or holds others' files of these names, or an animation cannot be
-        written with this Pillow.
+        If the folder is a file, cannot be written or holds other files of these names, or the installed Pillow cannot
+        write animations.
     """
     before = _earlier_files(folder / INDEX)
     names = stack_names(len(foci))
@@ -131,7 +130,7 @@ def write_refocused(
 
 
 def _levels(picture: FloatMap, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
-    """A picture (H, W, C) in 0..1 as PNG holds it: (H, W) if grey, of 8 bit for uint8, else of 16 bit."""
+    """Levels of an image (H, W, C) in 0..1 for a PNG: (H, W) if grey; 8 bit for uint8, else 16 bit."""
     held = np.uint8 if np.dtype(dtype) == np.uint8 else np.uint16
     levels = np.rint(picture.astype(np.float64) * full_scale(held)).astype(held)
     return levels[..., 0] if levels.shape[2] == 1 else levels
@@ -147,7 +146,7 @@ def _write_animation(path: Path, frames: Sequence[npt.NDArray[Any]]) -> None:
     from PIL import Image, features
 
     if not features.check("webp"):
-        raise SepiError(f"{path}: this Pillow was built without WebP, which the animation is written as")
+        raise SepiError(f"{path}: the installed Pillow has no WebP, which animations need")
     first, *more = (Image.fromarray(frame).convert("RGB") for frame in [*frames, *frames[-2:0:-1]])
     with atomic_path(path) as temporary:
         first.save(
@@ -156,8 +155,8 @@ def _write_animation(path: Path, frames: Sequence[npt.NDArray[Any]]) -> None:
 
 
 def _earlier_files(index: Path) -> list[str]:
-    """An index of this module and the pictures that it names; nothing without one."""
-    # a user's own file of this name is left alone, whatever it holds
+    """Names of an earlier index and of the images in it; empty if there is none."""
+    # a user's own file of this name stays, whatever it holds
     with suppress(OSError, UnicodeDecodeError, csv.Error):
         with index.open(encoding="ascii", newline="") as file:
             rows = list(csv.reader(file))

@@ -1,4 +1,4 @@
-"""The files of a result: their names, whose a folder is that one is to be written to, and whether maps are sound."""
+"""Files of a result: their names, and checks of the folder and of the maps before they are written."""
 
 from __future__ import annotations
 
@@ -18,49 +18,49 @@ from sepi.validation import require_type
 
 _MAPS = ("disparity.pfm", "disparity.npy", "disparity_16bit.png", "disparity.png", "confidence.png")
 RESULT_FILES = (*_MAPS, "points.ply", RESULT)
-"""What :func:`write_result` always writes; masks, depth and error bars come with what it is given."""
+"""Files that :func:`write_result` always writes; masks, depth and error bars depend on the maps."""
 
 RUNTIME = "runtime.txt"
-"""Seconds that it took, where that is told."""
+"""Run time in seconds, if it is given."""
 
 ALL_VIEWS = "all_views.h5"
 """Maps of all views, which the command writes on request (:mod:`sepi.io.all_views`)."""
 
 DEPTH = "depth.pfm"
-"""Depth in metres, where the camera is known."""
+"""Depth in metres, if the camera is known."""
 
 ERROR_FILES = SIGMA_PFM, SIGMA_PNG, INTERVAL = "sigma.pfm", "sigma.png", "interval.npz"
-"""Error bars, where the maps have any."""
+"""Error bars, if the maps have them."""
 
 DEPTH_SIGMA = "depth_sigma.pfm"
-"""Standard deviation of the depth in metres, where the camera is known, too."""
+"""Standard deviation of the depth in metres, if the camera is known and the maps have error bars."""
 
 AS_TAKEN = ("original_disparity", "original_depth", "original_sigma")
-"""Maps in the picture as a calibrated camera took it; those of other views than the result's end with ``_T_S``."""
+"""Maps at the pixels of the image as a calibrated camera took it; names end with ``_T_S`` for other views."""
 
 MASK_NAME = r"[\w-]+"
-"""Names of masks, as a regular expression."""
+"""Regular expression of the name of a mask."""
 
-# files that a message names
+# most files that a message names
 _LISTED = 3
 
 
 def require_own(folder: Path, light_field: LightField, *, force: bool = False) -> frozenset[str]:
-    """Raise unless a result of this light field may be written to ``folder``; what an earlier one wrote there.
+    """Names of the files that an earlier result of this light field wrote to ``folder``, if one may be written there.
 
     Raises
     ------
     SepiError
-        As :func:`require_target`; and unless ``force``, if the folder holds anything but an earlier result of this
-        light field, or beside it a file that would be taken for one of the result's.
+        As :func:`require_target`. Unless ``force``, also if the folder holds anything but an earlier result of this
+        light field, or a file with the name of a result's file that no result wrote.
     """
     require_target(folder)
     there = sorted(path.name for path in folder.iterdir() if path.name[0] != ".") if folder.is_dir() else []
     origin = None
-    # a damaged one is replaced as well
+    # force also replaces a damaged result
     with suppress(SepiError) if force else nullcontext():
         origin = read_origin(folder)
-    # who made the file may have had another file in mind than one of this folder
+    # a forged record must not name files outside this folder
     files = frozenset() if origin is None else frozenset(filter(is_results_name, origin.files or RESULT_FILES))
     others = [name for name in there if name not in files and (origin is None or is_results_name(name))]
     if force:
@@ -76,13 +76,13 @@ def require_own(folder: Path, light_field: LightField, *, force: bool = False) -
 
 
 def remove_result(folder: Path) -> None:
-    """Remove all that has the name of a file of a result, from a folder that is known to hold nothing else."""
+    """Remove all files with names of a result's files from a folder that is known to hold only these."""
     if folder.is_dir():
         remove_files(folder, [path.name for path in folder.iterdir() if is_results_name(path.name)])
 
 
 def require_target(folder: Path) -> None:
-    """Raise unless a folder of this name can be made or written to; for telling before a long computation.
+    """Raise unless this folder can be made or written to; a check before a long computation.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def require_target(folder: Path) -> None:
     existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
         raise SepiError(f"{folder}: cannot be written ({existing} is not a writable folder)")
-    # masks of the scene would be replaced by those of the result, which have the same names
+    # the result's masks would replace those of the scene, which have the same names
     if folder.is_dir() and any(folder.glob("input_Cam*.png")):
         raise SepiError(f"{folder}: holds the views of a light field; choose another folder for the result")
 
@@ -107,13 +107,13 @@ def is_results_name(name: str) -> bool:
 
 
 def names_as_taken(position: tuple[int, int] | None = None, *, with_sigma: bool = False) -> tuple[str, ...]:
-    """Names of the maps in the picture that a calibrated camera took, of a view's or the result's own."""
+    """Names of the maps in the image as a calibrated camera took it; default: of the result's own view."""
     names = AS_TAKEN if with_sigma else AS_TAKEN[:-1]
     return tuple("_".join([name, *map(str, position or ())]) + ".pfm" for name in names)
 
 
 def names_of_others(light_field: LightField, *, with_sigma: bool = False) -> tuple[str, ...]:
-    """Names of the maps as calibrated cameras took them of all views but the reference view; none without a rig."""
+    """The names of :func:`names_as_taken` for all views but the reference view; empty without a rig."""
     if light_field.camera is None or light_field.rig is None:
         return ()
     places = [(int(t), int(s)) for t, s in np.argwhere(light_field.present)]
@@ -122,19 +122,19 @@ def names_of_others(light_field: LightField, *, with_sigma: bool = False) -> tup
 
 
 UNKNOWN = "unknown"
-"""Mask that has a meaning in a result."""
+"""Mask of the pixels for whose depth no view has evidence."""
 
-# part of a disparity, and pixels per view step, by which float32 rounds what was counted in other view steps
+# rounding by float32, relative and in pixels per view step, of disparities converted from other view steps
 _ROUNDING = 1e-5
 
 
 def sound_maps(light_field: LightField, maps: StageMaps) -> StageMaps:
-    """Maps that can be written: disparity, confidence and error bars of float32 whatever numbers they were.
+    """Checked maps, with disparity, confidence and error bars as float32.
 
     Parameters
     ----------
     light_field : LightField
-        That they belong to.
+        The light field of the maps.
     maps : StageMaps
 
     Returns
@@ -144,8 +144,9 @@ def sound_maps(light_field: LightField, maps: StageMaps) -> StageMaps:
     Raises
     ------
     SepiError
-        If a map is not of the light field's shape or of numbers, the confidence not within 0..1, or error bars are no
-        such: some of the three missing, a standard deviation negative, an interval that does not hold the disparity.
+        If a map does not have the light field's shape or holds no numbers, the confidence leaves 0..1, or the error
+        bars are not valid: one of the three is missing, a standard deviation is negative, or an interval does not hold
+        the disparity.
     """
     name, numbers = light_field.name, ("disparity", "confidence", *ERROR_BARS)
     for key, values in maps.all().items():
@@ -169,12 +170,12 @@ def sound_maps(light_field: LightField, maps: StageMaps) -> StageMaps:
 
 
 def _require_error_bars(name: str, maps: StageMaps) -> None:
-    """Raise unless the maps have no error bars, or such as can be."""
+    """Raise if the maps have error bars that are not valid."""
     given = [key for key in ERROR_BARS if key in maps.extra]
     if not given:
         return
     if len(given) < len(ERROR_BARS):
-        raise SepiError(f"{name}: error bars are the maps sigma, low and high, got {' and '.join(given)} alone")
+        raise SepiError(f"{name}: error bars are the maps sigma, low and high, got only {' and '.join(given)}")
     sigma, low, high = (maps.extra[key].astype(np.float64) for key in (SIGMA, LOW, HIGH))
     told = np.isfinite(maps.disparity)
     bad = told & ~(np.isfinite(sigma) & (sigma >= 0))
@@ -185,7 +186,7 @@ def _require_error_bars(name: str, maps: StageMaps) -> None:
         raise SepiError(f"{name}: low must be no more than high, got {low[bad][0]:g} and {high[bad][0]:g}")
     disparity = maps.disparity.astype(np.float64)
     slack = _ROUNDING * (1 + np.abs(np.where(told, disparity, 0)))
-    # what no view knows has the whole range, and a disparity that may be any
+    # an unknown pixel has the whole range as its interval, and its disparity is a guess
     outside = told & ~maps.mask(UNKNOWN) & ~((low - slack <= disparity) & (disparity <= high + slack))
     if outside.any():
         y, x = np.argwhere(outside)[0]

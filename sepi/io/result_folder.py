@@ -1,4 +1,4 @@
-"""The folder of final maps: numbers for programs, pictures and points for people.
+"""The folder of a result: numbers for programs, images and points for people.
 
 docs/reference/outputs.md describes the files.
 """
@@ -40,7 +40,7 @@ _MASK_TEXT = {"Software": "sepi", "Description": "mask: 255 inside, 0 outside"}
 
 @dataclass(frozen=True)
 class Result:
-    """What ``result.h5`` holds of the view that the maps belong to.
+    """Maps of one view as ``result.h5`` holds them.
 
     Attributes
     ----------
@@ -51,15 +51,15 @@ class Result:
     disparity, confidence : ndarray, shape (H, W), float32
         Pixels per view step; 0..1.
     unknown : ndarray, shape (H, W), bool
-        Pixels that no view knows anything about; none in a result that does not say.
+        Pixels for whose depth no view has evidence; all False if the result does not record them.
     camera : Camera or None
-        Where it is known.
+        None if unknown.
     from_centre : (float, float)
         Baseline (down, across) from the grid's centre view to the view, in view steps.
     rig : Rig or None
-        Where the view stands in the world, at the rig's origin, if it was made from calibrated cameras.
+        Pose of the view in the world, at the rig's origin, if the cameras were calibrated.
     sigma : ndarray, shape (H, W), float32, or None
-        Standard deviation of the disparity, pixels per view step; None in a result that has no error bars.
+        Standard deviation of the disparity, pixels per view step; None without error bars.
     low, high : ndarray, shape (H, W), float32, or None
         Bounds of the interval that holds the disparity with a probability of 90 %.
 
@@ -101,35 +101,38 @@ def write_result(
 ) -> tuple[str, ...]:
     """Write the maps of a light field, as ``sepi depth`` does.
 
-    Disparity as ``disparity.pfm``, ``disparity.npy`` and ``disparity_16bit.png`` (numbers) and ``disparity.png``
-    (colours, from far, dark blue, to near, yellow; grey where the mask ``unknown`` is set), ``confidence.png`` from
-    black (0) to white (1), ``mask_NAME.png`` of each boolean map, ``points.ply`` without what is unknown, ``depth.pfm``
-    in metres where the light field has a camera, ``original_disparity.pfm`` and ``original_depth.pfm`` in the picture
-    as a calibrated camera took it, and ``result.h5`` with everything: all maps, the view itself, the camera, what made
-    the maps, and which light field they are of. Where the maps have error bars, ``sigma.pfm``, ``sigma.png`` and
-    ``interval.npz`` have them, ``depth_sigma.pfm`` those of the depth. docs/reference/outputs.md describes them.
-    Equal content gives equal bytes.
+    The files are:
 
-    A new folder appears whole or not at all; in an existing one the files are replaced when all are written, and what
-    an earlier result wrote and this one does not make (masks, depth, run time, maps of all views) is removed.
+    - ``disparity.pfm``, ``disparity.npy`` and ``disparity_16bit.png``: disparity as numbers;
+    - ``disparity.png``: in colours from far (dark blue) to near (yellow), grey where the mask ``unknown`` is set;
+    - ``confidence.png``, from black (0) to white (1), and ``mask_NAME.png`` for each boolean map;
+    - ``points.ply``, without unknown pixels;
+    - ``sigma.pfm``, ``sigma.png`` and ``interval.npz`` if the maps have error bars;
+    - ``depth.pfm`` and ``depth_sigma.pfm`` in metres if the light field has a camera;
+    - ``original_disparity.pfm``, ``original_depth.pfm`` and ``original_sigma.pfm``, at the pixels of the image as a
+      calibrated camera took it;
+    - ``result.h5``: all maps, the view, the camera, what made the maps, and their light field.
+
+    docs/reference/outputs.md describes them. Equal content gives equal bytes. A new folder appears whole or not at all.
+    In an existing folder, files are replaced once all are written, and other files of an earlier result are removed.
 
     Parameters
     ----------
     folder : str or Path
-        Made where it does not exist.
+        Made if missing.
     light_field : LightField
-        Where the maps come from.
+        The light field of the maps.
     maps : StageMaps
         Of the light field's shape.
     attributes : mapping, optional
-        More to be kept in ``result.h5``, or other values of what is kept there anyway.
+        More attributes for ``result.h5``; they override those written by default.
     force : bool
-        Write into a folder that holds files of others or the result of another light field, too. What has the name of a
-        file of the result is replaced, and all else of others left alone.
+        Also write into a folder that holds other files or the result of another light field. Files with the names of
+        the result's files are replaced, others stay.
     seconds : float, optional
-        How long it took, for ``runtime.txt``.
+        Run time, for ``runtime.txt``.
     beside : tuple of str
-        Names of files of a result that the caller writes on top of these.
+        Names of further files of the result that the caller writes.
 
     Returns
     -------
@@ -139,9 +142,8 @@ def write_result(
     Raises
     ------
     SepiError
-        If the maps are not of the light field's shape, the confidence not within 0..1, or an interval does not hold the
-        disparity; or if the folder is a file, holds the views of a light field, files of others or another light
-        field's result, or cannot be written.
+        If the maps are not valid (:func:`sepi.io.result_files.sound_maps`), or the folder is a file, holds the views of
+        a light field, other files or another light field's result, or cannot be written.
 
     Examples
     --------
@@ -185,7 +187,7 @@ def write_result(
 
 
 def read_result(path: str | Path) -> Result:
-    """Read back what a result says about its view.
+    """Read the maps of a result.
 
     Parameters
     ----------
@@ -199,7 +201,7 @@ def read_result(path: str | Path) -> Result:
     Raises
     ------
     SepiError
-        If there is none, or it is damaged.
+        If the result is missing or damaged.
 
     Examples
     --------
@@ -220,7 +222,7 @@ def read_result(path: str | Path) -> Result:
         picture, maps = hdf5.read_dataset(path, file["view"]), hdf5.float_maps(path, file)
         unknown = hdf5.read_dataset(path, file[UNKNOWN]) if UNKNOWN in file else np.zeros(maps["disparity"].shape)
         (t, s), (rows, columns) = (map(int, hdf5.attribute(file, name)) for name in ("view_position", "grid"))
-        # results of earlier versions: rows as far apart as columns, no view off the grid
+        # earlier versions had rows as far apart as columns, and all views on the grid
         told = hdf5.attribute(file, "from_centre") if "from_centre" in file.attrs else (t - rows // 2, s - columns // 2)
         down, across = map(float, told)
         scene = str(hdf5.attribute(file, "scene")) if "scene" in file.attrs else ""
@@ -252,9 +254,9 @@ def _write_files(
     given = [*([] if camera is None else [DEPTH]), *bars, *original, *([] if seconds is None else [RUNTIME])]
     names = (*RESULT_FILES[:-1], *given, *masks, RESULT)
     unknown, digest = maps.mask(UNKNOWN), attributes.get(DIGEST)
-    # pictures are packed outside Python's lock
+    # images are packed outside Python's lock
     with ThreadPoolExecutor(min(4, available_cores())) as pool:
-        # a digest of all views is among them unless it is known, which takes longest, but not Python's lock
+        # the digest of all views takes longest, and runs outside Python's lock
         told = pool.submit(result_attributes, light_field, maps, None if digest is None else str(digest))
         written = [
             pool.submit(map_pictures.write_16bit, folder / "disparity_16bit.png", maps.disparity),
@@ -262,7 +264,7 @@ def _write_files(
             pool.submit(_write_pictures, folder, maps, masks, unknown),
             pool.submit(_write_numbers, folder, light_field, maps, more.get("depth"), seconds),
         ]
-        # of these a later result is sure that they are not a user's own
+        # a later result may replace these files: they are not a user's own
         files = {"files": " ".join(sorted((*names, *beside)))}
         with hdf5.create_hdf5(folder / RESULT) as file:
             hdf5.put_maps(file, maps.updated(maps.disparity, maps.confidence, **more))
@@ -305,7 +307,7 @@ def write_as_taken(
     position: _View | None = None,
     sigma: FloatMap | None = None,
 ) -> bool:
-    """Write the maps of a view in the picture that its camera took; False where no calibrated camera did.
+    """Write the maps of a view at the pixels of the image as its calibrated camera took it; False without a rig.
 
     Parameters
     ----------
@@ -314,7 +316,7 @@ def write_as_taken(
     disparity : ndarray, shape (H, W), float32
         Of the view.
     position : (int, int), optional
-        Another view's in the grid than the reference view's.
+        Position of the view in the grid; default: the reference view.
     sigma : ndarray, shape (H, W), float32, optional
         Standard deviation of the disparity.
     """

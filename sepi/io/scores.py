@@ -1,13 +1,13 @@
-"""Score files, what the evaluation of a scene's disparity maps found, and external methods' maps with their scores.
+"""Score files of a scene's disparity maps, and files of external methods' maps with their scores.
 
-Layout of a score file: a group ``maps/NAME`` per map, in it ``scores``, JSON that leads from protocol and region to
-scores, the signed error map ``error (H, W)`` and the masks ``regions/NAME (H, W)``; the masks are the same for every
-map, and stored once. A map with error bars has ``reliability (3, 10)``, too. Where the scene has no ground truth the
-groups of the maps are empty, and the root attribute ``ground_truth`` is False.
+A score file has a group ``maps/NAME`` for each map. It holds ``scores``, JSON from protocol and region to scores, the
+signed error map ``error (H, W)``, and the masks ``regions/NAME (H, W)``, which all maps share and which are stored
+once. A map with error bars also has ``reliability (3, 10)``. If the scene has no ground truth, these groups are empty,
+and the root attribute ``ground_truth`` is False.
 
-Layout of a file of external maps: a group ``methods/NAME`` per method, in the order of the configuration, with the
-attributes ``source``, ``problem`` and ``sha256``. Where there is no problem it holds ``disparity (H, W)``, and what a
-score file holds if the scene has ground truth.
+A file of external maps has a group ``methods/NAME`` for each method, in the order of the configuration, with the
+attributes ``source``, ``problem`` and ``sha256``. If there is no problem it holds ``disparity (H, W)``, and the
+datasets of a score file if the scene has ground truth.
 """
 
 from __future__ import annotations
@@ -43,21 +43,21 @@ AllScores = dict[str, dict[str, Scores]]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Scores of one disparity map, its error, and where it was scored: see :func:`sepi.evaluate.evaluation_of`.
+    """Scores of one disparity map, its error, and the scored regions (:func:`sepi.evaluate.evaluation_of`).
 
     Attributes
     ----------
     scores : mapping
-        Protocol to region to scores; empty where there is no ground truth.
+        Protocol to region to scores; empty without ground truth.
     error : ndarray, shape (H, W), float32, or None
         Estimate minus ground truth in pixels per view step; NaN where either is unknown.
     regions : mapping of str to ndarray, shape (H, W), bool
-        The masks that the scores of a region were taken over.
+        Masks of the scored regions.
     region_sources : mapping of str to str
-        ``"scene"`` (the scene brought the mask) or ``"computed"`` (by :mod:`sepi.scoring.regions`).
+        ``"scene"`` (the mask comes with the scene) or ``"computed"`` (by :mod:`sepi.scoring.regions`).
     reliability : ndarray, shape (3, 10), or None
-        How right the confidence is, over the whole map (:class:`sepi.scoring.error_bars.Reliability`); None where the
-        map has no error bars.
+        Reliability of the confidence over the whole map (:class:`sepi.scoring.error_bars.Reliability`); None without
+        error bars.
 
     Examples
     --------
@@ -81,12 +81,12 @@ class Evaluation:
 
 
 def map_name(stages: Path, file: Path) -> str:
-    """Name of the map in a stage file: its folder within the folder of a scene's stage files.
+    """Name of the map in a stage file: its path below the folder of a scene's stage files.
 
     Raises
     ------
     SepiError
-        If it is not in that folder.
+        If the file is not below that folder.
     """
     if not file.parent.is_relative_to(stages):
         raise SepiError(f"{file}: not below {stages}, the folder of the stage files")
@@ -94,9 +94,9 @@ def map_name(stages: Path, file: Path) -> str:
 
 
 def write_scores(path: Path, maps: Mapping[str, Evaluation], attributes: Mapping[str, Attribute]) -> None:
-    """Write the evaluations of a scene's maps, by name, and the attributes of the scene.
+    """Write the evaluations of a scene's maps and the attributes of the scene; equal content gives equal bytes.
 
-    Equal content gives equal bytes. A name is a path such as ``"sepi/half_sepi"``.
+    The name of a map is a path such as ``"sepi/half_sepi"``.
     """
     with create_hdf5(path) as file:
         file.attrs["ground_truth"] = any(found.error is not None for found in maps.values())
@@ -104,7 +104,7 @@ def write_scores(path: Path, maps: Mapping[str, Evaluation], attributes: Mapping
         groups = file.create_group(_MAPS, track_order=True)
         shared: Mapping[str, h5py.Dataset] = {}
         for name, evaluation in maps.items():
-            # HDF5 would take a slash for a group of groups; no label of a choice has a colon
+            # a slash would make nested groups; no label of a choice has a colon
             group = groups.create_group(name.replace("/", ":"))
             own = {region: mask for region, mask in evaluation.regions.items() if region not in shared}
             put_evaluation(group, replace(evaluation, regions=own))
@@ -114,19 +114,19 @@ def write_scores(path: Path, maps: Mapping[str, Evaluation], attributes: Mapping
 
 
 def read_scores(path: Path, names: Collection[str] | None = None) -> dict[str, AllScores]:
-    """Map to protocol to region to scores, of these maps or of all; no protocols where there is no ground truth.
+    """Map to protocol to region to scores, for ``names`` or all maps; no protocols without ground truth.
 
     Raises
     ------
     SepiError
-        If the file is missing, not HDF5, not a score file, or has nothing of one of the maps.
+        If the file is missing, not a score file, or lacks one of the maps.
     """
     with open_hdf5(path, _KIND) as file:
         return {name: scores_in(group) for name, group in _groups(path, file, names).items()}
 
 
 def read_reliability(path: Path, names: Collection[str]) -> dict[str, npt.NDArray[np.float64]]:
-    """The reliability of those of these maps that have error bars.
+    """Reliability of those of these maps that have error bars.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def read_reliability(path: Path, names: Collection[str]) -> dict[str, npt.NDArra
 
 
 def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[str, Evaluation]:
-    """Everything that a score file holds of these maps, or of all.
+    """Evaluations of these maps, or of all maps in a score file.
 
     Raises
     ------
@@ -151,9 +151,9 @@ def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[s
 
 
 def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
-    """Write an evaluation into an empty group, or a file's root; once read and written again it is the same bytes."""
+    """Write an evaluation into an empty group or a file's root; reading and writing it again gives the same bytes."""
     if evaluation.scores:
-        # some thousand attributes in groups of their own would take seconds to read
+        # as JSON, since thousands of attributes in groups would take seconds to read
         text = json.dumps(evaluation.scores, sort_keys=True)
         put(group, _SCORES, np.frombuffer(text.encode(), np.uint8))
     if evaluation.error is not None:
@@ -165,7 +165,7 @@ def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
 
 
 def scores_in(group: h5py.Group) -> AllScores:
-    """The scores alone of what :func:`put_evaluation` wrote: protocol to region to scores."""
+    """Protocol to region to scores, as :func:`put_evaluation` wrote them."""
     if _SCORES not in group:
         return {}
     found = json.loads(read_dataset(Path(group.file.filename), group[_SCORES]).tobytes())
@@ -173,7 +173,7 @@ def scores_in(group: h5py.Group) -> AllScores:
 
 
 def evaluation_in(group: h5py.Group) -> Evaluation:
-    """What :func:`put_evaluation` wrote."""
+    """Evaluation that :func:`put_evaluation` wrote."""
     path = Path(group.file.filename)
     regions = members(group.get("regions", {}))
     return Evaluation(
@@ -186,7 +186,7 @@ def evaluation_in(group: h5py.Group) -> Evaluation:
 
 
 def without_nan(value: Any) -> Any:
-    """A value as JSON has it: None for a number that is none, such as a score over no pixels."""
+    """Value for JSON: None instead of NaN and infinity, such as a score over no pixels."""
     if isinstance(value, dict):
         return {key: without_nan(inner) for key, inner in value.items()}
     if isinstance(value, list):
@@ -207,7 +207,7 @@ _ATTRIBUTES = ("source", "problem", "sha256")
 
 
 class ExternalSource(BaseModel):
-    """Where the disparity maps of an external method lie, and what their values mean.
+    """Files of an external method's disparity maps, and the scale of their values.
 
     Attributes
     ----------
@@ -224,10 +224,10 @@ class ExternalSource(BaseModel):
     offset: float = 0.0
 
     def file(self, dataset: str, scene: str) -> Path:
-        """The map of a scene: the file that is there, or else the one that was expected."""
+        """File with the map of a scene: the one that exists, else the expected one."""
         path = Path(os.path.expanduser(self.path.replace("{dataset}", dataset).replace("{scene}", scene)))
         if "{scene}" in self.path:
-            # os.path: a folder that may not be entered has no maps, and is no error here
+            # os.path: a folder without permission has no maps, and is no error here
             return map_file(path) if os.path.isdir(path) else path
         try:
             names = sorted(os.listdir(path))
@@ -247,15 +247,15 @@ class ExternalMap:
     Attributes
     ----------
     source : str
-        Path of its file, also where there is none.
+        Path of its file, even if it is missing.
     problem : str
-        Why there is no map, in a few words for a cell of a table; empty where there is one.
+        Why there is no map, in a few words for the cell of a table; empty if there is one.
     sha256 : str
-        Digest of the file, 64 hexadecimal digits; empty where it could not be read.
+        Digest of the file, 64 hexadecimal digits; empty if it could not be read.
     disparity : ndarray, shape (H, W), float32, or None
-        Pixels per view step, NaN or infinite where unknown; None where there is a problem.
+        Pixels per view step, NaN or infinite where unknown; None if there is a problem.
     evaluation : Evaluation
-        Its scores; empty where there is a problem, or the scene has no ground truth.
+        Scores; empty if there is a problem, or the scene has no ground truth.
     """
 
     source: str
@@ -266,7 +266,7 @@ class ExternalMap:
 
 
 def write_external(path: Path, maps: Mapping[str, ExternalMap]) -> None:
-    """Write the maps of all methods, by name; equal content gives equal bytes."""
+    """Write the external maps of a scene, by method; equal content gives equal bytes."""
     with create_hdf5(path) as file:
         methods = file.create_group(_METHODS, track_order=True)
         for name, external in maps.items():
@@ -278,13 +278,13 @@ def write_external(path: Path, maps: Mapping[str, ExternalMap]) -> None:
 
 
 def read_external(path: Path, *, with_maps: bool = True) -> dict[str, ExternalMap]:
-    """Method to what :func:`write_external` wrote of it, in the same order.
+    """Method to its external map, in the order in which :func:`write_external` wrote them.
 
     Parameters
     ----------
     path : Path
     with_maps : bool
-        Whether to read disparity, errors and regions, too, rather than the scores alone.
+        False: read the scores alone, without disparity, errors and regions.
     """
     with open_hdf5(path, "file of external maps (written by python -m sepi.external)") as file:
         return {

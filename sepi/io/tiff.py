@@ -1,4 +1,4 @@
-"""Pictures in a TIFF, with their pixels as they are stored, whatever a camera's orientation says of them."""
+"""TIFF files: pages with their pixels as stored, whatever the orientation tag says, and maps of floats."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ if TYPE_CHECKING:
     from tifffile import TiffFile, TiffPage
 
 TIFF = (".tif", ".tiff")
-"""Ends of names, in small letters."""
+"""Suffixes of file names, in lower case."""
 
 TIFF_SIGNATURES = (b"II*\0", b"II+\0", b"MM\0*", b"MM\0+")
 """First bytes of a TIFF."""
 
-# none, LZW, deflate and PackBits, which unpack to no more than the tags say, and JPEG, which is looked at
+# none, LZW, deflate and PackBits, which unpack to no more than the tags say; the size of a JPEG is checked
 _COMPRESSIONS = (1, 5, 8, 32946, 32773, _JPEG := 7)
 _KINDS = ("u1", "u2", "i1", "i2", "f2", "f4")
 _WHITE_IS_ZERO, _PALETTE, _YCBCR = 0, 3, 6
 # pixels in a tile
 _LARGEST_TILE = 2**24
-# tags that say what the pixels are, but for those without which nothing is read
+# tags that change the meaning of the pixels, and whose absence tifffile does not notice
 _FORM_TAGS = frozenset((258, 259, 262, 317, 320, 338, 339))
 _SILENT = logging.NullHandler()
 
 
 def open_tiff(file: IO[bytes]) -> TiffFile:
-    """A file as tifffile reads it, without a word on the terminal."""
+    """File opened by tifffile, which then prints no warnings."""
     import tifffile
 
-    # what it complains of is raised here
+    # what it warns of is raised as an error here
     logging.getLogger("tifffile").addHandler(_SILENT)
     return tifffile.TiffFile(file)
 
 
 def tiff_form(page: Any, size: int) -> tuple[int, int, int, bool]:
-    """Height, width and bytes of a pixel of a page, and whether it is grey.
+    """Height and width of a page, bytes of a pixel, and whether it is grey.
 
     Parameters
     ----------
@@ -57,10 +57,10 @@ def tiff_form(page: Any, size: int) -> tuple[int, int, int, bool]:
     Raises
     ------
     SepiError
-        If the page is damaged, or of a form that would be decoded to other values than it holds.
+        If the page is damaged, or of a form that would not be decoded exactly.
     """
     if _FORM_TAGS & (directory_of(page)[0] - {tag.code for tag in page.tags}):
-        raise SepiError("damaged TIFF: what its pixels are is cut off")
+        raise SepiError("damaged TIFF: tags that describe its pixels are cut off")
     bits, samples, photometric, dtype = page.bitspersample, page.samplesperpixel, page.photometric, page.dtype
     if dtype is None or dtype.str[1:] not in _KINDS or bits != 8 * dtype.itemsize:
         form = {"f": " float", "i": " signed"}.get(dtype.kind if dtype is not None else "", "")
@@ -68,18 +68,18 @@ def tiff_form(page: Any, size: int) -> tuple[int, int, int, bool]:
     if samples not in (1, 3, 4):
         raise SepiError(f"a TIFF of {samples} samples a pixel; expected grey, RGB or RGBA")
     if page.compression not in _COMPRESSIONS or page.predictor not in (1, 2, 3):
-        raise SepiError("a TIFF that is packed in a rarer way; save it uncompressed")
+        raise SepiError("a TIFF of a rare compression; save it uncompressed")
     known = [1, 2, *[_WHITE_IS_ZERO] * (dtype.kind != "f"), *[_PALETTE] * (bits == 8 and samples == 1)]
     if photometric not in (*known, *[_YCBCR] * (page.compression == _JPEG)):
-        raise SepiError("a TIFF that is neither grey nor RGB; save it as one of these")
+        raise SepiError("a TIFF that is neither grey nor RGB; save it as grey or RGB")
     height, width, counts = page.imagelength, page.imagewidth, page.databytecounts
     if not all(isinstance(number, int) for number in (height, width, page.tilelength, page.tilewidth)):
-        # several of them: a product with one would be a list as long as the other says
+        # with several values, a product with another size would be a list of that length
         raise SepiError("damaged TIFF: its height and width are not one number each")
     if page.imagedepth != 1:
-        raise SepiError("a TIFF of a volume; save each of its pictures as one")
+        raise SepiError("a TIFF of a volume; save each of its slices as a TIFF")
     if 0 in counts or len(counts) < math.prod(page.chunked):
-        # a decoder would take what is missing for black
+        # a decoder would fill missing parts with black
         raise SepiError("damaged TIFF: parts of its pixels are missing")
     if max(start + count for start, count in zip(page.dataoffsets, counts, strict=True)) > size:
         raise SepiError(f"damaged TIFF: the file is cut off after {size} bytes")
@@ -91,7 +91,7 @@ def tiff_form(page: Any, size: int) -> tuple[int, int, int, bool]:
 
 
 def page_pixels(page: TiffPage) -> npt.NDArray[Any]:
-    """Pixels of a page of an open file, whose form was looked at.
+    """Pixels of a page of an open file whose form was checked.
 
     Returns
     -------
@@ -101,12 +101,12 @@ def page_pixels(page: TiffPage) -> npt.NDArray[Any]:
     Raises
     ------
     SepiError
-        If there are numbers below zero among integers.
+        If integers are negative.
     """
     if page.compression == _JPEG:
         _require_no_larger(page)
     stored = page.asarray(squeeze=False, maxworkers=1)
-    # planes, depth, height, width, samples: colours are either of the ends
+    # planes, depth, height, width, samples: colours are the first or the last axis
     values = np.moveaxis(stored[:, 0, :, :, 0], 0, 2) if len(stored) > 1 else stored[0, 0]
     if page.photometric == _PALETTE:
         values = (np.asarray(page.colormap).T[values[:, :, 0]] >> 8).astype(np.uint8)
@@ -116,13 +116,13 @@ def page_pixels(page: TiffPage) -> npt.NDArray[Any]:
         raise SepiError(f"a TIFF with a sign, and a pixel of {values.min()}; expected none below 0")
     values = values.astype(np.float32 if kind == "f" else f"u{size}")
     if page.photometric == _WHITE_IS_ZERO:
-        # of numbers with a sign, white is the largest of them
+        # for signed numbers, white is the largest of them
         values = np.iinfo(stored.dtype).max - values
     return np.ascontiguousarray(values)
 
 
 def directory_of(page: Any) -> tuple[set[int], bool]:
-    """Codes of the tags of a page, also of those that cannot be read, and whether no page follows it."""
+    """Codes of all tags of a page, even unreadable ones, and whether it is the last page."""
     form, file = page.parent.tiff, page.parent.filehandle
     file.seek(page.offset)
     (count,) = struct.unpack(form.tagnoformat, file.read(form.tagnosize))
@@ -132,7 +132,7 @@ def directory_of(page: Any) -> tuple[set[int], bool]:
 
 
 def _require_no_larger(page: Any) -> None:
-    """Raise where a JPEG in a page has more pixels than its place: the decoder would take memory for them."""
+    """Raise if a JPEG in a page has more pixels than its tile or strip; the decoder would take memory for them."""
     from PIL.JpegImagePlugin import JpegImageFile
 
     file = page.parent.filehandle
@@ -140,11 +140,11 @@ def _require_no_larger(page: Any) -> None:
         file.seek(start)
         with JpegImageFile(io.BytesIO(file.read(count))) as picture:
             if picture.width * picture.height > math.prod(page.chunks):
-                raise SepiError(f"damaged TIFF: a JPEG of {picture.width}x{picture.height} pixels in a part of it")
+                raise SepiError(f"damaged TIFF: a JPEG of {picture.width}x{picture.height} pixels is too large for it")
 
 
 def write_tiff(path: Path, values: FloatMap, comment: str) -> None:
-    """Write a TIFF of 32-bit floats, compressed without loss; equal content gives equal bytes.
+    """Write a TIFF of 32-bit floats, losslessly compressed; equal content gives equal bytes.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def write_tiff(path: Path, values: FloatMap, comment: str) -> None:
     values : ndarray, shape (H, W) or (H, W, 3), float32
         NaN and infinity stay.
     comment : str
-        What the numbers are; the picture's description.
+        Meaning and unit of the numbers; becomes the TIFF's description.
 
     Raises
     ------

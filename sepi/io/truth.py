@@ -1,7 +1,7 @@
-"""Ground truth apart from the views: what scores are made with, and no stage reads.
+"""Ground truth in a file apart from the views: only scores use it, no stage reads it.
 
-A truth file holds ``ground_truth (H, W) float32`` in pixels per view step and ``masks/NAME (H, W)``, both of the light
-field's reference view, as far as the scene has any.
+A truth file holds ``ground_truth (H, W) float32`` in pixels per view step and ``masks/NAME (H, W)`` of the light
+field's reference view, if the scene has them.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from sepi.lightfield import LightField, Truth
 
 
 def write_truth(path: Path, truth: Truth) -> None:
-    """Write what is known of a scene's reference view; equal content gives equal bytes."""
+    """Write the ground truth and masks of a scene; equal content gives equal bytes."""
     with create_hdf5(path) as file:
         put_truth(file, truth)
 
 
 def read_with_truth(light_field: Path, truth: Path | None) -> LightField:
-    """Read a light field and the ground truth that lies apart from it; without a file of that, its own.
+    """Light field with the ground truth from a truth file; without that file, with its own.
 
     Raises
     ------
     SepiError
-        If one of the files is missing or not what it should be, or they do not have the same size.
+        If a file is missing or of another kind, or they differ in size.
     """
     found = read_light_field(light_field)
     if truth is None:

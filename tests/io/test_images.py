@@ -407,9 +407,9 @@ def test_what_is_no_file(tmp_path: Path) -> None:
     (tmp_path / "gone.png").symlink_to(tmp_path / "nowhere.png")
     (tmp_path / "sparse.png").touch()
     os.truncate(tmp_path / "sparse.png", 2**33)
-    words = {"pipe": "no plain file", "folder": "cannot be read", "gone": "link to nothing", "sparse": "bytes"}
+    words = {"pipe": "cannot be read", "folder": "cannot be read", "gone": "cannot be read", "sparse": f"{2**33} bytes"}
     for name, word in words.items():
-        with pytest.raises(SepiError, match=rf"{name}\.png: .*{word}"):
+        with pytest.raises(SepiError, match=rf"{name}\.png: {word}"):
             read_picture(tmp_path / f"{name}.png")
 
 
