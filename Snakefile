@@ -1,13 +1,13 @@
 # Light field depth by stitched epipolar plane images: from light fields to the paper's tables.
 #
 #   snakemake all         tables, figures and maps of every configured dataset
-#   snakemake scenes      what is made of each scene, without the tables and the page that need all of them
+#   snakemake scenes      the files of each scene, without the tables and the page that need all scenes
 #   snakemake ablation    the paper's table 4, Wang's occlusion stage, noise uncorrected, and the parts of variant best
 #   snakemake comparison  the methods that the paper compares with, computed on the same scenes
 #   snakemake rendered    path-traced scenes in several levels of noise: rendered, computed, scored by property
 #   snakemake -- FILE     one file: results/DATASET/SCENE/VARIANT/disparity.pfm
 #
-# docs/reproduce/workflow.md explains targets and what makes a job run again, docs/reproduce/configure.md the configuration.
+# docs/reproduce/workflow.md explains targets and why jobs run again, docs/reproduce/configure.md the configuration.
 
 
 configfile: f"{workflow.current_basedir}/config.yaml"
@@ -30,7 +30,7 @@ include: "rules/report.smk"
 include: "rules/run.smk"
 
 
-# Tables and figures, and the maps of the most accurate variant, of the paper's, and of variants that the user added
+# Tables and figures, and the maps of variant best, of the paper's, and of the user's variants
 rule all:
     input:
         all_files(),
@@ -39,7 +39,7 @@ rule all:
         "all tables, figures and maps are made"
 
 
-# What `all` makes of every scene. Scenes do not depend on each other here, so `--batch scenes=1/10` plans a tenth of them
+# The files that `all` makes of every scene. Scenes are independent here, so `--batch scenes=1/10` plans a tenth of them
 rule scenes:
     input:
         [SCENE_COMPLETE.format(dataset=dataset, scene=scene) for dataset, scene in SETTINGS.scenes],
@@ -47,7 +47,7 @@ rule scenes:
         "all scenes are made"
 
 
-# Table 4, the ablation of variant best, and the maps of all their variants
+# Table 4, the ablation of variant best, and the maps of the variants in both
 rule ablation:
     input:
         ablation_files(),
@@ -56,7 +56,7 @@ rule ablation:
         "all ablations are made"
 
 
-# The compared methods on every scene: tables, page, pictures, and their maps
+# The compared methods on every scene: tables, page, images, and maps
 rule comparison:
     input:
         report_files(COMPARISON),
@@ -65,7 +65,7 @@ rule comparison:
         "all compared methods are computed"
 
 
-# The rendered scenes in every level of noise: tables by property, page and pictures
+# The rendered scenes in every level of noise: tables by property, page and images
 rule rendered:
     input:
         lambda wildcards: rendered_files(),

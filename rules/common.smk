@@ -1,4 +1,4 @@
-# Shared by all rules: the checked configuration, and the names, threads and memory derived from it.
+# Shared by all rules: the checked configuration, and the names, threads and memory that follow from it.
 
 import atexit
 import hashlib
@@ -23,20 +23,19 @@ from sepi.rendered import RENDERED
 from sepi.workflow.rendered_scenes import rendered_scene
 from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
 
-# the folder of the Snakefile, and whether that is a module of another workflow
+# the folder of the Snakefile, and whether another workflow uses it as a module
 FOLDER = os.path.dirname(str(workflow.current_basedir))
 IS_MODULE = FOLDER != workflow.basedir
-# where a module's `prefix` puts things, while the rules are read
+# puts a module's `prefix` before paths
 MODIFIER = workflow.modifier.path_modifier
 
-# what was read of the code by the start before
+# code digests cached by the previous start
 remember(Path(".snakemake").absolute())
 atexit.register(keep, Path(".snakemake").absolute())
 
-# jobs are run by the Python that runs Snakemake, whether or not its environment is activated, with the package whose code
-# the digests are made of; jobs of a workflow that has this one as a module keep their own. They end with Snakemake, whatever
-# ends it: what a job that nobody waits for goes on to write would meet the next run's. For this they take the place of
-# their shell (`exec`)
+# Jobs use the Python that runs Snakemake, even if its environment is not activated, and the package that the digests
+# describe; jobs of a workflow that uses this one as a module keep theirs. Jobs end with Snakemake, since later writes
+# would clash with the next run. For this they replace their shell (`exec`).
 PYTHON_PATH = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
 os.environ.update(
     {
@@ -49,13 +48,13 @@ os.environ.update(
 
 
 def command(words):
-    """The shell command that runs a module of the package; without plug-ins, which takes long to look for."""
+    """Shell command that runs a module of the package, without the slow search for plug-ins."""
     return f'PYTHONPATH="$SEPI_PYTHONPATH" PYDANTIC_DISABLE_PLUGINS=1 exec "$SEPI_PYTHON" -m {words}'
 
 
 try:
     SETTINGS = load_settings(config)
-    # Snakemake would wrap what is wrong with a name in a dozen lines
+    # Snakemake would report a wrong name in a dozen lines
     for word in () if IS_MODULE else sys.argv[1:]:
         SETTINGS.require_target(word)
 except SepiError as error:
@@ -69,7 +68,7 @@ SCENES_BY_DATASET = {name: SETTINGS.scenes_of(name) for name in SETTINGS.dataset
 
 
 def placed(path):
-    """Where a file or folder that the rules name is: the prefix of a module is put before it."""
+    """Path of a file or folder that the rules name, with the prefix of a module."""
     return MODIFIER.replace_prefix(f"{path}/").rstrip("/")
 
 
@@ -77,14 +76,14 @@ PLAN = Plan(RESULTS, SCENES_BY_DATASET, VARIANT_LABELS, list(SETTINGS.external),
 
 
 def as_far_as_computed(plan):
-    """The plan of a report without the scenes that are not computed, where the user asks for that."""
+    """Plan of a report, without scenes that are not computed if the user asks for that."""
     of_scenes = {pair: replace(plan, scenes={pair[0]: [pair[1]]}) for pair in plan.pairs if SETTINGS.report.partial}
     return plan.without(
         [pair for pair, one in of_scenes.items() if not all(map(os.path.exists, map(placed, one.number_inputs())))]
     )
 
 
-# report to its scenes and variants; the main one has no name, the others' files lie in folders of their names
+# name of a report to its plan; the main report has no name, the files of others lie in folders of their names
 REPORTS = {
     plan.report: as_far_as_computed(plan)
     for plan in (
@@ -100,25 +99,25 @@ REPORTS = {
 
 
 def own_file(path):
-    """A user's file as an input: it is where the user says, whatever the prefix of a module."""
+    """Path of a user's file as an input, without the prefix of a module."""
     return str(path) if placed(path) == str(path) else os.path.abspath(path)
 
 
 def source_file(name):
-    """A file of this workflow; of a module that lies elsewhere, Snakemake's copy, which each run may make anew."""
+    """Path of a file of this workflow; for a remote module, of Snakemake's copy, which each run may make anew."""
     path = os.path.normpath(os.path.join(FOLDER, name))
     return path if os.path.isfile(path) else ancient(workflow.source_path(f"../{name}"))
 
 
-# the Snakefile, what it includes, and what that reads
+# the Snakefile, the files that it includes, and the template that they read
 INCLUDED = re.findall(r'^include: "(.+)"$', Path(source_file("Snakefile")).read_text(), re.MULTILINE)
 PLAN_TEMPLATE = "rules/plan.json.j2"
 RULE_FILES = [source_file(name) for name in ["Snakefile", *INCLUDED, PLAN_TEMPLATE]]
 
 
-# the rules' patterns
+# patterns of a scene's files in rules
 SCENE = scene_files("{dataset}", "{scene}")
-# ... and what commands are told that find files by themselves
+# the same for commands that find files by themselves
 PLACED_SCENE = scene_files("{dataset}", "{scene}", Path(placed(RESULTS)))
 LABELS = {stage: f"{{{stage}}}" for stage in STAGES}
 
@@ -126,14 +125,14 @@ if not REPORTS[""].pairs:
     sys.exit("sepi: config.report.partial: no scene is computed yet")
 
 
-# a file that says that everything of a scene is made
+# marker file: all outputs of a scene are made
 SCENE_COMPLETE = f"{RESULTS}/{{dataset}}/{{scene}}/complete"
-# variants whose final maps everybody gets
+# variants whose final maps `all` makes
 LISTED_MAPS = ["best", "paper", *SETTINGS.own_variants]
 
 
-# a group of jobs that depend on each other is one submission to a cluster: all that is made of a scene. (Several small scenes
-# with --group-components; run locally, a group means nothing.)
+# On a cluster, a group of dependent jobs is one submission: all jobs of a scene, or of several small scenes with
+# --group-components. Locally, a group has no effect.
 GROUP = "scene"
 
 
@@ -146,7 +145,7 @@ wildcard_constraints:
 
 
 def stage_output(stage, ending):
-    """Pattern of what a stage writes: for every choice but the one that hands maps on, which is no job."""
+    """Pattern of a stage's output for every choice, except the one that hands maps on and has no job."""
     known = {name: "|".join(map(re.escape, found)) for name, found in SETTINGS.parameters.items()}
     known[stage] = "|".join(re.escape(label) for label in SETTINGS.parameters[stage] if label != HANDED_ON)
     return SCENE.stage({name: f"{{{name},{labels}}}" for name, labels in known.items()}, stage, ending)
@@ -158,7 +157,7 @@ def stage_log(folder, stage, ending):
 
 
 def stage_message(stage, title):
-    """What is shown when a stage starts: the scene, and the choices that led to it."""
+    """Message when a stage starts: the scene, and the choices up to this stage."""
     choices = key_of(LABELS, stage).replace("{", "{wildcards.")
     return f"{{wildcards.dataset}}/{{wildcards.scene}}: {title} ({choices})"
 
@@ -171,7 +170,7 @@ STAGE_FLAGS = (
 
 
 def file_before(stage):
-    """Function of wildcards: the file with the maps that a stage is given, of the last stage before it that ran."""
+    """Function of wildcards: the stage file that a stage reads, of the last stage that ran before it."""
     before = list(STAGES)[: list(STAGES).index(stage)]
 
     def file(wildcards):
@@ -182,13 +181,13 @@ def file_before(stage):
 
 
 def final_file(wildcards):
-    """The file with the final maps of a variant."""
+    """Stage file with the final maps of a variant."""
     require_known("variant", [wildcards.variant], SETTINGS.variants)
     return PLAN.stage_file(wildcards.dataset, wildcards.scene, wildcards.variant, PLAN.stages[-1])
 
 
 def result_files(variants, scenes=REPORTS[""].pairs):
-    """The final maps of scenes for these variants."""
+    """Files of the final maps of scenes for these variants."""
     return [
         str(PLAN.files(dataset, scene).variant(variant) / name)
         for dataset, scene in scenes
@@ -198,18 +197,18 @@ def result_files(variants, scenes=REPORTS[""].pairs):
 
 
 def plan_of(which):
-    """The plan of one of the files of numbers or scores, and whether it is that of the parts of variant best."""
+    """Plan of a file of numbers or scores, and whether the file is of the parts of variant best."""
     parts = which == PARTS_ENDING
     return REPORTS["" if parts else which.removeprefix("_")], parts
 
 
 def report_of(wildcards):
-    """The plan of the report in whose folder something lies."""
+    """Plan of the report that the wildcards name."""
     return REPORTS[wildcards.report.removesuffix("/")]
 
 
 def scored_maps(wildcards):
-    """The stage files whose maps go into one of a scene's score files."""
+    """Stage files whose maps go into a score file."""
     plan, parts = plan_of(wildcards.which)
     return plan.scored_files(wildcards.dataset, wildcards.scene, parts)
 
@@ -220,7 +219,7 @@ def choice_for(stage):
 
 
 def parameters_of(stage):
-    """Function of wildcards: the parameters of a stage's choice as JSON, so that a change of them is seen."""
+    """Function of wildcards: the parameters of a stage's choice as JSON; a change of them runs the job again."""
     known = {label: SETTINGS.parameters_json(stage, label) for label in SETTINGS.parameters[stage]}
     return lambda wildcards: known[wildcards[stage]]
 
@@ -231,17 +230,17 @@ def code_of(stage):
 
 
 def files_of(stage):
-    """Function of wildcards: files that a stage's choice reads beside the light field, such as a network."""
+    """Function of wildcards: further files that a stage's choice reads, such as a network."""
     return lambda wildcards: list(map(own_file, SETTINGS.parameters[stage][wildcards[stage]].files))
 
 
 def scene_of(wildcards):
-    """The scene that a rule's wildcards name."""
+    """Scene that a rule's wildcards name."""
     return SETTINGS.scene(wildcards.dataset, wildcards.scene)
 
 
 def source_files(kind):
-    """Function of wildcards: files of a scene's views (``files``) or of its ground truth (``truth``), as inputs."""
+    """Function of wildcards: files of a scene's views (``files``) or ground truth (``truth``), as inputs."""
 
     def files(wildcards):
         scene = scene_of(wildcards)
@@ -253,7 +252,7 @@ def source_files(kind):
 def dates_of(files):
     """Function of wildcards: a digest of sizes and dates of files that no job makes.
 
-    Snakemake sees newer files alone, and what comes by unzip, rsync -a, cp -p or tar keeps an old date.
+    Snakemake only notices newer files, and files from unzip, rsync -a, cp -p or tar keep an old date.
     """
 
     def digest(wildcards):
@@ -264,7 +263,7 @@ def dates_of(files):
 
 
 def ingest_source(wildcards):
-    """Where a scene comes from, as words for the ingest command."""
+    """Source of a scene, as arguments of the ingest command."""
     scene = scene_of(wildcards)
     if scene.source is None:
         return ["--builtin", scene.name, "--size", str(scene.height)]
@@ -274,7 +273,7 @@ def ingest_source(wildcards):
 
 
 def truth_source(wildcards):
-    """Where a scene's ground truth comes from, as words for its command; none where there is no ground truth."""
+    """Source of a scene's ground truth, as arguments of its command; empty without ground truth."""
     scene = scene_of(wildcards)
     if scene.is_rendered:
         return ["--rendered", placed(scene.source)]
@@ -282,12 +281,12 @@ def truth_source(wildcards):
 
 
 def own_truth_size(wildcards):
-    """The light field that ground truth of the user's own must have the size of; nothing without any."""
+    """Light field whose size the user's own ground truth must have; empty without own ground truth."""
     return scene_files(wildcards.dataset, wildcards.scene).light_field if scene_of(wildcards).own_truth else []
 
 
 def own_truth(wildcards):
-    """The user's own ground truth of a scene, as flags. Of a function of the input Snakemake would see no change."""
+    """The user's own ground truth as flags; as a function of the input, Snakemake would not notice a change."""
     own = scene_of(wildcards).own_truth
     if own is None:
         return []
@@ -295,25 +294,25 @@ def own_truth(wildcards):
     return ["--truth", str(own.path), *scale, "--light-field", placed(own_truth_size(wildcards))]
 
 
-# errors that the user asked to score
+# thresholds of BadPix that the user asked for
 BAD_THRESHOLDS = [word for threshold in SETTINGS.bad_thresholds for word in ("--bad", str(threshold))]
 
 
 def ingest_range(wildcards):
-    """The disparity range that the user set, as flags; none where the scene's own or an estimate serves."""
+    """Disparity range that the user set, as flags; empty for the scene's own or an estimate."""
     given = scene_of(wildcards).disparity_range
     return [] if given is None else ["--disparity-range", *map(str, given)]
 
 
 def threads_for(wildcards):
-    """Threads of a job: one for each 8 million samples, since small scenes gain more from jobs side by side."""
+    """Threads of a job: one for each 8 million samples, since small scenes gain more from parallel jobs."""
     return min(1 + scene_of(wildcards).samples // 8_000_000, 8)
 
 
 def stage_memory_for(stage, bytes_per_sample, bytes_per_pixel):
-    """Function of wildcards: memory of a stage's job in MB, as usual for the stage or as its choice needs.
+    """Function of wildcards: memory of a stage's job in MB, the stage's usual or what its choice needs.
 
-    More than the usual number of candidates adds to it.
+    Candidates beyond the usual number add to it.
     """
 
     def memory(wildcards, attempt):
@@ -326,9 +325,9 @@ def stage_memory_for(stage, bytes_per_sample, bytes_per_pixel):
 
 
 def stage_minutes_for(stage, seconds_per_megasample):
-    """Function of wildcards: time of a stage's job in minutes, as usual for the stage or as its choice needs.
+    """Function of wildcards: time of a stage's job in minutes, the stage's usual or what its choice needs.
 
-    A job that goes through more than the usual number of candidates takes longer.
+    Candidates beyond the usual number add to it.
     """
 
     def minutes(wildcards, attempt):
@@ -342,7 +341,7 @@ def stage_minutes_for(stage, seconds_per_megasample):
 def memory_for(*needs, **more):
     """Function of wildcards: memory of a job in MB (:meth:`sepi.workflow.datasets.Scene.memory_mb`).
 
-    A job that is tried again, since a cluster ended it for want of memory, asks for more.
+    A job that a cluster ended for lack of memory asks for more at the next attempt.
     """
 
     def memory(wildcards, attempt):
@@ -361,7 +360,7 @@ def minutes_for(*seconds, **more):
 
 
 def of_source(read, rendered):
-    """Function of wildcards: memory or time of a job that reads files, or what the renderer made, which is wider."""
+    """Function of wildcards: ``rendered`` for path-traced scenes, which have wider values, else ``read``."""
 
     def ask(wildcards, attempt):
         return (rendered if scene_of(wildcards).is_rendered else read)(wildcards, attempt)
@@ -370,6 +369,6 @@ def of_source(read, rendered):
 
 
 def sweep_of(stage, wildcards):
-    """A scene's light field, and the parameters of the choice that a stage makes of it."""
+    """File of a scene's light field, and the parameters of a stage's choice."""
     light_field = scene_files(wildcards.dataset, wildcards.scene, Path(placed(RESULTS))).light_field
     return light_field, SETTINGS.parameters[stage][wildcards[stage]]

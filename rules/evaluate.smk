@@ -1,6 +1,6 @@
-# Scores of a scene's disparity maps, after every stage of every variant (paper, section V): both protocols, all regions.
-# One job for a scene: the regions, which are found once for all its maps, take longer than the scores. A scene without ground
-# truth gets a score file that says so. The parts of variant best have a file of their own, as in the report.
+# Scores of a scene's disparity maps, after every stage of every variant (paper, section V): both protocols, all
+# regions. One job for a scene: regions take longer than scores, and are found once for all maps. A scene without
+# ground truth gets a score file that says so. The parts of variant best have a file of their own, as in the report.
 rule evaluate:
     input:
         light_field=SCENE.light_field,

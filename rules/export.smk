@@ -1,5 +1,5 @@
-# The final maps of a variant, in a folder of its own, as `sepi depth` writes them; masks, and depth in metres where the
-# camera is known, come beside the files that are named here.
+# The final maps of a variant in a folder, as `sepi depth` writes them. Masks, and depth in metres if the camera is
+# known, lie beside the files that are named here.
 
 
 rule export:

@@ -1,5 +1,5 @@
-# Disparity maps that external methods made of a scene (config key `external`), scored like ours. A file that is missing or
-# wrong stops nothing: its problem is in the output and in the log.
+# Disparity maps of a scene by external methods (config key `external`), scored like ours. A missing or wrong file
+# does not stop the run: its problem is in the output and in the log.
 
 
 rule external:

@@ -1,5 +1,5 @@
-# Light fields: any format in, one HDF5 file out (views, disparity range and where that came from).
-# A scene's pictures are the inputs: a changed or new one is read again.
+# Light fields: any format in, one HDF5 file out (views, disparity range and its source).
+# The inputs are the files of the views: a changed or new file is read again.
 rule ingest:
     input:
         files=source_files("files"),

@@ -1,4 +1,4 @@
-# Occluded regions (paper, section IV-B): depth from the views that see a pixel; none is no job.
+# Occluded regions (paper, section IV-B): depth from the views that see a pixel; choice `none` has no job.
 rule occlusion:
     input:
         light_field=SCENE.light_field,

@@ -1,4 +1,4 @@
-# Global optimisation (paper, section IV-D, Eq. 8-12) over the whole map; none is no job.
+# Global optimisation (paper, section IV-D, Eq. 8-12) over the whole map; choice `none` has no job.
 rule optimize:
     input:
         light_field=SCENE.light_field,

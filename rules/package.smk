@@ -1,5 +1,5 @@
-# The Python package whose commands the rules call: it must be installed where Snakemake runs, in this workflow's version. A
-# checkout brings its own; a module from elsewhere does not.
+# The Python package whose commands the rules call. It must be installed where Snakemake runs, in this workflow's
+# version; a checkout contains it, a workflow used as a module may not.
 
 import os
 import sys
@@ -7,19 +7,19 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
-# of the package that these rules are written for
+# version of the package that these rules need
 VERSION = "0.1.0"
 
 
 def package_problem(folder):
-    """What is wrong with the installed package for a workflow in this folder, in one line; empty where nothing is."""
+    """Problem of the installed package for a workflow in this folder, in one line; empty if there is none."""
     found = find_spec("sepi")
     if found is None:
         return f"the Python package is not installed where Snakemake runs; pip install sepi=={VERSION}"
     try:
         installed = version("sepi")
     except PackageNotFoundError:
-        # a bare source tree, whose version nobody knows
+        # a source tree that is not installed has no version
         return ""
     beside = found.origin is not None and Path(found.origin).parents[1] == Path(folder)
     if beside or installed == VERSION:
@@ -30,7 +30,7 @@ def package_problem(folder):
     )
 
 
-# a job of the workflow that looks at the rules is of a run that has asked this
+# jobs that read the rules belong to a run that has checked this
 if "SEPI_WORKFLOW_PROCESS" not in os.environ:
     PROBLEM = package_problem(os.path.dirname(str(workflow.current_basedir)))
     if PROBLEM:

@@ -1,4 +1,4 @@
-# Path-traced scenes (sepi.rendered): one file for each, of which ingest makes a light field for each level of noise.
+# Path-traced scenes (sepi.rendered): one file for each, from which ingest makes a light field for each level of noise.
 
 
 rule render:

@@ -1,8 +1,8 @@
-# Reports, below reports/: a page with everything, its numbers, tables, charts, and pictures of every scene.
+# Reports, below reports/: a page of everything, numbers, tables, charts, and images of every scene.
 
 
-# Which scenes and variants the numbers are of. With thousands of scenes this is too long for a command line, and
-# so for a rule with one
+# Scenes and variants of the numbers. For thousands of scenes they are too long for a command line, and so for a rule
+# with a shell command
 rule plan:
     input:
         source_file(PLAN_TEMPLATE),
@@ -12,7 +12,7 @@ rule plan:
         "logs/plan{which}.log",
     localrule: True
     params:
-        # functions: braces in names are no wildcards
+        # functions, so that braces in names are not wildcards
         text=lambda wildcards: plan_of(wildcards.which)[0].to_json(),
     message:
         "plan of the report"
@@ -20,8 +20,8 @@ rule plan:
         "jinja2"
 
 
-# Every number of the report in one file: scores, times, facts about the scenes, and the tables made of them. The numbers
-# of best's parts have a file of their own (report_parts), since `all` does not run those variants.
+# All numbers of the report in one file: scores, times, facts about the scenes, and the tables made of them. The parts
+# of variant best have a file of their own (report_parts), since `all` does not run those variants.
 rule numbers:
     input:
         plan="reports/page/plan{which}.json",
@@ -35,7 +35,7 @@ rule numbers:
         "benchmarks/report{which}.tsv"
     threads: 1
     resources:
-        # light fields are read one after the other
+        # light fields are read one by one
         mem_mb=lambda wildcards: 500 + max(scene.samples for scene in scenes_of(wildcards.which)) * 8 // 2**20,
         runtime=lambda wildcards: 5 + sum(scene.minutes(0.1) for scene in scenes_of(wildcards.which)) // 5,
     params:
@@ -51,7 +51,7 @@ rule numbers:
         )
 
 
-# The tables of each report, and those of the parts of variant best, whose numbers are a file of their own
+# Tables of each report, and of the parts of variant best, which have their own file of numbers
 for which in TABLES:
 
     rule:
@@ -81,7 +81,7 @@ for which in TABLES:
             command("sepi.report.tables --numbers {input:q} --output {params.folder:q} 2> {log:q}")
 
 
-# Charts of the numbers, for a paper
+# Charts of the numbers, in print quality
 rule charts:
     input:
         "reports/report.json",
@@ -138,8 +138,8 @@ rule parts_chart:
         command("sepi.report.charts --numbers {input:q} --chart ablation_best --output {params.folder:q} 2> {log:q}")
 
 
-# Pictures of a scene: reference view, ground truth, each stage and variant, errors, masks, external methods' maps, and all
-# on a sheet (overview); single pixels that the method is shown at work on (pixels); and the scene for the page.
+# Images of a scene: reference view, ground truth, each stage and variant, errors, masks, external methods' maps, and
+# all on a sheet (overview); the method at single pixels (pixels); and the scene for the page.
 rule maps:
     input:
         lambda wildcards: report_of(wildcards).map_inputs(wildcards.dataset, wildcards.scene),
@@ -178,7 +178,7 @@ rule maps:
         )
 
 
-# Everything that is made of a scene by itself, with an empty file to ask for
+# All outputs of a single scene, with an empty file as the target
 rule scene:
     input:
         pictures="reports/maps/{dataset}/{scene}",
@@ -195,7 +195,7 @@ rule scene:
         "{wildcards.dataset}/{wildcards.scene}: complete"
 
 
-# The rules themselves, as Snakemake draws them
+# Graph of the rules, as Snakemake draws it
 rule graph:
     input:
         snakefile=RULE_FILES[0],
@@ -220,7 +220,7 @@ rule graph:
         )
 
 
-# The page of a report: all numbers, tables and scenes in one file
+# Page of a report: all numbers, tables and scenes in one file
 rule page:
     input:
         numbers=lambda wildcards: f"reports/report{report_of(wildcards).ending()}.json",

@@ -1,4 +1,4 @@
-# What a run says at its end: what its jobs warned of, and what it wrote.
+# Messages at the end of a run: warnings of its jobs, and the files that it wrote.
 
 import shutil
 import time
@@ -15,13 +15,13 @@ def is_new(file):
 
 
 def print_warnings():
-    """Show what the readers of light fields, ground truth and external maps warned of in this run, from their logs."""
+    """Show the warnings that reading light fields, ground truth and external maps gave in this run, from the logs."""
     shown = set()
     for dataset, scene in (*SETTINGS.scenes, *SETTINGS.rendered_scenes):
         for kind in ("ingest", "truth", "external"):
             log = Path(placed(f"logs/{dataset}/{scene}/{kind}.log"))
             for line in log.read_text().splitlines() if is_new(log) else ():
-                # a method rarely has maps of all scenes: one line for each method
+                # methods often lack maps of some scenes: one line for each method
                 line = re.sub(r", scene .+: no such file$", ": no map of some scenes", line)
                 if line.startswith("sepi: warning:") and line not in shown:
                     shown.add(line)
@@ -29,7 +29,7 @@ def print_warnings():
 
 
 def print_written():
-    """Name the tables and figures, and the folders of final maps, that this run wrote."""
+    """Print the tables, figures and folders of final maps that this run wrote."""
     tables = filter(is_new, map(placed, every_file()))
     maps = (f"{os.path.dirname(file)}/" for file in map(placed, result_files(SETTINGS.variants)) if is_new(file))
     for title, files in {"Tables and figures": tables, "Maps": maps}.items():
@@ -42,14 +42,14 @@ def remove_leftovers():
     """Remove temporary files of jobs that were killed in an earlier run."""
     for folder in (RESULTS, "reports"):
         for path in filter(is_temporary, list(Path(placed(folder)).rglob(".*"))):
-            # within a temporary folder that is gone by now
+            # its temporary folder may be gone by now
             with suppress(FileNotFoundError):
                 if path.stat().st_mtime < STARTED:
                     remove_temporary(path)
 
 
 def run_ended_well():
-    """Tell of warnings and of what was made."""
+    """Print warnings and the files that were made."""
     remove_leftovers()
     print_warnings()
     if SETTINGS.report.page is None and not SETTINGS.has_page:
@@ -60,7 +60,7 @@ def run_ended_well():
 
 
 def run_failed():
-    """Tell that the disk is nearly full: a job may have failed of that, and found no room to say so."""
+    """Report an almost full disk: a job that failed of it may have had no room for its message."""
     free = shutil.disk_usage(".").free
     if free < 100_000_000:
         print(f"sepi: {os.getcwd()}: only {free / 1e6:.0f} MB are free on this disk", file=sys.stderr, flush=True)

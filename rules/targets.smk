@@ -1,4 +1,4 @@
-# What the pages, the tables and the pictures consist of, and what they are made of.
+# Files of pages, tables and images, and the inputs that they are made from.
 
 from importlib.util import find_spec
 
@@ -11,24 +11,24 @@ from sepi.workflow.result_paths import render_file
 RENDERING = SETTINGS.rendered
 
 PARTS = "reports/report_parts.json" if SETTINGS.report.parts_of_best else []
-# what ends the name of a file of numbers, to the folder and the tables that are made of it
+# ending of a file of numbers to the folder and the names of its tables
 TABLES = {plan.ending(): (f"reports/{name}".rstrip("/"), plan.tables()) for name, plan in REPORTS.items()}
 TABLES[PARTS_ENDING] = ("reports", PARTS_TABLES)
 
 
 def table_files(which):
-    """The tables of one of the files of numbers, each as CSV, Markdown and LaTeX."""
+    """Tables of a file of numbers, each as CSV, Markdown and LaTeX."""
     folder, tables = TABLES[which]
     return [f"{folder}/{table}.{ending}" for table in tables for ending in ("csv", "md", "tex")]
 
 
 def figure_files(names):
-    """Each of the charts as PNG and PDF."""
+    """Charts, each as PNG and PDF."""
     return [f"reports/figures/{name}.{ending}" for name in names for ending in ("png", "pdf")]
 
 
 def report_files(name=""):
-    """What lies in the folder of a report: page if there is one, numbers, tables, and pictures of every scene."""
+    """Files of a report: page if there is one, numbers, tables, and images of every scene."""
     plan = REPORTS[name]
     folder, _ = TABLES[plan.ending()]
     page = [f"{folder}/index.html"] if SETTINGS.has_page else []
@@ -37,92 +37,92 @@ def report_files(name=""):
 
 
 def all_files():
-    """The main report, its charts, and the parts of ``best`` if they are asked for."""
+    """Files of the main report, its charts, and the parts of ``best`` if the configuration asks for them."""
     charts = figure_files(["ablation", "time_and_memory", "error_bars"])
     return list(dict.fromkeys([*report_files(), *charts, *(ablation_files() if PARTS else [])]))
 
 
 def ablation_files():
-    """The paper's table 4, and the ablation of ``best``."""
+    """Files of the paper's table 4, and of the ablation of ``best``."""
     paper = [file for file in table_files("") if Path(file).stem == "table4_ablation"]
     return [*paper, *table_files(PARTS_ENDING), *figure_files(["ablation", "ablation_best"])]
 
 
 def every_file():
-    """All of every report."""
+    """All files of all reports."""
     return [*all_files(), *ablation_files(), *(file for name in REPORTS if name for file in report_files(name))]
 
 
 def measured_files(which):
-    """What one of the files of numbers is collected from."""
+    """Inputs of a file of numbers."""
     plan, parts = plan_of(which)
     return plan.number_inputs(parts)
 
 
 def scenes_of(which):
-    """The scenes of one of the files of numbers."""
+    """Scenes of a file of numbers."""
     return [SETTINGS.scene(*pair) for pair in plan_of(which)[0].pairs]
 
 
 def page_of_scene():
-    """What the page needs of a scene, as an output of the rule that draws its pictures; nothing without a page."""
+    """The page's file for a scene, as an output of the rule that draws its images; empty without a page."""
     return {"page": "reports/{report}page/{dataset}/{scene}.json"} if SETTINGS.has_page else {}
 
 
 def page_flags(wildcards, output):
-    """The page's part of a scene, as words for the command that draws its pictures."""
+    """The page's file for a scene, as flags of the command that draws its images."""
     return ["--page", output.page] if SETTINGS.has_page else []
 
 
 def pages_of_scenes(wildcards):
-    """What a page is made of, by scene."""
+    """Inputs of a page: a file for each scene."""
     return [
         f"reports/{wildcards.report}page/{dataset}/{scene}.json" for dataset, scene in report_of(wildcards).pictured
     ]
 
 
 def plan_of_scene(wildcards):
-    """A plan for one scene alone, so that another scene in the configuration does not redraw it."""
+    """Plan for one scene, so that a change of other scenes in the configuration does not redraw it."""
     return replace(report_of(wildcards), scenes={wildcards.dataset: [wildcards.scene]}).to_json()
 
 
 def pixels_of(wildcards):
-    """The pixels of a scene that the configuration asks for, as JSON."""
+    """Pixels of a scene that the configuration asks for, as JSON."""
     return json.dumps(SETTINGS.report.pixels.get(f"{wildcards.dataset}/{wildcards.scene}", []))
 
 
 def external_inputs(wildcards):
-    """The maps that are there: one that appears later is a new input, and the scene's maps are read again."""
+    """External maps that exist; a map that appears later is a new input, so the scene's maps are read again."""
     files = SETTINGS.external_files(wildcards.dataset, wildcards.scene)
     return [own_file(file) for file in files.values() if os.path.isfile(file) and os.access(file, os.R_OK)]
 
 
 def folder_of_output(wildcards, output):
-    """The folder that a job's files go into."""
+    """Folder of a job's outputs."""
     return os.path.dirname(output[0])
 
 
 def folder_of_scenes(wildcards, output):
-    """The folder beside a page that has a file for each of its scenes."""
+    """Folder beside a page with a file for each scene."""
     return os.path.join(os.path.dirname(output[0]), "page")
 
 
 def results_folder(wildcards):
-    """The folder that commands look for results in."""
+    """Folder in which commands look for results."""
     return placed(RESULTS)
 
 
 def without_renderer(wildcards):
-    """No input; where the renderer is missing, that is told before any job, rather than after hours of others."""
+    """No input; ends the run before any job if the renderer is missing."""
     if find_spec("mitsuba") is None and not os.path.exists(placed(render_file(wildcards.world))):
         sys.exit("sepi: rendered scenes need the package mitsuba: pip install 'sepi[render]'")
     return []
 
 
 def rendered_files():
-    """All that is made of the rendered scenes."""
+    """All files of the report on rendered scenes."""
     if not SETTINGS.rendered_scenes:
-        sys.exit("sepi: config.rendered.scenes names none; leave the key out for all")
+        sys.exit("sepi: config.rendered.scenes: names no scene; leave the key out for all scenes")
     return report_files(DATASET)
 
 

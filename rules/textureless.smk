@@ -1,4 +1,4 @@
-# Textureless regions (paper, section IV-C, Eq. 6-7): filled from their reliable edges; none is no job.
+# Textureless regions (paper, section IV-C, Eq. 6-7): filled from their reliable edges; choice `none` has no job.
 rule textureless:
     input:
         light_field=SCENE.light_field,

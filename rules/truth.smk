@@ -1,5 +1,5 @@
-# Ground truth and masks of a scene, which only scores are made with: a new or changed one asks for no map. A scene without any
-# gets a file that says so.
+# Ground truth and masks of a scene. Only scores use them, so a change makes no map anew. A scene without ground truth
+# gets a file without data.
 rule truth:
     input:
         files=source_files("truth"),
