@@ -40,11 +40,11 @@ CANDIDATES = CandidateRule(usual=181, finest=0.02, coarsest=0.5)
 """The paper's number, for light fields like the paper's."""
 
 TILE_WIDTH = 128
-"""Columns done at a time: bounds what a thread holds, whatever the width of the picture, and keeps it in the cache."""
+"""Columns computed at a time, which bounds the memory of a thread for any image width, and keeps it in the cache."""
 
 NOISE_LEFT_OUT = 0.9
-"""Of the cost that noise alone makes, what confidence leaves out, at most: with all of it, where there is nothing but
-noise the ratio of Eq. 5 would be one of two nothings."""
+"""Largest share of the cost of noise alone that confidence leaves out: with all of it, Eq. 5 would be 0 / 0 in pure
+noise."""
 
 
 class SweepParameters(CandidateParameters):
@@ -87,7 +87,7 @@ class SweepParameters(CandidateParameters):
         return views + busy * self.thread_bytes(self.number(light_field), width)
 
     def thread_bytes(self, number: int, width: int) -> int:
-        """Bytes that a thread of :func:`sweep` holds, by number of candidates and picture width.
+        """Bytes that a thread of :func:`sweep` holds, by number of candidates and image width.
 
         It holds, for every candidate and group, the costs and the numbers of samples in the rows of a window, and
         their sums over the windows of a block of pixels.
@@ -160,7 +160,7 @@ def sweep(
     subsets : ndarray, shape (N, G), bool, optional
         Which groups make up each subset. Default: each group by itself.
     mask : ndarray, shape (H, W), bool, optional
-        Pixels to be done. Default: all.
+        Pixels to compute. Default: all.
     progress : callable, optional
 
     Returns

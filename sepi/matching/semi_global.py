@@ -35,15 +35,15 @@ HALF_CONFIDENT = 0.05
 """Margin of cost at which the confidence is one half."""
 
 ENOUGH_VIEWS = 25
-"""Views from which on more make a mean cost no surer: what errs in it then errs in all of them."""
+"""Number of views beyond which a mean cost does not improve: its remaining errors are common to all views."""
 
 BAND_BYTES = 2**24
-"""Of both volumes, in the rows that all paths go through before any goes on: they stay in the cache of all threads."""
+"""Bytes of both volumes in a band of rows; all paths finish a band before the next, so that it stays in the cache."""
 
 ROWS_AT_ONCE = 64
 """Rows of costs that are averaged together."""
 
-# times the radius of the window, where there are few
+# largest factor of the window's radius, for few views
 _MOST_WIDENED = 2
 
 SmallPenalty = Annotated[
@@ -112,16 +112,16 @@ class SmoothedResult:
 
 
 class Places(NamedTuple):
-    """Where in a volume the costs of each pixel's candidates are: side by side, as many as fill vectors.
+    """Places in a volume of the costs of each pixel's candidates, which lie side by side and fill whole vectors.
 
     Attributes
     ----------
     first, beyond : ndarray, shape (H, W), int32
-        The first candidate of a pixel, and the one after its last.
+        First candidate of a pixel, and the one after its last.
     origin : ndarray, shape (H, W), int64
-        Where its candidate 0 is, or would be.
+        Index of its candidate 0, even if it has none.
     candidates : int
-        Of a pixel that has all.
+        Number of all candidates.
     """
 
     first: npt.NDArray[np.int32]
@@ -131,7 +131,7 @@ class Places(NamedTuple):
 
     @classmethod
     def of_candidates(cls, first: npt.NDArray[np.int32], last: npt.NDArray[np.int32], candidates: int) -> Places:
-        """Places of the candidates from the first to the last of each pixel, (H, W), at least, of so many in all."""
+        """Places of at least the candidates ``first`` to ``last``, (H, W), of each pixel."""
         step = kernels.AT_ONCE
         begin, beyond, count = first // step * step, (last // step + 1) * step, -(-candidates // step) * step
         number = beyond - begin
@@ -139,12 +139,12 @@ class Places(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Costs in the volume."""
+        """Number of costs in the volume."""
         return int((self.beyond - self.first).sum())
 
 
 class CostVolumes:
-    """Memory for averaged and for smoothed costs, which the next sweep reuses: to fill new memory takes longer."""
+    """Memory for averaged and for smoothed costs, which the next sweep reuses, since new memory is slower."""
 
     def __init__(self) -> None:
         self._rooms = np.empty((2, 0), np.uint16)
@@ -152,7 +152,7 @@ class CostVolumes:
     def averaged_and_smoothed(self, size: int) -> npt.NDArray[np.uint16]:
         """Room for ``size`` averaged costs and for as many smoothed ones, (2, size)."""
         if size > self._rooms.shape[1]:
-            # not beside the old one
+            # free the old memory first
             del self._rooms
             self._rooms = np.empty((2, size), np.uint16)
         return self._rooms[:, :size]
@@ -173,7 +173,7 @@ class AveragedCosts:
         window's colour weights.
     parameters : SmoothingParameters
     likely : ndarray, shape (2, H, W), int32, optional
-        The first and the last candidate of each pixel that matter; all unless given. Others cost 1.
+        First and last candidate of each pixel that are used; default: all. Others cost 1.
     """
 
     def __init__(
@@ -195,13 +195,13 @@ class AveragedCosts:
         self._variance = parameters.window_sigma**2 + contrast
         self._averaged, self._smoothed = volumes.averaged_and_smoothed(self._places.size)
         rows = min(self._height, ROWS_AT_ONCE) + 2 * parameters.window_radius
-        # where there are none yet, nothing that is not finite
+        # zeros, so that costs not yet set are finite
         self._costs = np.zeros((len(disparities), rows, width), np.float32)
-        # rows of the picture: the first that there are costs of, the first without, the first that is not averaged
+        # rows of the view: the first with costs, the first without, the first that is not averaged
         self._top = self._next = self._done = 0
 
     def room(self, rows: int) -> FloatMap:
-        """Where costs of the next rows belong, at most :data:`ROWS_AT_ONCE`; shape (K, rows, W), 0..1."""
+        """Array for the costs of the next rows, at most :data:`ROWS_AT_ONCE`; shape (K, rows, W), 0..1."""
         first = self._next - self._top
         return self._costs[:, first : first + rows]
 

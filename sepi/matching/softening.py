@@ -1,10 +1,10 @@
-"""Views as matching compares them: denoised, and soft where their texture is too sharp to be interpolated.
+"""Views for matching: denoised, and slightly blurred where texture is too sharp for interpolation.
 
-Matching interpolates between the pixels of a view, and interpolation loses frequencies above about 0.3 cycles a pixel.
-Renderings, print and pictures that were made smaller have them. Their views then differ at the true disparity by more
-than the robust scale tolerates, and a disparity wins at which views fall on whole pixels. A slight blur of all views
-removes what interpolation loses. It would cost detail elsewhere, so only dense texture of such frequencies is blurred;
-a single edge stays sharp.
+Matching interpolates between the pixels of a view, and interpolation loses frequencies above about 0.3 cycles per
+pixel. Renderings, prints and downscaled images have such frequencies. Their views differ at the true disparity by more
+than the robust scale tolerates, and a disparity that needs no interpolation wins instead. A slight blur of all views
+removes these frequencies. It costs detail, so only dense texture of such frequencies is blurred; single edges stay
+sharp.
 """
 
 from __future__ import annotations
@@ -25,24 +25,25 @@ from sepi.threads import threads_used
 from sepi.workspace import OfViews, kept_of
 
 SHARP, SHARPEST = 0.295, 0.32
-"""Sharpness from which texture is blurred a little, and wholly. Dots averaged over each pixel have 0.33; most texture
-that a lens made soft has 0.2 to 0.27."""
+"""Sharpness at which the blur begins, and at which it is complete. Dots averaged over each pixel have 0.33; most
+texture through a lens has 0.2 to 0.27."""
 
 LEAST_SHARE = 0.1
-"""Of the reference view that is too sharp, below which no view is blurred."""
+"""Share of the reference view that must be too sharp; below it, no view is blurred."""
 
 _WINDOW = 2.5
 _DENSE = 21
-"""Pixels: width of the Gaussian over which frequencies are told, and of the window of which all must be sharp."""
+"""Standard deviation of the Gaussian over which frequencies are measured, and width of the window over which sharpness
+is averaged; pixels."""
 
 _NOISE = 3.0
-"""Times the noise's own energy that a texture's must exceed."""
+"""Factor of the noise's energy that is subtracted from second differences."""
 
 _OF_GREY = 0.67
-"""Of the noise of a channel, that of OpenCV's grey. Views of one channel count as three equal ones."""
+"""Noise of OpenCV's grey, relative to that of a channel. A single channel counts as three equal ones."""
 
 _LEAST_CONTRAST = 3e-3
-"""Of differences of neighbours that counts as texture; colours in 0..1."""
+"""Least difference of neighbours that counts as texture; colours in 0..1."""
 
 
 Softening = Annotated[
@@ -52,7 +53,7 @@ Softening = Annotated[
 
 
 class SofteningParameters(DenoisingParameters):
-    """Parameters of the views that are compared."""
+    """Parameters of the views for matching."""
 
     softening: Softening = 0.7
 
@@ -66,7 +67,7 @@ class _Kept(OfViews):
 
 
 def compared_views(light_field: LightField, parameters: SofteningParameters, least_noise: float = 0.0) -> LightField:
-    """The light field with denoised views where they are noisy, soft where they are too sharp.
+    """Light field with views denoised where they are noisy, and blurred where they are too sharp.
 
     Parameters
     ----------
@@ -79,8 +80,8 @@ def compared_views(light_field: LightField, parameters: SofteningParameters, lea
     Returns
     -------
     LightField
-        A :class:`sepi.matching.denoising.DenoisedLightField` if there is noise; the light field itself if there is
-        neither.
+        A :class:`sepi.matching.denoising.DenoisedLightField` if there is noise; the light field itself if nothing
+        changes.
 
     Raises
     ------
@@ -92,20 +93,20 @@ def compared_views(light_field: LightField, parameters: SofteningParameters, lea
 
 
 def softened(light_field: LightField, blur: float, noise: ViewNoise | None = None) -> LightField:
-    """The light field with views that are soft where they are too sharp.
+    """Light field with views blurred where they are too sharp.
 
     Parameters
     ----------
     light_field : LightField
     blur : float
-        Pixels; 0 keeps all sharp.
+        Standard deviation of the Gaussian, pixels; 0 changes nothing.
     noise : ViewNoise, optional
-        That of these views unless given.
+        Noise of the views; default: measured.
 
     Returns
     -------
     LightField
-        Of the same kind; itself if hardly any place is too sharp.
+        Of the same class; the light field itself if hardly any place is too sharp.
     """
     if blur == 0:
         return light_field
@@ -117,14 +118,14 @@ def softened(light_field: LightField, blur: float, noise: ViewNoise | None = Non
 
 
 def sharpness(picture: FloatMap, variance: FloatMap) -> FloatMap:
-    """Share of second differences in the differences of neighbours, over dense texture.
+    """Sharpness: share of second differences in the sum of first and second differences, averaged over a window.
 
     Parameters
     ----------
     picture : ndarray, shape (H, W), float32
         Grey, 0..1.
     variance : ndarray, shape (H, W), float32
-        Of its noise.
+        Variance of its noise.
 
     Returns
     -------
@@ -147,12 +148,12 @@ def sharpness(picture: FloatMap, variance: FloatMap) -> FloatMap:
 
 
 def _softened_views(light_field: LightField, noise: ViewNoise, blur: float) -> npt.NDArray[Any] | None:
-    """The views, blurred where they are too sharp; None if hardly any place is."""
+    """Views blurred where they are too sharp; None if hardly any place is."""
     views = light_field.views
     if light_field.missing is not None:
-        # what a view does not show is black, and would be blurred into what it shows
+        # pixels that a view does not show are black; a blur would mix them into their neighbours
         return None
-    # views are as bright as the reference view within the window
+    # within the window, views are as bright as the reference view
     variance = (_OF_GREY**2 * expected_variance(light_field, noise)).astype(np.float32)
     if np.mean(_too_sharp(views[light_field.reference_position], variance) > 0) < LEAST_SHARE:
         return None
@@ -171,6 +172,6 @@ def _softened_views(light_field: LightField, noise: ViewNoise, blur: float) -> n
 
 
 def _too_sharp(view: npt.NDArray[Any], variance: FloatMap) -> FloatMap:
-    """How far each pixel of a view (H, W, C) is too sharp, 0..1."""
+    """Degree to which each pixel of a view (H, W, C) is too sharp, 0..1."""
     grey = as_unit_float(cv2.cvtColor(view, cv2.COLOR_RGB2GRAY) if view.shape[2] == 3 else view[..., 0])
     return np.asarray(np.clip((sharpness(grey, variance) - SHARP) / (SHARPEST - SHARP), 0, 1), np.float32)
