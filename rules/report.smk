@@ -169,7 +169,7 @@ rule maps:
         page=page_flags,
         code=lambda wildcards: code_digest("sepi.report.figures"),
     message:
-        "{wildcards.dataset}/{wildcards.scene}: pictures"
+        "{wildcards.dataset}/{wildcards.scene}: images"
     shell:
         command(
             "sepi.report.figures --results {params.results:q} --plan {params.plan:q} "

@@ -1,27 +1,28 @@
 """Digest of the code behind a command, so that the workflow reruns a stage when its code changes.
 
 Snakemake sees the shell command of a rule, not the modules that the command imports. Each rule therefore has
-``params: code=code_digest("sepi.MODULE")``. What counts:
+``params: code=code_digest("sepi.MODULE")``. The digest covers:
 
-- the module itself and every module of this package that it imports, directly or through others, wherever the import
-  stands;
-- not what stands below ``if __name__ == "__main__":``. For a stage that is the command, which parses flags and shows
-  progress: it cannot change the maps. What writes them to a file can: :func:`stage_modules` adds it;
-- not what stands below ``if TYPE_CHECKING:``, which never runs;
-- not the ``__init__`` of a package on the way to a module: it is run, but nothing of it is used. It counts where a name
-  is imported from the package itself;
-- not the readers of the formats, the built-in and the rendered scenes, of which a job runs one: only that counts, which
-  :func:`ingest_modules` names;
-- not what is told of the rendered scenes, since to render them takes long;
-- the syntax tree without docstrings, texts of help and descriptions of parameters: neither these nor comments nor
+- the module and all modules of this package that it imports, directly or through others, anywhere in the code;
+- the syntax tree, without docstrings, help texts and descriptions of parameters, so that neither these nor comments and
   layout count, and every version of Python gives the same digest;
-- of kernels, the source of each that it imports and the headers which that includes, without comments and layout;
-- not other libraries: a new version of numpy reruns nothing.
+- the source of each kernel that it imports and the headers that this includes, without comments and layout.
 
-No stage imports another stage, so a change in one leaves the others' digests as they are.
+It does not cover:
 
-Reading all of the code takes most of a second, a fifth of a start of Snakemake. So what each source comes to is cached
-in Snakemake's own folder, keyed by the source itself: a changed one is read, whatever its time stamp.
+- code below ``if __name__ == "__main__":``. In a stage that is the command, which parses flags and shows progress, and
+  cannot change the maps. :func:`stage_modules` adds the module that writes them;
+- code below ``if TYPE_CHECKING:``, which never runs;
+- the ``__init__`` of a package on the way to a module, unless a name is imported from the package itself;
+- the format readers and the built-in and rendered scenes, of which a job runs only one, which :func:`ingest_modules`
+  names;
+- descriptions of the rendered scenes, since rendering takes long;
+- other libraries: a new version of NumPy reruns nothing.
+
+No stage imports another stage, so a change in one does not change the digests of others.
+
+Reading all code takes most of a second, a fifth of a start of Snakemake. The result for each source is cached in
+Snakemake's folder, keyed by the content of the source, so a change is noticed whatever the time stamp.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[2]
 
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-# blocks of a module that are not run when it is imported
+# blocks of a module that do not run when it is imported
 _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
 
 
@@ -73,47 +74,45 @@ _ALTERNATIVES = (
     ),
 )
 _HEADER = ".hpp"
-# what is told to people alone: words of calls, and what the rendered scenes are
+# arguments of calls that are texts for people: help, and descriptions of the rendered scenes
 _TOLD = ("help", "description")
 _TELLING = "rendered.catalogue"
 
-# what a source comes to: a digest of its code; level, module and names of what it imports, as they stand in it
+# result for a source: digest of its code; level, module and names of its imports, as written
 _Code = tuple[str, list[tuple[int, str, list[str]]]]
 
-# in Snakemake's folder
+# cache file in Snakemake's folder
 _KEPT = "sepi_code.json"
-# what is read by other code than this one may come to something else
+# another version of this module may give other results
 _OWN = Path(__file__).read_bytes()
-# key of a source to what it comes to: of the start before, and of this one
+# key of a source to its result, from the previous start and from this one
 _before: dict[str, _Code] = {}
 _read: dict[str, _Code] = {}
 
 
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
-    """Modules that decide, with what they import, what is in a stage's file: the stage, the module of the choice that
-    it runs, what is done to the views before, and the format of the file.
-    """
+    """Modules whose code, with imports, determines a stage's file: stage, choice, preparation of views, file format."""
     return (f"sepi.{stage}", choice.function.__module__, "sepi.exposure", "sepi.io.hdf5", "sepi.io.provenance")
 
 
 def ingest_modules(reader: str) -> tuple[str, ...]:
-    """Modules that decide what is in a light field's file: ingest, and the module that reads or renders the views."""
+    """Modules that determine a light field's file: ingest, and the module that reads or renders the views."""
     return ("sepi.ingest", reader)
 
 
 def render_modules(world: str) -> tuple[str, ...]:
-    """Modules that decide what is in the file of a rendered scene: the renderer, and the module of that scene."""
+    """Modules that determine the file of a rendered scene: the renderer, and the module of the scene."""
     return ("sepi.rendered.rendering", f"sepi.rendered.worlds.{world}")
 
 
 @cache
 def code_digest(*modules: str, root: Path = ROOT) -> str:
-    """Digest of modules and of all that they import from their own package.
+    """Digest of modules and of all modules that they import from their own package.
 
     Parameters
     ----------
     *modules : str
-        Dotted names, ``"sepi.initial"``.
+        Dotted names, such as ``"sepi.initial"``.
     root : Path
         Folder that holds the package.
 
@@ -134,7 +133,7 @@ def code_digest(*modules: str, root: Path = ROOT) -> str:
 
 
 def imported_modules(*modules: str, root: Path = ROOT) -> set[str]:
-    """The modules and those of their package that they import, directly or through others; dotted names."""
+    """Dotted names of modules and of those of their package that they import, directly or through others."""
     found: set[str] = set()
     waiting = list(modules)
     while waiting:
@@ -157,14 +156,14 @@ def _file_of(module: str, root: Path) -> Path | None:
     folder = root.joinpath(*above)
     if module.endswith(_HEADER):
         return folder / f"{name}{_HEADER}"
-    # kernels stand beside what calls them, and are imported from one place
+    # kernels lie beside their callers, and are imported from one package
     kernels = folder.parent.glob(f"*/kernels/{name}.cpp") if folder.name == "kernels" else ()
     return next(filter(Path.is_file, (folder / f"{name}.py", folder / name / "__init__.py", *kernels)), None)
 
 
 @cache
 def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
-    """A digest of the code of a module, and the modules of its package that it imports."""
+    """Digest of a module's code, and the modules of its package that it imports."""
     file = _file_of(module, root)
     if file is None:
         raise ModuleNotFoundError(f"no module {module} in {root}")
@@ -181,14 +180,14 @@ def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
 
 
 def _kernel_code(source: bytes) -> _Code:
-    """Of a C++ source without comments and layout, and the headers of the project that it includes."""
+    """Digest of a C++ source without comments and layout, and the headers of this package that it includes."""
     text = re.sub(r"//[^\n]*|/\*.*?\*/", " ", source.decode(), flags=re.DOTALL)
     headers = re.findall(r'^#include "(.+)\.hpp"', text, re.MULTILINE)
     return hashlib.sha256(" ".join(text.split()).encode()).hexdigest(), [(0, name, []) for name in headers]
 
 
 def _python_code(source: bytes) -> _Code:
-    """Of the syntax tree of a source without docstrings, and what its statements import."""
+    """Digest of a source's syntax tree without docstrings, and its imports."""
     tree = ast.parse(source)
     tree.body = [node for node in tree.body if not (isinstance(node, ast.If) and ast.unparse(node.test) in _NOT_RUN)]
     named: list[tuple[int, str, list[str]]] = []
@@ -197,9 +196,9 @@ def _python_code(source: bytes) -> _Code:
 
 
 def _dumped(node: Any, named: list[tuple[int, str, list[str]]]) -> str:
-    """A syntax tree as text; what is imported is added to ``named``.
+    """Syntax tree as text; imports are added to ``named``.
 
-    Versions of Python differ in the empty fields that they have, and ``ast.dump`` in more.
+    Empty fields are left out, since versions of Python differ in them; ``ast.dump`` differs in more.
     """
     if isinstance(node, list):
         return f"[{', '.join([_dumped(one, named) for one in node])}]"
@@ -220,7 +219,7 @@ def _dumped(node: Any, named: list[tuple[int, str, list[str]]]) -> str:
 
 
 def _imported(level: int, base: str, names: list[str], package: str, root: Path) -> Iterator[str]:
-    """The modules that a statement imports: of ``from pkg import name``, ``pkg.name`` if that is one, else ``pkg``."""
+    """Modules that a statement imports; for ``from pkg import name``: ``pkg.name`` if it is a module, else ``pkg``."""
     base = resolve_name("." * level + base, package)
     if not names:
         yield base
@@ -230,20 +229,20 @@ def _imported(level: int, base: str, names: list[str], package: str, root: Path)
 
 
 def _header(name: str, file: Path, root: Path) -> str:
-    """The header that a kernel or a header includes by this name: beside it, or in the package."""
+    """Module name of a header that ``file`` includes by this name: beside it, or elsewhere in the package."""
     near = file.parent / f"{name}{_HEADER}"
     place = near if near.is_file() else root / file.relative_to(root).parts[0] / f"{name}{_HEADER}"
     return ".".join(place.relative_to(root).with_suffix("").parts) + _HEADER
 
 
 def remember(folder: Path) -> None:
-    """Take over what the start before kept in a folder, where it is there and can be read."""
+    """Load the results that a previous start kept in a folder, if they are readable."""
     with suppress(OSError, ValueError, TypeError):
         _before.update(json.loads((folder / _KEPT).read_text(encoding="utf-8")))
 
 
 def keep(folder: Path) -> None:
-    """Keep what was read, where the folder is there and can be written: the next start is as right without."""
+    """Keep the results for the next start, if the folder is writable; they only save time."""
     if folder.is_dir() and _read != _before:
         with suppress(OSError, SepiError), atomic_path(folder / _KEPT) as temporary:
             temporary.write_text(json.dumps(_read), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The scenes that the workflow runs on: built-in ones, those found in a folder, and light fields named one by one."""
+"""Scenes of the workflow: built-in scenes, scenes found in a folder, and light fields given one by one."""
 
 from __future__ import annotations
 
@@ -27,21 +27,20 @@ from sepi.workflow.rendered_scenes import DATASET
 VIEW_PATTERN = "input_Cam*.png"
 
 LONGEST_NAME = 80
-"""Bytes of the name of a scene, a variant or a method: a file's holds 255, and some are made of several."""
+"""Most bytes of the name of a scene, a variant or a method: a file name of at most 255 joins several."""
 
 _FORMAT_OF = {"hci": "hci", "hci_2013": "hci-2013"}
 # a scene's name is a folder name below results/ and a word on the command line
 _NAME = re.compile(rf"[A-Za-z0-9][A-Za-z0-9_.+-]{{0,{LONGEST_NAME - 1}}}")
 _REPLACED = re.compile("<[a-z][a-z0-9_]*>|[{}]+")
-# what Python and its libraries take before any data, in MB
+# memory of Python and its libraries without data, in MB
 _LIBRARIES = 300
-# seconds that Python takes to start and to import, and how much slower than measured a cluster's node may be, with
-# others' jobs beside
+# seconds that Python takes to start and import, and how much slower than measured a shared cluster node may be
 _START_SECONDS = 20
 _SLOWER = 4
 # bytes of a pixel of 8-bit colours
 _RGB = 3
-# root/scene, root/category/scene, and a level more
+# levels of folders: root/scene, root/category/scene, and one more
 _DEPTH = 3
 
 
@@ -52,23 +51,23 @@ class Scene:
     Attributes
     ----------
     dataset, name : str
-        Together they name the scene's folder ``results/DATASET/NAME``.
+        Name of the scene's folder, ``results/DATASET/NAME``.
     source : Path or None
-        The folder or file to read; None for a built-in scene, the file of :mod:`sepi.rendered` for a rendered one.
+        Folder or file to read; None for a built-in scene, the file of :mod:`sepi.rendered` for a rendered one.
     files : tuple of Path
-        What ingest reads: a change in one of them is a change of the scene, but for its ground truth.
+        Files that ingest reads, without ground truth; a change in one of them is a change of the scene.
     views : int
         Number of views.
     height, width : int
         Size of a view in pixels.
     pixel_bytes : int
-        Bytes that a pixel of a view takes as the files hold it, unpacked.
+        Bytes of a decoded pixel of a view.
     disparity_range : tuple of float or None
-        Range the user set, pixels per view step; None: the scene's own or an estimate.
+        Range that the user set, pixels per view step; None: the scene's own or an estimate.
     flags : tuple of str
-        How ingest is to read it, as flags of its command line.
+        Flags for the command line of ingest.
     own_truth : TruthFile or None
-        The user's, in place of the light field's.
+        The user's ground truth, instead of the light field's.
     """
 
     dataset: str
@@ -90,28 +89,28 @@ class Scene:
 
     @property
     def is_rendered(self) -> bool:
-        """Whether a job makes what is read, and nothing is there before."""
+        """Whether a job of the workflow makes the source."""
         return self.dataset == DATASET
 
     @property
     def reader(self) -> str:
-        """The module that reads the views, or renders them."""
+        """Module that reads the views, or renders them."""
         if self.source is None:
             return "sepi.scenes"
         if self.is_rendered:
             return "sepi.rendered.exposure"
-        # of an unknown format: ingest will say what is wrong
+        # ingest reports an unknown format
         return format_of.__module__ if self._format is None else self._format.reader.__name__
 
     @property
     def truth(self) -> tuple[Path, ...]:
-        """The files with ground truth and masks: a change in one of them asks for scores and for no map."""
+        """Files with ground truth and masks: a change in one of them makes new scores, but no new maps."""
         own = () if self.own_truth is None else (self.own_truth.path,)
         return own + self.brought_truth
 
     @property
     def brought_truth(self) -> tuple[Path, ...]:
-        """Those of them that the light field brings."""
+        """Files with ground truth and masks that belong to the light field itself."""
         if self.is_rendered:
             return self.files
         return () if self.source is None or self._format is None else tuple(self._format.truth_files(self.source))
@@ -129,33 +128,33 @@ class Scene:
         Parameters
         ----------
         bytes_per_sample, bytes_per_pixel : float
-            What the job holds of each pixel of all views and of each pixel of one, for views of 8-bit colours.
+            Memory of the job for each pixel of all views and for each pixel of one view, for views of 8-bit colours.
         copies : int
-            How often views of wider values are held at a time.
+            Number of copies of the views in memory, which count if values are wider than 8 bit.
         """
         wider = copies * max(0, self.pixel_bytes - _RGB)
         held = (bytes_per_sample + wider) * self.samples + bytes_per_pixel * self.height * self.width
         return _LIBRARIES + round(held / 2**20)
 
     def minutes(self, seconds_per_megasample: float, seconds_per_megapixel: float = 0) -> int:
-        """Time to ask a cluster for, in minutes: several times what a job on this scene takes on one core.
+        """Time limit of a job on a cluster in minutes: several times its duration on one core.
 
         Parameters
         ----------
         seconds_per_megasample, seconds_per_megapixel : float
-            What a job takes for a million pixels of all views, and of one view, as measured.
+            Measured duration for a million pixels of all views, and of one view.
         """
         measured = (seconds_per_megasample * self.samples + seconds_per_megapixel * self.height * self.width) / 1e6
         return math.ceil((_START_SECONDS + _SLOWER * measured) / 60)
 
 
 def require_plain_path(path: str, where: str) -> None:
-    """Refuse a path that Snakemake would take for another.
+    """Raise if Snakemake would replace a part of a path.
 
     Raises
     ------
     SepiError
-        If there is a word in angle brackets in it, or a brace, which Snakemake replaces.
+        If the path has a word in angle brackets or a brace.
     """
     found = _REPLACED.search(path)
     if found:
@@ -165,31 +164,31 @@ def require_plain_path(path: str, where: str) -> None:
 def scenes_in(
     root: Path, dataset: str, where: str, include: Sequence[str] = (), exclude: Sequence[str] = ()
 ) -> list[Scene]:
-    """Every light field of a dataset below a folder, by name.
+    """Scenes of a dataset below a folder, sorted by name.
 
     A scene of ``hci`` is a folder with ``input_Cam*.png``; ``root`` may be one itself, or hold scenes or categories of
-    scenes. A scene of ``hci_2013`` is an HDF5 file with a dataset ``LF``; it has the file's name, or its folder's where
-    the file is ``lf.h5``.
+    scenes. A scene of ``hci_2013`` is an HDF5 file with a dataset ``LF``; it has the name of the file, or of its folder
+    if the file is ``lf.h5``.
 
     Parameters
     ----------
     root : Path
-        Folder to look in, or one such file.
+        Folder to search, or such a file.
     dataset : str
         ``"hci"`` or ``"hci_2013"``.
     where : str
-        The key that named ``root``, for messages.
+        Configuration key of ``root``, for messages.
     include, exclude : sequence of str
-        Patterns (:mod:`fnmatch`) of names: of those to take, all unless given, and of those to leave out.
+        Patterns (:mod:`fnmatch`) of names to take (default: all) and to leave out.
 
     Raises
     ------
     SepiError
-        If there is no such folder, no scene in it, none that a pattern is of or none left, two scenes of one name, or a
-        name that is no plain word.
+        If the folder does not exist or has no scene, a pattern matches none, none is left, two scenes have one name, or
+        a name is not valid.
     """
     find, expected = _FINDERS[dataset]
-    # os.path: a name that is too long names nothing, and is no error there
+    # os.path: a name that is too long is no error there
     if not (os.path.isdir(root) or (os.path.isfile(root) and dataset == "hci_2013")):
         raise SepiError(f"{where}: no folder '{root}'")
     scenes = list(find(root.resolve()))
@@ -220,7 +219,7 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str, truth
     Raises
     ------
     SepiError
-        If nothing is there, be it the light field or its ``truth``, or ``name`` is no plain word.
+        If the light field or its ``truth`` does not exist, or ``name`` is not valid.
     """
     _require_plain(name, where)
     if not os.path.exists(source):
@@ -235,7 +234,7 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str, truth
         return replace(_benchmark_scene("own", name, source, flags), own_truth=truth)
     cameras = cameras_in(source) if word in (None, "cameras") and not exported.matches(source) else None
     if cameras is not None:
-        # pictures may lie elsewhere
+        # the images may lie in another folder
         given = dict(pairwise(flags))
         model = read_model(source, given.get("--images"), ReadOptions(crop_of=given.get("--crop-of")).part)
         files = (*described_by(cameras), *model.files)
@@ -244,7 +243,7 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str, truth
     files = tuple(path for path in inside if not path.name.startswith("."))
     if truth is not None:
         files = tuple(path for path in files if path.resolve() != truth.path)
-    # notes beside pictures are no part of the light field
+    # other files beside the images are no part of the light field
     if exported.matches(source):
         manifest, *others = exported.truth_files(source)
         files = (*(path for path in files if path not in (manifest, *others)), manifest)
@@ -284,7 +283,7 @@ def _archive_scenes(path: Path, depth: int = _DEPTH + 1) -> Iterator[Scene]:
         yield Scene("hci_2013", name, path, (path,), *size_of((path,)))
 
 
-# dataset to what yields its scenes below a folder, and what is looked for
+# dataset to the function that finds its scenes below a folder, and the kind of files that it expects
 _FINDERS: dict[str, tuple[Callable[[Path], Iterator[Scene]], str]] = {
     "hci": (_benchmark_scenes, f"folders with {VIEW_PATTERN}"),
     "hci_2013": (_archive_scenes, f"HDF5 files with a dataset {hci_2013.VIEWS}"),
