@@ -382,7 +382,7 @@ UNREAD: dict[str, tuple[Callable[[Path], object], str]] = {
     "packed by Zstandard": (by_tifffile(RGB16, compression="zstd"), "save it uncompressed"),
     "below zero": (by_tifffile(-(GREY16 // 2).astype(np.int16) - 1), "a pixel of -32"),
     "not a number": (by_tifffile(np.where(RGBF > 0.5, np.float32(np.nan), RGBF)), "NaN"),
-    "one pixel infinite": (by_tifffile(np.where(RGBF > 0.99, np.float32(np.inf), RGBF)), "infinite"),
+    "one pixel infinite": (by_tifffile(np.where(RGBF > 0.99, np.float32(np.inf), RGBF)), "infinity"),
     "0 to 255": (by_tifffile(RGBF * 255), "within 0..1"),
     "negative": (by_tifffile(RGBF - 1), "within 0..1"),
 }

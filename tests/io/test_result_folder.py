@@ -369,7 +369,7 @@ BAD_MAPS = {
 
 
 BAD_BARS = {
-    "no bounds": (lambda bars: bars.pop("low"), "sigma and high alone"),
+    "no bounds": (lambda bars: bars.pop("low"), "sigma and high"),
     "negative sigma": (lambda bars: bars.update(sigma=-bars["sigma"]), "sigma must be finite and not negative, got -0"),
     "endless sigma": (lambda bars: bars.update(sigma=bars["sigma"] * np.inf), "sigma must be finite"),
     "bounds the wrong way round": (
