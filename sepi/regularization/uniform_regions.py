@@ -120,7 +120,9 @@ def fill_uniform_regions(
     of_mean = variance * np.float32((LEFT_OF_SLOPES if noisy else 1) / compared.sum())
     mean = matching.mean(before.disparity)[..., :3]
     core = plain_pixels(mean, of_mean, parameters)
-    found = _with_borders(uniform_regions(mean, core, of_mean, before.confidence, parameters), before, parameters)
+    # noise is measured; what rounding adds is supposed, and a single pixel may be plain by chance
+    uniform = uniform_regions(mean, core, of_mean, before.confidence, parameters, fewest=1 if noisy else 2)
+    found = _with_borders(uniform, before, parameters)
     lit = _by_light(light_field, matching, before.disparity, found, variance, noisy) if parameters.light else {}
     known = light_field.require_disparity_range()
     planes = _planes_of(found, lit, before.disparity, mean, noisy, parameters)
@@ -265,6 +267,7 @@ def uniform_regions(
     variance: float | FloatMap,
     confidence: FloatMap,
     parameters: UniformPlanesParameters,
+    fewest: int,
 ) -> BoolMap:
     """Plain pixels, and pixels of their colour around them.
 
@@ -276,6 +279,8 @@ def uniform_regions(
         The plain pixels.
     confidence : ndarray, shape (H, W), float32
     parameters : UniformPlanesParameters
+    fewest : int
+        Plain pixels within reach of a pixel of their colour.
 
     Returns
     -------
@@ -287,5 +292,5 @@ def uniform_regions(
     near = cv2.blur(core.astype(np.float32), (size, size))
     colour = cv2.blur(mean * core[..., None].astype(np.float32), (size, size)) / np.maximum(near, 1e-9)[..., None]
     alike = np.sum(cv2.split((mean - colour) ** 2), axis=0) < 27 * variance + parameters.colour_tolerance**2
-    # above zero by more than the rounding errors of a running sum
-    return np.asarray(core | ((near > 1.5 / size**2) & alike & (confidence < parameters.grow_confidence)))
+    # half a pixel is more than the rounding errors of a running sum
+    return np.asarray(core | ((near > (fewest - 0.5) / size**2) & alike & (confidence < parameters.grow_confidence)))
