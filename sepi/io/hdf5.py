@@ -92,6 +92,8 @@ Attribute = str | float | int | tuple[float, ...]
 RIG = "rig"
 """Dataset of a light field, or attribute of a result: poses of the calibrated cameras, as JSON."""
 
+# attributes of a light field that are read; others may be of any kind
+_KNOWN = ("name", "source", "reading", "row_spacing", "view", "notes", "disparity_range", "disparity_range_source")
 # datasets of a cost volume
 _COSTS, _CANDIDATES = "cost_volume", "candidates"
 
@@ -247,7 +249,7 @@ def read_light_field(path: Path) -> LightField:
             raise SepiError(f"{path}: light of a path-traced scene, not a light field; give the scene's folder instead")
         known_arrays = ("views", "present", "missing", "positions", RIG)
         arrays = {name: read_dataset(path, file[name]) for name in known_arrays if name in file}
-        known = {key: attribute(file, key) for key in file.attrs}
+        known = {key: attribute(file, key) for key in _KNOWN if key in file.attrs}
         ground_truth, masks = truth_in(path, file)
         searched = None
         if "disparity_range" in known:

@@ -100,6 +100,9 @@ class Origin:
 DIGEST = "light_field"
 """Name of the attribute with the :func:`digest_of` a light field."""
 
+# what is read of a result; other programs may have added attributes of other kinds
+_ORIGIN = ("view_position", "grid", "reading", "scene", "source", "positions", "row_spacing", DIGEST, RIG, "files")
+
 
 def origin_attributes(light_field: LightField, digest: str | None = None) -> dict[str, Attribute]:
     """Attributes of the light field that maps were made from, as :func:`read_origin` reads them.
@@ -139,9 +142,9 @@ def read_origin(path: Path) -> Origin | None:
     if path.suffix not in (".h5", ".hdf5") or not path.is_file():
         return None
     with open_hdf5(path, "result of 'sepi depth'") as file:
-        known = {name: attribute(file, name) for name in file.attrs}
-        if not {"view_position", "grid"} <= set(known):
+        if not {"view_position", "grid"} <= set(file.attrs):
             return None
+        known = {name: attribute(file, name) for name in _ORIGIN if name in file.attrs}
         (t, s), (rows, columns) = (map(int, known[name]) for name in ("view_position", "grid"))
         options, file_format = _reading(path, str(known.get("reading", "")))
         return Origin(

@@ -157,6 +157,18 @@ def test_evaluate_takes_png_maps(result: Path, disparity: np.ndarray, tmp_path: 
     assert "give a scale" in called.stderr
 
 
+def test_text_in_a_map_of_another_program_is_no_matter(tmp_path: Path, disparity: np.ndarray) -> None:
+    """It is of variable length, on which HDF5 may hang where a file is damaged, so that it is not read."""
+    with h5py.File(tmp_path / "map.h5", "w") as file:
+        file["disparity"] = disparity
+        file.attrs["method"] = "mine"
+    write_pfm(tmp_path / "truth.pfm", disparity)
+    files = [str(tmp_path / name) for name in ("map.h5", "truth.pfm")]
+    for words in (["evaluate", *files], ["compare", *files, "-o", str(tmp_path / "page.html")]):
+        called = CliRunner().invoke(main, words)
+        assert called.exit_code == 0, called.output
+
+
 def test_tiff_of_floats_is_a_map_and_of_levels_is_none(tmp_path: Path, disparity: np.ndarray) -> None:
     """Levels mean nothing without a scale; taken as disparity they would be scored."""
     disparity[0, 0] = np.inf
