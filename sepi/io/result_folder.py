@@ -220,6 +220,8 @@ def read_result(path: str | Path) -> Result:
     path = path / RESULT if path.is_dir() else path
     with hdf5.open_hdf5(path, "result of 'sepi depth'") as file:
         picture, maps = hdf5.read_dataset(path, file["view"]), hdf5.float_maps(path, file)
+        if missing := {"disparity", "confidence"}.difference(maps):
+            raise SepiError(f"damaged result of 'sepi depth': it has no {' and no '.join(sorted(missing))}")
         unknown = hdf5.read_dataset(path, file[UNKNOWN]) if UNKNOWN in file else np.zeros(maps["disparity"].shape)
         (t, s), (rows, columns) = (map(int, hdf5.attribute(file, name)) for name in ("view_position", "grid"))
         # earlier versions had rows as far apart as columns, and all views on the grid

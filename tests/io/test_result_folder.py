@@ -432,6 +432,7 @@ def _huge(file: h5py.File) -> None:
 
 BAD_RESULTS = {
     "no view": (_replaced("view", None), "not a result of 'sepi depth'"),
+    "no confidence": (_replaced("confidence", None), "no confidence"),
     "stage file": (lambda file: file.attrs.pop("view_position"), "view_position"),
     "grid of one number": (lambda file: file.attrs.__setitem__("grid", 3), "damaged"),
     "camera of nonsense": (lambda file: file.attrs.__setitem__("camera", (0.0, 1.0, -2.0)), "camera"),
