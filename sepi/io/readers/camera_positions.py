@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -67,7 +68,9 @@ def positions_from_cameras(cameras: Positions, present: BoolMap) -> tuple[Positi
     # one unit for both axes, a step between columns, so that rows and columns of pixels keep their proportions
     positions[..., axes] = filled * np.sign(step) / abs(step[-1])
     signs = dict(zip(axes, np.sign(step).astype(int).tolist(), strict=True))
-    return positions, float(abs(step[0] / step[-1])), (signs.get(0, 0), signs.get(1, 0))
+    row_spacing = float(abs(step[0] / step[-1]))
+    # rounding is no other spacing
+    return positions, 1.0 if math.isclose(row_spacing, 1) else row_spacing, (signs.get(0, 0), signs.get(1, 0))
 
 
 def _coordinates(slopes: npt.NDArray[np.floating[Any]]) -> list[int] | None:

@@ -260,7 +260,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     light_field = LightField(
         pixels, name, str(path), present, view=options.view, notes=told, arranged=arranged, files=names
     )
-    return _with_positions(light_field, layout, numbers) if arranged else light_field
+    return _with_positions(light_field, layout, numbers) if arranged and not named.in_decimals else light_field
 
 
 def _views(folder: Path, names: Sequence[str], options: ReadOptions) -> tuple[ViewNumbers, dict[str, str]]:

@@ -161,7 +161,7 @@ class NameGroup:
     """
 
     def __init__(self, source: str, names: Sequence[str], form: re.Pattern[str], decimals_count: bool) -> None:
-        self._form, self._decimals_count = form, decimals_count
+        self.form, self._decimals_count = form, decimals_count
         groups: dict[tuple[str, ...], list[str]] = defaultdict(list)
         for name in names:
             texts, numbers = self._cut(name)
@@ -251,7 +251,7 @@ class NameGroup:
             stem, suffix = name, ""
         texts: list[str] = [""]
         numbers, at = [], 0
-        for match in self._form.finditer(stem):
+        for match in self.form.finditer(stem):
             texts[-1] += stem[at : match.start()]
             at, digits = match.end(), match[0].lstrip("+-")
             if match.lastgroup == "decimal" and not self._decimals_count:

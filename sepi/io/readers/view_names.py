@@ -38,6 +38,8 @@ class ViewNumbers:
         Pattern that gives the same numbers; empty if the names only sort, or a pattern was given.
     said : bool
         Whether the names say which number is the row and which the column.
+    in_decimals : bool
+        Whether the numbers may be parts of what looks like decimal numbers, which then are no camera positions.
     """
 
     numbers: dict[str, tuple[int, ...]]
@@ -46,6 +48,7 @@ class ViewNumbers:
     kind: Kind = Kind.COUNT
     pattern: str = ""
     said: bool = False
+    in_decimals: bool = False
 
 
 def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewNumbers:
@@ -76,7 +79,9 @@ def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewN
 
     numbers = {name: values for name in matches if (values := numbers_of(name)) is not None}
     others = tuple(name for name in names if name not in matches)
-    return ViewNumbers(numbers, numbers_of, others, Kind.GRID if len(fields) == 2 else Kind.COUNT)
+    kind = Kind.GRID if len(fields) == 2 else Kind.COUNT
+    in_decimals = re.search(r"[0-9}*]\.\{|\}\.[0-9{*]", pattern) is not None
+    return ViewNumbers(numbers, numbers_of, others, kind, in_decimals=in_decimals)
 
 
 def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
@@ -111,7 +116,7 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
         numbers_of = _no_numbers
     pattern = "" if counted.kind is Kind.SORT else group.pattern(columns)
     others = tuple(sorted({*names}.difference(group.names)))
-    return ViewNumbers(numbers, numbers_of, others, counted.kind, pattern, said)
+    return ViewNumbers(numbers, numbers_of, others, counted.kind, pattern, said, group.form is not _EITHER)
 
 
 def decimals_in(names: Sequence[str]) -> list[tuple[float, ...]]:

@@ -555,6 +555,22 @@ def test_decimals_that_fit_no_grid_count_nothing(tmp_path: Path) -> None:
     assert light_field.row_spacing == 1
 
 
+@pytest.mark.parametrize("pattern", [None, "img_0.{row}_0.{column}.png"])
+def test_decimals_that_are_row_and_column_are_no_positions(tmp_path: Path, pattern: str | None) -> None:
+    """They would say how far apart rows are, which the views tell."""
+    names = by_place("img_{:.2f}_{:.2f}.png", (0.0, 0.25, 0.5), (0.25, 0.35, 0.45))
+    light_field = read(put(tmp_path / "f", names), ReadOptions(pattern=pattern))
+    assert places_of(light_field)[0][0] == 0
+    assert light_field.row_spacing == 1
+    assert "camera positions" not in " ".join(light_field.notes)
+
+
+def test_rows_as_far_apart_as_columns_are_one_step_apart_exactly(tmp_path: Path) -> None:
+    """Another spacing is taken for one that is known, and not estimated."""
+    names = by_place("x{:.1f}_y{:.1f}.png", (0.0, 0.5, 1.0), (0.0, 0.5, 1.0))
+    assert read(put(tmp_path / "f", names), ReadOptions()).row_spacing == 1
+
+
 def test_bad_view_can_be_excluded(tmp_path: Path) -> None:
     folder = put(tmp_path / "f", PLACES)
     (folder / "v_1_2.png").write_bytes(b"")
