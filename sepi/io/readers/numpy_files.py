@@ -21,6 +21,7 @@ from sepi.lightfield import LightField
 _KIND = "NumPy file"
 # first bytes of a ZIP archive with members, and of an empty one
 _ZIP_MAGICS = (b"PK\x03\x04", b"PK\x05\x06")
+_OBJECTS = "Python objects, which may be any program; save images as one array, numpy.stack(them)"
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
@@ -44,10 +45,12 @@ def read_array(path: Path) -> Array:
     with reading(path, _KIND), warnings.catch_warnings(action="ignore"):
         with path.open("rb") as file:
             start = file.read(12)
-        # NumPy allocates this length before it reads; two bytes in version 1, four in later ones
-        length = int.from_bytes(start[8:10] if start[6:7] == b"\x01" else start[8:12], "little")
-        if length > path.stat().st_size:
-            raise ValueError(f"a header of {length} bytes")
+            # NumPy allocates this length before it reads; two bytes in version 1, four in later ones
+            length = int.from_bytes(start[8:10] if start[6:7] == b"\x01" else start[8:12], "little")
+            if length > path.stat().st_size:
+                raise ValueError(f"a header of {length} bytes")
+            if b"'|O'" in file.read(length):
+                raise SepiError(_OBJECTS)
         array: Array = np.load(path, mmap_mode="r", allow_pickle=False)
         return array
 
@@ -76,6 +79,8 @@ def read_named(path: Path, name: str) -> Array:
     if not _is_zipped(path):
         return read_array(path)
     with reading(path, _KIND), np.load(path, allow_pickle=False) as archive:
+        if array_shapes(path)[name][1].hasobject:
+            raise SepiError(_OBJECTS)
         array: Array = archive[name]
         return array
 
