@@ -14,9 +14,10 @@ from sepi.io.files import atomic_path, reading
 from sepi.validation import require_path, require_type
 
 _POINT = np.dtype([("position", "<f4", 3), ("colour", "u1", 3)])
-# number types of PLY, and NumPy's names for them
-_WORDS = ("char i1", "uchar u1", "short i2", "ushort u2", "int i4", "uint u4", "float f4", "double f8")
-_NUMBERS = dict(word.split() for word in _WORDS)
+# number types of PLY; NumPy knows the sized ones
+_SIZED = {"char": "int8", "uchar": "uint8", "short": "int16", "ushort": "uint16", "int": "int32", "uint": "uint32"}
+_SIZED |= {"float": "float32", "double": "float64"}
+_NUMBERS = _SIZED | {word: word for word in _SIZED.values()}
 _ORDERS: dict[str, Literal["<", ">"]] = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _LONGEST_HEADER = 2**16
 _PROPERTIES = (*(f"float {axis}" for axis in "xyz"), *(f"uchar {colour}" for colour in ("red", "green", "blue")))
@@ -107,12 +108,17 @@ def read_positions(path: Path) -> npt.NDArray[np.float64]:
         end = data.index(b"end_header", 0, _LONGEST_HEADER)
         begin = data.index(b"\n", end) + 1
         lines = [line.split() for line in data[:end].decode("ascii", "replace").splitlines()]
-        kind = next(line[1] for line in lines if line[:1] == ["format"])
+        kind = next((line[1] for line in lines if line[:1] == ["format"]), "none")
+        if kind not in ("ascii", *_ORDERS):
+            raise SepiError(f"damaged PLY file: expected the format ascii or {' or '.join(_ORDERS)}, found {kind}")
         first, *others = [n for n, line in enumerate(lines) if line[:1] == ["element"]]
         if lines[first][1] != "vertex":
             raise SepiError("not a PLY file of points: its first element is not 'vertex'")
         count, properties = int(lines[first][2]), lines[first + 1 : others[0] if others else None]
-        names = [(line[2], _NUMBERS.get(line[1], line[1])) for line in properties if line[:1] == ["property"]]
+        words = [line[1:] for line in properties if line[:1] == ["property"]]
+        if unread := [word for word, *_ in words if word not in _NUMBERS]:
+            raise SepiError(f"a PLY file whose vertices have a '{unread[0]}'; expected numbers: {', '.join(_NUMBERS)}")
+        names = [(name, _NUMBERS[word]) for word, name in words]
         if kind == "ascii":
             rows = [tuple(map(float, line.split())) for line in data[begin:].splitlines()[:count]]
             values = np.array(rows, [(name, "f8") for name, _ in names])
