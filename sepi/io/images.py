@@ -120,7 +120,8 @@ def read_views(
     def fill(index: int) -> None:
         image = _read(paths[index], any_floats) if index else first
         if image.shape != first.shape or image.dtype != first.dtype:
-            raise SepiError(f"{paths[index]}: {_described(image)}, but {paths[0].name} is {_described(first)}")
+            unlike = f"{_described(image)}, but {paths[0].name} is {_described(first)}"
+            raise SepiError(f"{paths[index]}: {unlike}; all views must be alike; --exclude leaves one out")
         views[positions[index]] = image
 
     # decoding runs outside Python's lock, so threads share the work; all threads share the warning filters

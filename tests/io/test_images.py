@@ -429,6 +429,7 @@ def test_views_of_two_sorts_are_refused(tmp_path: Path, case: str) -> None:
     with pytest.raises(SepiError, match=word) as caught:
         read_views([tmp_path / "a.tif", tmp_path / "b.tif"])
     assert "b.tif" in str(caught.value)
+    assert "--exclude" in str(caught.value)
 
 
 def test_views_that_take_more_memory_than_there_is_are_refused(tmp_path: Path) -> None:
