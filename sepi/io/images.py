@@ -208,11 +208,14 @@ def _decoded(path: Path, data: bytes, kind: str) -> Pixels:
     if kind == "TIFF":
         with open_tiff(io.BytesIO(data)) as pictures:
             return page_pixels(pictures.pages[0].aspage())
-    ends = {"PNG": _LAST_CHUNK in data, "BMP": int.from_bytes(data[2:6], "little") <= len(data)}
-    if not ends.get(kind, True):
+    if kind == "PNG" and _LAST_CHUNK not in data:
         raise ValueError("its end is missing")
     if kind in _PLUGINS:
         with pillow_class(_PLUGINS[kind])(io.BytesIO(data)) as image:
+            tile = image.tile[0]
+            # Pillow does not miss bytes that fill up the last row of a BMP
+            if tile.codec_name == "raw" and tile.offset + tile.args[1] * image.height > len(data):
+                raise ValueError("its end is missing")
             return np.asarray(image.convert("L" if image.mode == "L" else "RGB"))
     import imagecodecs
 

@@ -154,7 +154,7 @@ def _by_pillow(plugin: str, file: IO[bytes], path: Path, size: int) -> _Form:
     with pillow_class(plugin)(file) as image:
         # how a PNG packs its pixels: decoding turns grey with transparency, or a palette, into colours
         packed = str(image.tile[0].args) if plugin == "Png" else image.mode
-        grey = packed.startswith(("1", "I", "L")) if plugin == "Png" else packed in ("L", "LA", "I;16")
+        grey = packed.startswith(("1", "I", "L")) if plugin == "Png" else packed in ("1", "L", "LA", "I;16")
         return image.height, image.width, (1 if grey else 3) * (2 if "16" in packed else 1), grey
 
 

@@ -9,6 +9,7 @@ import struct
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -29,6 +30,7 @@ TIFF_SIGNATURES = (b"II*\0", b"II+\0", b"MM\0*", b"MM\0+")
 _COMPRESSIONS = (1, 5, 8, 32946, 32773, _JPEG := 7)
 _KINDS = ("u1", "u2", "i1", "i2", "f2", "f4")
 _WHITE_IS_ZERO, _PALETTE, _YCBCR = 0, 3, 6
+_COEFFICIENTS, _RANGE, _FULL_RANGE = 529, 532, (0, 1, 255, 1, 128, 1, 255, 1, 128, 1, 255, 1)
 # pixels in a tile
 _LARGEST_TILE = 2**24
 # tags that change the meaning of the pixels, and whose absence tifffile does not notice
@@ -70,8 +72,8 @@ def tiff_form(page: Any, size: int) -> tuple[int, int, int, bool]:
     if page.compression not in _COMPRESSIONS or page.predictor not in (1, 2, 3):
         raise SepiError("a TIFF of a rare compression; save it uncompressed")
     known = [1, 2, *[_WHITE_IS_ZERO] * (dtype.kind != "f"), *[_PALETTE] * (bits == 8 and samples == 1)]
-    if photometric not in (*known, *[_YCBCR] * (page.compression == _JPEG)):
-        raise SepiError("a TIFF that is neither grey nor RGB; save it as grey or RGB")
+    if photometric not in (*known, *[_YCBCR] * (page.compression == _JPEG or _is_full_ycbcr(page))):
+        raise SepiError("a TIFF that is neither grey nor RGB; save it as one of these")
     height, width, counts = page.imagelength, page.imagewidth, page.databytecounts
     if not all(isinstance(number, int) for number in (height, width, page.tilelength, page.tilewidth)):
         # with several values, a product with another size would be a list of that length
@@ -115,6 +117,8 @@ def page_pixels(page: TiffPage) -> npt.NDArray[Any]:
     if kind == "i" and values.min() < 0:
         raise SepiError(f"a TIFF with a sign, and a pixel of {values.min()}; expected none below 0")
     values = values.astype(np.float32 if kind == "f" else f"u{size}")
+    if page.photometric == _YCBCR and page.compression != _JPEG:
+        values = cv2.cvtColor(values[:, :, [0, 2, 1]], cv2.COLOR_YCrCb2RGB)
     if page.photometric == _WHITE_IS_ZERO:
         # for signed numbers, white is the largest of them
         values = np.iinfo(stored.dtype).max - values
@@ -129,6 +133,12 @@ def directory_of(page: Any) -> tuple[set[int], bool]:
     entries = file.read(count * form.tagsize)
     codes = {struct.unpack_from(f"{form.byteorder}H", entries, at)[0] for at in range(0, len(entries), form.tagsize)}
     return codes, bool(file.read(form.offsetsize) == bytes(form.offsetsize))
+
+
+def _is_full_ycbcr(page: Any) -> bool:
+    """Whether a page has colours of 8 bit for each pixel, over the range and of the coefficients that are usual."""
+    whole = page.tags.valueof(_RANGE, default=_FULL_RANGE) == _FULL_RANGE and _COEFFICIENTS not in page.tags
+    return whole and page.subsampling == (1, 1) and page.dtype == np.uint8 and page.samplesperpixel > 2
 
 
 def _require_no_larger(page: Any) -> None:

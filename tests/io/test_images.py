@@ -60,6 +60,17 @@ def by_tifffile(values: np.ndarray, **options: object) -> Callable[[Path], objec
     return lambda path: tifffile.imwrite(path, flat(values), **options)
 
 
+def by_pillow_ycbcr(values: np.ndarray, **options: object) -> Callable[[Path], object]:
+    return lambda path: Image.fromarray(values).convert("YCbCr").save(path, **options)
+
+
+def bmp_of_wrong_length(path: Path) -> None:
+    """As some programs write them: more bytes than there are, of a picture that is whole."""
+    Image.fromarray(RGB8).save(path)
+    data = path.read_bytes()
+    path.write_bytes(data[:2] + struct.pack("<I", len(data) + 2) + data[6:])
+
+
 PALETTE = RANDOM.integers(0, 256, (256, 3), np.uint8)
 
 
@@ -91,6 +102,8 @@ EXACT: dict[str, tuple[str, Callable[[Path], object], np.ndarray]] = {
     "png grey with alpha": ("a.png", by_pillow(RGB8[:, :, :2]), GREY8),
     "png capitals": ("A.PNG", by_opencv(RGB8), RGB8),
     "bmp grey": ("a.bmp", by_pillow(GREY8), GREY8),
+    "bmp of 1 bit": ("a.bmp", lambda path: Image.fromarray(GREY8[:, :, 0] > 99).save(path), (GREY8 > 99) * 255),
+    "bmp that claims another length": ("a.bmp", bmp_of_wrong_length, RGB8),
     "bmp RGB": ("a.bmp", by_pillow(RGB8), RGB8),
     "bmp RGBA": ("a.bmp", by_opencv(alpha(RGB8)), RGB8),
     "tiff grey 8": ("a.tif", by_tifffile(GREY8), GREY8),
@@ -161,6 +174,13 @@ def test_picture_is_read_pixel_for_pixel(tmp_path: Path, case: str, capfd: pytes
     np.testing.assert_array_equal(read, pixels)
     assert read.dtype in (np.uint8, np.uint16, np.float32)
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("compression", ["raw", "tiff_lzw"])
+def test_tiff_in_ycbcr_has_the_colours_that_were_stored(tmp_path: Path, compression: str) -> None:
+    by_pillow_ycbcr(RGB8, compression=compression)(tmp_path / "a.tif")
+    # rounding of two conversions
+    assert np.abs(read_picture(tmp_path / "a.tif").astype(int) - RGB8).max() <= 3
 
 
 @pytest.mark.parametrize("options", [{}, {"progressive": True}, {"subsampling": 0}, {"restart_marker_blocks": 2}])
@@ -379,6 +399,11 @@ def test_sound_header_beside_a_bad_one(tmp_path: Path) -> None:
 UNREAD: dict[str, tuple[Callable[[Path], object], str]] = {
     "64 bit floats": (by_tifffile(RGBF.astype(np.float64)), "64 bit float"),
     "32 bit integers": (by_tifffile(GREY16.astype(np.uint32)), "32 bit"),
+    "YCbCr of another range": (
+        by_pillow_ycbcr(RGB8, tiffinfo={532: (15.0, 235.0, 128.0, 240.0, 128.0, 240.0)}),
+        "neither grey nor RGB",
+    ),
+    "YCbCr in half as many columns": (by_pillow_ycbcr(RGB8, tiffinfo={530: (2, 1)}), "neither grey nor RGB"),
     "packed by Zstandard": (by_tifffile(RGB16, compression="zstd"), "save it uncompressed"),
     "below zero": (by_tifffile(-(GREY16 // 2).astype(np.int16) - 1), "a pixel of -32"),
     "not a number": (by_tifffile(np.where(RGBF > 0.5, np.float32(np.nan), RGBF)), "NaN"),
