@@ -155,7 +155,9 @@ def with_code_read(folder: Path) -> None:
     """Have in a folder what an earlier run there would have kept of the package's code, which takes long to read."""
     _read_code()
     (folder / ".snakemake").mkdir(exist_ok=True)
-    keep(folder / ".snakemake")
+    # of another folder's starts
+    with mock.patch.dict("sepi.workflow.code_digest._before", clear=True):
+        keep(folder / ".snakemake")
 
 
 def planned(stdout: str) -> dict[str, int]:

@@ -85,9 +85,9 @@ _Code = tuple[str, list[tuple[int, str, list[str]]]]
 _KEPT = "sepi_code.json"
 # another version of this module may give other results
 _OWN = Path(__file__).read_bytes()
-# key of a source to its result, from the previous start and from this one
-_before: dict[str, _Code] = {}
-_read: dict[str, _Code] = {}
+# key of a source to its file and its result, from previous starts and from this one
+_before: dict[str, tuple[str, *_Code]] = {}
+_read: dict[str, tuple[str, *_Code]] = {}
 
 
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
@@ -170,8 +170,9 @@ def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
     source = file.read_bytes()
     key = hashlib.sha256(b"\0".join((_OWN, file.suffix.encode(), source))).hexdigest()
     if key not in _read:
-        _read[key] = _before.get(key) or (_python_code if file.suffix == ".py" else _kernel_code)(source)
-    code, named = _read[key]
+        read = _python_code if file.suffix == ".py" else _kernel_code
+        _read[key] = _before.get(key) or (str(file), *read(source))
+    _, code, named = _read[key]
     if file.suffix != ".py":
         return code, frozenset(_header(name, file, root) for _, name, _ in named)
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
@@ -236,13 +237,20 @@ def _header(name: str, file: Path, root: Path) -> str:
 
 
 def remember(folder: Path) -> None:
-    """Load the results that a previous start kept in a folder, if they are readable."""
-    with suppress(OSError, ValueError, TypeError):
-        _before.update(json.loads((folder / _KEPT).read_text(encoding="utf-8")))
+    """Load the results that previous starts kept in a folder, if they are readable."""
+    with suppress(OSError, ValueError, TypeError, AttributeError):
+        kept = json.loads((folder / _KEPT).read_text(encoding="utf-8"))
+        _before.update({key: (file, code, named) for key, (file, code, named) in kept.items()})
 
 
 def keep(folder: Path) -> None:
-    """Keep the results for the next start, if the folder is writable; they only save time."""
-    if folder.is_dir() and _read != _before:
+    """Keep the results of this start, and those of previous starts for other files that still exist.
+
+    They only save time, so nothing is kept if the folder is not writable.
+    """
+    files = {file for file, _, _ in _read.values()}
+    others = {key: code for key, code in _before.items() if code[0] not in files and Path(code[0]).is_file()}
+    kept = others | _read
+    if folder.is_dir() and kept != _before:
         with suppress(OSError, SepiError), atomic_path(folder / _KEPT) as temporary:
-            temporary.write_text(json.dumps(_read), encoding="utf-8")
+            temporary.write_text(json.dumps(kept), encoding="utf-8")

@@ -1,5 +1,6 @@
 """The digest of a stage's code: too coarse, and a changed comment costs hours; too fine, and results are stale."""
 
+import json
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -235,6 +236,30 @@ def as_at_a_start(monkeypatch: pytest.MonkeyPatch) -> Callable[[], list[str]]:
 
     reading = module._python_code
     return start
+
+
+def test_a_start_that_reads_less_forgets_only_what_is_gone(
+    tree: Path, tmp_path: Path, as_at_a_start: Callable[[], list[str]]
+) -> None:
+    """Else the next full start reads all anew, or the file grows with each version of the code."""
+    shared, kept = tree / "pkg/shared.py", tmp_path / "sepi_code.json"
+    for text, *modules in [("value = 3\n", "pkg.one", "pkg.two"), ("value = 4\n", "pkg.shared")]:
+        shared.write_text(text)
+        as_at_a_start()
+        remember(tmp_path)
+        code_digest(*modules, root=tree)
+        keep(tmp_path)
+    number = len(json.loads(kept.read_text()))
+    read = as_at_a_start()
+    remember(tmp_path)
+    assert len(imported_modules("pkg.one", "pkg.two", root=tree)) == number
+    assert read == []
+    (tree / "pkg/two.py").unlink()
+    as_at_a_start()
+    remember(tmp_path)
+    code_digest("pkg.shared", root=tree)
+    keep(tmp_path)
+    assert len(json.loads(kept.read_text())) == number - 1
 
 
 def test_a_start_reads_what_changed_since_the_one_before(
