@@ -25,7 +25,7 @@ from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_file
 
 # the folder of the Snakefile, and whether another workflow uses it as a module
 FOLDER = os.path.dirname(str(workflow.current_basedir))
-IS_MODULE = FOLDER != workflow.basedir
+IS_MODULE = os.path.realpath(FOLDER) != os.path.realpath(workflow.basedir)
 # puts a module's `prefix` before paths
 MODIFIER = workflow.modifier.path_modifier
 
