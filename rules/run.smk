@@ -7,6 +7,9 @@ from contextlib import suppress
 from sepi.io.files import is_temporary, remove_temporary
 
 STARTED = time.time()
+DAY = 24 * 60 * 60
+# of those without a map of an external method
+SCENES_NAMED = 3
 
 
 def is_new(file):
@@ -16,16 +19,22 @@ def is_new(file):
 
 def print_warnings():
     """Show the warnings that reading light fields, ground truth and external maps gave in this run, from the logs."""
-    shown = set()
+    shown, without_map = set(), {}
     for dataset, scene in (*SETTINGS.scenes, *SETTINGS.rendered_scenes):
         for kind in ("ingest", "truth", "external"):
             log = Path(placed(f"logs/{dataset}/{scene}/{kind}.log"))
             for line in log.read_text().splitlines() if is_new(log) else ():
-                # methods often lack maps of some scenes: one line for each method
-                line = re.sub(r", scene .+: no such file$", ": no map of some scenes", line)
                 if line.startswith("sepi: warning:") and line not in shown:
                     shown.add(line)
-                    print(line, flush=True)
+                    method, scene_named, reason = line.partition(f", scene {dataset}/{scene}: ")
+                    if scene_named and reason.endswith(": no such file"):
+                        without_map.setdefault(method, []).append(f"{dataset}/{scene}")
+                    else:
+                        print(line, flush=True)
+    # methods often lack maps of some scenes: one line for each method
+    for method, scenes in without_map.items():
+        more = f" and {len(scenes) - SCENES_NAMED} more" if len(scenes) > SCENES_NAMED else ""
+        print(f"{method}: no map of {', '.join(scenes[:SCENES_NAMED])}{more}", flush=True)
 
 
 def print_written():

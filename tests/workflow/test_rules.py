@@ -208,3 +208,23 @@ def test_no_command_grows_with_the_number_of_scenes(tmp_path: Path) -> None:
     )
     assert one.keys() == report
     assert one == three
+
+
+def test_the_end_names_some_scenes_without_a_map(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A method that lacks maps of hundreds of scenes must not bury the other warnings."""
+    scenes = ["dots", "wall", "rack", "stripes", "pencils"]
+    rules = Workflow(REPOSITORY, tmp_path / "run", {"builtin": {"scenes": scenes}}).read().globals
+    monkeypatch.chdir(tmp_path)
+    for number, name in enumerate(scenes):
+        log = tmp_path / "logs/builtin" / name / "external.log"
+        log.parent.mkdir(parents=True)
+        lacking = ["all", "three"] if number < 3 else ["all"]
+        lines = [f"sepi: warning: external {one}, scene builtin/{name}: a/b: no such file\n" for one in lacking]
+        log.write_text("".join(lines))
+    rules["print_warnings"]()
+    assert capsys.readouterr().out.splitlines() == [
+        "sepi: warning: external all: no map of builtin/dots, builtin/wall, builtin/rack and 2 more",
+        "sepi: warning: external three: no map of builtin/dots, builtin/wall, builtin/rack",
+    ]

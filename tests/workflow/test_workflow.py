@@ -390,7 +390,7 @@ class TestReport:
         lines = [line for line in stdout.splitlines() if line.startswith("sepi: warning: external")]
         assert any("external small, scene hci/box" in line and f"{SIZE}x40" in line for line in lines)
         assert any("external holed, scene hci/box" in line and str(10 * SIZE) in line for line in lines)
-        assert "sepi: warning: external absent: no map of some scenes" in lines
+        assert "sepi: warning: external absent: no map of hci/box" in lines
         assert "| 1.00 (16 % unknown) |" in (folder / "reports/table1_mse.md").read_text()
         page = (folder / "reports/index.html").read_text()
         assert "good (external)" in page
