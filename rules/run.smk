@@ -48,12 +48,15 @@ def print_written():
 
 
 def remove_leftovers():
-    """Remove temporary files of jobs that were killed in an earlier run."""
+    """Remove temporary files of jobs that were killed in an earlier run.
+
+    None that is younger than a day: a run of other targets in this folder, which Snakemake allows, may be writing it.
+    """
     for folder in (RESULTS, "reports"):
         for path in filter(is_temporary, list(Path(placed(folder)).rglob(".*"))):
             # its temporary folder may be gone by now
-            with suppress(FileNotFoundError):
-                if path.stat().st_mtime < STARTED:
+            with suppress(OSError):
+                if path.stat().st_mtime < STARTED - DAY:
                     remove_temporary(path)
 
 
@@ -73,3 +76,4 @@ def run_failed():
     free = shutil.disk_usage(".").free
     if free < 100_000_000:
         print(f"sepi: {os.getcwd()}: only {free / 1e6:.0f} MB are free on this disk", file=sys.stderr, flush=True)
+    remove_leftovers()
