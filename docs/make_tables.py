@@ -27,7 +27,7 @@ USUAL = {"protocol": "paper", "region": "all", "stage": "optimize"}
 """Final maps as a whole."""
 
 TABLE = re.compile(
-    r"<!-- from (?P<what>[^:]+): (?P<forms>.+?)(?P<empty> or empty)? -->\n\n?(?P<rows>(?:\|[^\n]*\n)+)", re.S
+    r"<!-- from (?P<what>[^:]+): (?P<forms>.+?)(?P<empty>\s+or\s+empty)?\s+-->\n\n?(?P<rows>(?:\|[^\n]*\n)+)", re.S
 )
 
 FIGURE = re.compile(r"\{([^:}]+):([^}]+)\}")
