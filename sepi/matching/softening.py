@@ -89,6 +89,8 @@ def compared_views(light_field: LightField, parameters: SofteningParameters, lea
         If the disparity range is unknown.
     """
     found = denoised(light_field, parameters.denoising, least_noise)
+    if parameters.softening == 0:
+        return found
     return softened(found, parameters.softening, measured_noise(light_field))
 
 
@@ -107,6 +109,11 @@ def softened(light_field: LightField, blur: float, noise: ViewNoise | None = Non
     -------
     LightField
         Of the same class; the light field itself if hardly any place is too sharp.
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
     """
     if blur == 0:
         return light_field
