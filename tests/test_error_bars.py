@@ -41,6 +41,21 @@ def test_intervals_hold_the_truth_in_whatever_noise(variant: str, sigma: float) 
     assert min(shares) > 74, shares
 
 
+@pytest.mark.parametrize("variant", ["best", "fast"])
+@pytest.mark.parametrize("grid", [(1, 2), (2, 1), (2, 2)])
+def test_views_on_one_side_leave_the_interval_as_wide_as_it_must_be(variant: str, grid: tuple[int, int]) -> None:
+    """No views on opposite sides can disagree: their agreement is unknown, and not perfect."""
+    shares = []
+    for name in NAMES:
+        whole = noisy(name, 3.0)
+        views = np.ascontiguousarray(whole.views[3 : 3 + grid[0], 3 : 3 + grid[1]])
+        few = LightField(
+            views, name, disparity_range=whole.disparity_range, view=(0, 0), ground_truth=whole.ground_truth
+        )
+        shares.append(held(few, estimate_depth(few, variant)))
+    assert 82 < np.mean(shares) < 98, shares
+
+
 def test_noise_widens_the_interval_and_a_clean_scene_has_a_narrow_one() -> None:
     """An interval that is right by being wide would be as wide without noise."""
     for name in NAMES:

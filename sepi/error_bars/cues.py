@@ -112,13 +112,14 @@ def cues_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, n
         ``agreement`` and ``detail_agreement``: mean robust weight of the views by colours and by detail.
     """
     seeing = _mean(evidence.seeing, 3) + _LEAST
+    step = np.abs(_mean(gradient, 3) / (_mean(curvature, 3) + _LEAST))
     residual = np.maximum(_mean(evidence.misfit, 3) / (_mean(evidence.agreement, 3) + _LEAST), 0)
     return {
         "deviation": _deviation(_mean(curvature, 3)),
         "wide_deviation": _deviation(_mean(curvature, 7)),
-        "step": np.abs(_mean(gradient, 3) / (_mean(curvature, 3) + _LEAST)),
+        "step": step,
         "wide_step": np.abs(_mean(gradient, 15) / (_mean(curvature, 15) + _LEAST)),
-        "disagreement": _disagreement(evidence, curvature),
+        "disagreement": _disagreement(evidence, curvature, step),
         "misfit": np.sqrt(residual / 3) / np.float32(max(noise, _LEAST_NOISE)),
         "agreement": _mean(evidence.agreement, 3) / seeing,
         "detail_agreement": _mean(evidence.detail_agreement, 3) / seeing,
@@ -139,20 +140,22 @@ def _deviation(information: FloatMap) -> FloatMap:
     return np.asarray(1 / np.sqrt(np.maximum(information, 0) + np.float32(1e-2)), np.float32)
 
 
-def _disagreement(evidence: Evidence, curvature: FloatMap) -> FloatMap:
-    """Standard deviation by the difference between the changes that opposite halves of the views ask for."""
+def _disagreement(evidence: Evidence, curvature: FloatMap, step: FloatMap) -> FloatMap:
+    """Standard deviation by the difference between the changes that opposite halves of the views ask for.
+
+    Without views on opposite sides it is unknown, and the step takes its place: where both are known, they are alike.
+    """
     halves = [[_mean(values, 3) for values in half] for half in evidence.halves]
     whole = _mean(curvature, 3)
     least = np.float32(1e-3) * whole + np.float32(1e-2)
     total, pairs = np.zeros_like(whole), 0
     for one, other in (halves[:2], halves[2:]):
         if not (one[1].any() and other[1].any()):
-            # without views on both sides there is no difference
             continue
         difference = one[0] / (one[1] + least) - other[0] / (other[1] + least)
         total += one[1] * other[1] / (one[1] + other[1] + _LEAST) * difference**2
         pairs += 1
-    return np.asarray(np.sqrt(np.maximum(total, 0) / (max(pairs, 1) * (whole + _LEAST))), np.float32)
+    return np.asarray(np.sqrt(np.maximum(total, 0) / (pairs * (whole + _LEAST))), np.float32) if pairs else step
 
 
 def _mean(values: FloatMap, size: int) -> FloatMap:
