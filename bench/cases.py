@@ -9,7 +9,7 @@ from typing import Any
 
 import h5py
 
-from bench import floor, plain, solvers
+from bench import floor, plain
 from bench.busy import stages_beside_another_program
 from bench.measure import Case, Figures, Prepared, command
 from bench.scene import VARIANT, Scene, inputs, sweep_values
@@ -154,11 +154,6 @@ def _plain_cases(scene: Scene) -> Iterator[Case]:
         )
 
 
-def _solver_cases(scene: Scene) -> Iterator[Case]:
-    for name in solvers.SOLVERS:
-        yield Case("solvers", name, solvers.prepare, (scene.path, name))
-
-
 def _storage_cases(scene: Scene) -> Iterator[Case]:
     """Writing, then reading, of each content with each of HDF5's own compressions."""
     for content in ("views", "maps", "masks"):
@@ -173,7 +168,6 @@ GROUPS: dict[str, Callable[[Scene], Iterator[Case]]] = {
     "busy": _busy_cases,
     "growth": _growth_cases,
     "beside": _plain_cases,
-    "solvers": _solver_cases,
     "storage": _storage_cases,
     "large": _large_case,
 }

@@ -57,10 +57,6 @@ def sections(result: Result) -> dict[str, list[Row]]:
         "Initial stage beside plain ones": [
             {"": name, "s per candidate": f"{seconds:.2g}"} for name, seconds in per_candidate(result).items()
         ],
-        "Solvers of the global optimisation": [
-            {"": name, "s": _figure(m.median), "largest error": f"{m.figures['largest_difference']:.0g}"}
-            for name, m in result.group("solvers").items()
-        ],
         "HDF5 compression": [_row(m, m.figures) for m in result.group("storage").values()],
     }
     return {heading: rows for heading, rows in tables.items() if rows}

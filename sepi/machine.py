@@ -20,7 +20,6 @@ LIBRARIES = (
     "scikit-image",
     "opencv-python-headless",
     "h5py",
-    "pyamg",
     "pydantic",
     "matplotlib",
     "snakemake",

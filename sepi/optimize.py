@@ -13,7 +13,6 @@ leaves planes unchanged, weights each pixel by the views' information on it. ``n
 References
 ----------
 .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
-.. [2] Olson, Schroder: PyAMG: algebraic multigrid solvers in Python v4.0. 2018.
 """
 
 from __future__ import annotations
@@ -34,14 +33,7 @@ from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
 from sepi.matching.softening import compared_views
 from sepi.matching.view_subsets import spread_views
-from sepi.regularization.wls import (
-    WlsParameters,
-    data_weight,
-    energy_system,
-    rectified_confidence,
-    smoothness_coefficient,
-    solve,
-)
+from sepi.regularization.wls import WlsParameters, data_weight, rectified_confidence, smoothness_coefficient, solve
 from sepi.stage import (
     Choice,
     NoParameters,
@@ -160,8 +152,7 @@ def wls(
     weight = data_weight(before.disparity, confidence, parameters)
     smoothness = smoothness_coefficient(light_field.reference_view, confidence, parameters)
     progress(0.1)
-    matrix, right = energy_system(before.disparity, weight, smoothness, parameters.alpha)
-    disparity = solve(matrix, right, before.disparity, parameters.rtol).astype(np.float32)
+    disparity = solve(before.disparity, weight, smoothness, parameters.alpha, parameters.rtol)
     progress(0.6)
     views = spread_views(light_field, WLS_VIEWS)
     matching = GaussNewton(light_field, BaseDetailParameters(), OcclusionMarginParameters().occlusion_margin, views)
@@ -342,7 +333,8 @@ def _smoothed(
     change.
     """
     from sepi.regularization.local_inverse import inverse_diagonal
-    from sepi.regularization.second_order import second_difference_stencil, smoothness_weights, solve_smooth
+    from sepi.regularization.multilevel import solve_smooth
+    from sepi.regularization.second_order import second_difference_stencil, smoothness_weights
 
     unit = max(float(np.percentile(curvature, 90)), 1e-9)
     weight = np.minimum(curvature / unit, 1) * prior.reliability

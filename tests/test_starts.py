@@ -12,7 +12,7 @@ from sepi.cli.main import main
 from sepi.scenes import render, write_hci
 
 SLOW = (
-    *("scipy", "skimage", "matplotlib", "pyamg", "jinja2", "snakemake", "tqdm"),
+    *("scipy", "skimage", "matplotlib", "jinja2", "snakemake", "tqdm"),
     *("PIL", "tifffile", "tabulate", "networkx", "pandas", "psutil"),
 )
 """Libraries that take longer to import than many a job takes."""

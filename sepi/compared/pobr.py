@@ -60,7 +60,7 @@ from sepi.image.superpixels import Superpixels, superpixels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
-from sepi.regularization.wls import energy_system, solve
+from sepi.regularization.wls import solve
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, relative_confidence, require_previous
 
 CANDIDATES = CandidateRule(usual=101, finest=0.02, coarsest=0.5)
@@ -203,10 +203,9 @@ def pobr_smoothing(
     floor = parameters.gradient_floor**2 + NOISE_GAIN * noise_level(image) ** 2
     smoothness = (np.exp(-parameters.tau_2 * confidence) / (edges + floor)).astype(np.float32)
     weight = np.maximum(confidence, np.float32(LEAST_CONFIDENCE)) ** 2
-    matrix, right = energy_system(before.disparity, weight, smoothness, parameters.alpha)
     progress(0.1)
-    disparity = solve(matrix, right, before.disparity, RTOL)
-    return before.updated(disparity.astype(np.float32), confidence).without_costs()
+    disparity = solve(before.disparity, weight, smoothness, parameters.alpha, RTOL)
+    return before.updated(disparity, confidence).without_costs()
 
 
 def label_deviation(disparity: FloatMap, segments: Superpixels) -> FloatMap:

@@ -1,9 +1,11 @@
-"""Conjugate gradients for second-order smoothing, with a multilevel preconditioner of bilinear hats.
+"""Solver of the global optimisation: conjugate gradients with a multilevel preconditioner of bilinear hats.
 
-Conjugate gradients take many steps for a surface that bends over many pixels. The preconditioner adds up inverse
-diagonals of the matrix on several levels: single pixels, and bilinear hats with 2, 8 and 32 pixels between nodes [1]_.
-It needs no factorisation, and a third of the steps of a diagonal combined with a direct solution for planes in blocks.
-The matrix remains a stencil. The loop is written out because importing a library for it takes longer than solving.
+The weighted least squares of the paper and the second-order smoothing both minimise ``sum_p w_p (d_p - z_p)^2 + d^T A
+d`` over disparities ``d``, where ``z`` is the data and ``w`` its weight; ``A`` is kept as a stencil instead of a sparse
+matrix. Conjugate gradients take many steps for a surface that changes over many pixels. The preconditioner adds up
+inverse diagonals of the matrix on several levels: single pixels, and bilinear hats with 2, 8 and 32 pixels between
+nodes [1]_. It needs no factorisation, and a third of the steps of a diagonal combined with a direct solution for planes
+in blocks. The loop is written out because importing a library for it takes longer than solving.
 
 References
 ----------
@@ -13,11 +15,13 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.kernels import second_order as kernels
+from sepi.lightfield import FloatMap
 
 FloatArray = npt.NDArray[np.float64]
 Inverse = Callable[[FloatArray], tuple[FloatArray, float]]
@@ -31,15 +35,67 @@ COUNTED = 2
 HALF = np.float32(0.5)
 """Height of a hat at the finer level's nodes beside its own."""
 
+MARGIN: int = kernels.MARGIN
+"""Reach of the stencil, pixels, and so the width of the zeros round the solver's pictures."""
+
+LEAST_SINGLE_RTOL = 1e-5
+"""Least residual for which single precision is enough."""
+
+LEAST_WEIGHT = 1e-9
+"""Least weight of the data, which keeps the system solvable."""
+
+
+def solve_smooth(
+    smoothness: FloatArray, weight: FloatMap, data: FloatMap, start: FloatMap, rtol: float, max_iterations: int
+) -> FloatMap:
+    """Disparities that minimise the energy.
+
+    Parameters
+    ----------
+    smoothness : ndarray, shape (N, H + 2 MARGIN, W + 2 MARGIN), float64
+        ``A``: the first N <= 7 entries of each pixel with itself and with the pixels to the right by 1 and 2, below by
+        1 and 2, below to the right, and below to the left, in a margin of zeros. This function adds the data's weights.
+    weight, data : ndarray, shape (H, W), float32
+        ``w`` and ``z``.
+    start : ndarray, shape (H, W), float32
+        Initial disparities.
+    rtol : float
+        Residual at which the solver stops, relative to the data's deviations from their mean.
+    max_iterations : int
+        Most steps of the solver.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+    """
+    if not weight.any():
+        # without weights any plane is a solution
+        return data
+    w = np.maximum(weight.astype(np.float64), LEAST_WEIGHT)
+    # smoothness ignores constants: without the mean, rtol does not depend on the zero of disparity
+    mean = np.average(data, weights=w)
+    inside = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
+    # single precision takes a third of the time; it changes the solution by a hundredth of its error
+    dtype: Any = np.float32 if rtol >= LEAST_SINGLE_RTOL else np.float64
+    smoothness[0][inside] += w
+    packed = smoothness.astype(dtype)
+    inverse = multilevel_inverse(smoothness, dtype)
+    # frees its memory unless the caller holds it
+    del smoothness
+    right, first = np.zeros((2, *packed.shape[1:]), dtype)
+    right[inside], first[inside] = w * (data - mean), start - mean
+    solution = conjugate_gradients(packed, inverse, right, first, rtol, max_iterations)
+    return np.asarray(solution[inside] + mean, np.float32)
+
 
 def conjugate_gradients(
     stencil: FloatArray, inverse: Inverse, right: FloatArray, start: FloatArray, rtol: float, max_iterations: int
 ) -> FloatArray:
-    """Solution of a system of the smoothing, by preconditioned conjugate gradients.
+    """Solution of a system, by preconditioned conjugate gradients.
 
     Parameters
     ----------
-    stencil : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float32 or float64
+    stencil : ndarray, shape (N, H + 2 MARGIN, W + 2 MARGIN), float32 or float64
         The matrix, as for :func:`multilevel_inverse`.
     inverse : callable
         Preconditioner from :func:`multilevel_inverse`, of the same type.
@@ -75,13 +131,12 @@ def conjugate_gradients(
 
 
 def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
-    """Approximate inverse of a matrix of the smoothing, symmetric and positive.
+    """Approximate inverse of a matrix, symmetric and positive.
 
     Parameters
     ----------
-    stencil : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
-        :func:`sepi.regularization.second_order.second_difference_stencil` plus the data's weights, with a margin of
-        zeros.
+    stencil : ndarray, shape (N, H + 2 MARGIN, W + 2 MARGIN), float64
+        The smoothness, as for :func:`solve_smooth`, plus the data's weights.
     dtype : dtype
         Type in which the inverse is applied, float32 or float64.
 

@@ -9,14 +9,13 @@ sparse matrix; :mod:`sepi.regularization.multilevel` solves it.
 from __future__ import annotations
 
 from itertools import combinations_with_replacement
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.kernels import second_order as kernels
 from sepi.lightfield import FloatMap
-from sepi.regularization.multilevel import conjugate_gradients, multilevel_inverse
+from sepi.regularization.multilevel import MARGIN
 
 FloatArray = npt.NDArray[np.float64]
 Corner = tuple[slice, slice]
@@ -27,12 +26,6 @@ _ALONG_X = ((_ALL, slice(None, -2)), (_ALL, slice(1, -1)), (_ALL, slice(2, None)
 _ALONG_Y = ((slice(None, -2), _ALL), (slice(1, -1), _ALL), (slice(2, None), _ALL))
 _BACK, _ON = slice(None, -1), slice(1, None)
 _ACROSS = ((_BACK, _BACK), (_BACK, _ON), (_ON, _BACK), (_ON, _ON))
-
-MARGIN: int = kernels.MARGIN
-"""Reach of second differences, pixels, and so the width of the zeros round the solver's pictures."""
-
-LEAST_SINGLE_RTOL = 1e-5
-"""Least residual for which single precision is enough."""
 
 # along x, along y and mixed: rows and columns of the pixels of a difference, and their factors
 _DIFFERENCES = (
@@ -139,45 +132,3 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
             entry = stencil[_ENTRIES.index((below - y, right - x)), MARGIN + y :, MARGIN + x :]
             entry[:height, :width] += of_one * of_other * weight
     return stencil
-
-
-def solve_smooth(
-    smoothness: FloatArray, weight: FloatMap, data: FloatMap, start: FloatMap, rtol: float, max_iterations: int
-) -> FloatMap:
-    """Disparities that minimise the energy.
-
-    Parameters
-    ----------
-    smoothness : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
-        From :func:`second_difference_stencil`, times the strength; this function adds the data's weights to it.
-    weight, data : ndarray, shape (H, W), float32
-        ``w`` and ``z``.
-    start : ndarray, shape (H, W), float32
-        Initial disparities.
-    rtol : float
-        Residual at which the solver stops, relative to the data's deviations from their mean.
-    max_iterations : int
-        Most steps of the solver.
-
-    Returns
-    -------
-    ndarray, shape (H, W), float32
-    """
-    if not weight.any():
-        # without weights any plane is a solution
-        return data
-    w = weight.astype(np.float64) + 1e-9
-    # smoothness ignores constants: without the mean, rtol does not depend on the zero of disparity
-    mean = np.average(data, weights=w)
-    inside = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
-    # single precision takes a third of the time; it changes the solution by a hundredth of its error
-    dtype: Any = np.float32 if rtol >= LEAST_SINGLE_RTOL else np.float64
-    smoothness[0][inside] += w
-    packed = smoothness.astype(dtype)
-    inverse = multilevel_inverse(smoothness, dtype)
-    # frees its memory unless the caller holds it
-    del smoothness
-    right, first = np.zeros((2, *packed.shape[1:]), dtype)
-    right[inside], first[inside] = w * (data - mean), start - mean
-    solution = conjugate_gradients(packed, inverse, right, first, rtol, max_iterations)
-    return np.asarray(solution[inside] + mean, np.float32)

@@ -3,12 +3,9 @@
 References
 ----------
 .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
-.. [2] Olson, Schroder: PyAMG: algebraic multigrid solvers in Python v4.0. 2018.
 """
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -16,18 +13,16 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.lightfield import BoolMap, FloatMap
+from sepi.regularization.multilevel import MARGIN, solve_smooth
 from sepi.stage import Parameters, relative_confidence
-
-if TYPE_CHECKING:
-    import scipy.sparse as sparse
 
 FloatArray = npt.NDArray[np.float64]
 
 LEAST_CONFIDENCE = 0.01
 """Least confidence, which keeps the system solvable."""
 
-ITERATIONS_BEFORE_MULTIGRID = 200
-"""Number of iterations that take about as long as setting up the multigrid."""
+MOST_ITERATIONS = 1000
+"""Most steps of the solver, which hardly ever takes more than a hundred."""
 
 
 class WlsParameters(Parameters):
@@ -76,50 +71,25 @@ def smoothness_coefficient(reference_view: FloatMap, confidence: FloatMap, param
     return np.asarray(np.exp(-parameters.tau_2 * confidence) / (squared + parameters.gradient_floor**2), np.float32)
 
 
-def energy_system(
-    disparity: FloatMap, weight: FloatMap, smoothness: FloatMap, alpha: float
-) -> tuple[sparse.csr_matrix, FloatArray]:
-    """Normal equations of Eq. 8 on the 4-connected grid.
+def solve(disparity: FloatMap, weight: FloatMap, smoothness: FloatMap, alpha: float, rtol: float) -> FloatMap:
+    """Disparity of least energy, Eq. 8; shape (H, W), float32.
 
-    The sum holds each pair of neighbours twice, with the coefficient of either pixel.
-
-    Returns
-    -------
-    matrix : sparse matrix, shape (H * W, H * W), float64
-        Symmetric, positive definite.
-    right : ndarray, shape (H * W,), float64
+    The solver stops at a residual of ``rtol`` times the right side.
     """
-    import scipy.sparse as sparse
-
-    H, W = disparity.shape
-    index = np.arange(H * W).reshape(H, W)
-    s = alpha * smoothness.astype(np.float64)
-    first = np.concatenate([index[:, :-1].ravel(), index[:-1].ravel()])
-    second = np.concatenate([index[:, 1:].ravel(), index[1:].ravel()])
-    pair = np.concatenate([(s[:, :-1] + s[:, 1:]).ravel(), (s[:-1] + s[1:]).ravel()])
-    w = weight.astype(np.float64).ravel()
-    off = sparse.coo_matrix((-pair, (first, second)), shape=(H * W, H * W))
-    off = (off + off.T).tocsr()
-    diagonal = w - np.asarray(off.sum(axis=1)).ravel()
-    return (off + sparse.diags(diagonal)).tocsr(), w * disparity.ravel()
+    stencil = _smoothness_stencil(smoothness, alpha)
+    return solve_smooth(stencil, weight, disparity, disparity, rtol, MOST_ITERATIONS)
 
 
-def solve(matrix: sparse.csr_matrix, right: FloatArray, start: FloatMap, rtol: float) -> FloatArray:
-    """Solution of the normal equations by conjugate gradients; shape of ``start``, float64.
+def _smoothness_stencil(smoothness: FloatMap, alpha: float) -> FloatArray:
+    """Matrix of the smoothness on the 4-connected grid; shape (4, H + 2 MARGIN, W + 2 MARGIN), float64.
 
-    With little smoothness, the diagonal is a sufficient preconditioner, and setting up an algebraic multigrid [2]_
-    would take several times as long as the solution. If a residual of ``rtol`` times the right side is not reached
-    soon, the multigrid takes over: its number of iterations does not grow with smoothness or scarce data.
+    The sum of Eq. 8 holds each pair of neighbours twice, with the coefficient of either pixel.
     """
-    import scipy.sparse as sparse
-    from scipy.sparse.linalg import cg
-
-    vector = start.astype(np.float64).ravel()
-    inverse = sparse.diags_array(1 / matrix.diagonal())
-    solution, missed = cg(matrix, right, x0=vector, rtol=rtol, maxiter=ITERATIONS_BEFORE_MULTIGRID, M=inverse)
-    if missed:
-        import pyamg  # slow to import, seldom needed
-
-        hierarchy = pyamg.ruge_stuben_solver(matrix)
-        solution = hierarchy.solve(right, x0=solution, tol=rtol, accel="cg", maxiter=100)
-    return np.asarray(solution).reshape(start.shape)
+    s = alpha * np.pad(smoothness.astype(np.float64), MARGIN)
+    inside = np.pad(np.ones(smoothness.shape, bool), MARGIN)
+    stencil = np.zeros((4, *s.shape))
+    for entry, axis in ((1, 1), (3, 0)):
+        pair = np.where(inside & np.roll(inside, -1, axis), s + np.roll(s, -1, axis), 0)
+        stencil[entry] = -pair
+        stencil[0] += pair + np.roll(pair, 1, axis)
+    return stencil

@@ -5,7 +5,8 @@ import pytest
 from scipy.sparse import diags
 
 from sepi.regularization.local_inverse import inverse_diagonal
-from sepi.regularization.second_order import MARGIN, second_difference_stencil
+from sepi.regularization.multilevel import MARGIN
+from sepi.regularization.second_order import second_difference_stencil
 
 SIZE = 40
 INNER = np.s_[7:-7, 7:-7]

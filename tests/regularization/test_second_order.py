@@ -20,16 +20,14 @@ from sepi.matching.surface_windows import Surfaces, windowed_step
 from sepi.matching.view_subsets import spread_views
 from sepi.optimize import SecondOrderParameters, second_order
 from sepi.pipeline import estimate_depth
-from sepi.regularization.multilevel import multilevel_inverse
+from sepi.regularization.multilevel import LEAST_SINGLE_RTOL, multilevel_inverse, solve_smooth
+from sepi.regularization.multilevel import MARGIN as MARGIN_OF_STENCIL
 from sepi.regularization.second_order import (
-    LEAST_SINGLE_RTOL,
     colour_changes,
     second_difference_stencil,
     smoothness_weights,
-    solve_smooth,
     upper_quartile,
 )
-from sepi.regularization.second_order import MARGIN as MARGIN_OF_STENCIL
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 from sepi.workspace import Workspace
@@ -248,7 +246,7 @@ def test_solver_agrees_with_a_direct_one(shape, rtol, error) -> None:
     weight = random.uniform(0, 1, shape).astype(np.float32) ** 4
     weights = [random.uniform(0, 1, w.shape) for w in weights_of(data)]
     smooth = sum(d.T @ diags(w.ravel()) @ d for d, w in zip(second_differences(shape), weights, strict=True))
-    system = (10 * smooth + diags(weight.ravel() + 1e-9)).tocsc()
+    system = (10 * smooth + diags(np.maximum(weight.ravel(), 1e-9))).tocsc()
     expected = spsolve(system, weight.ravel().astype(float) * data.ravel())
     found = solve_smooth(10 * second_difference_stencil(weights, shape), weight, data, data, rtol, 2000)
     np.testing.assert_allclose(found.ravel(), expected, atol=error)

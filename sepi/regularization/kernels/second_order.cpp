@@ -1,4 +1,4 @@
-// Second-order smoothing: its matrix, as a stencil, and the hats of its preconditioner.
+// The matrix of the global optimisation, as a stencil, the hats of its preconditioner, and the weights of second-order smoothing.
 //
 // Pictures have a margin of MARGIN pixels of zeros on each side, so that loops need no border cases; hats have none.
 // Node i of the finest level lies at SPACING i - 0.5 pixels. A coarser level has every other node; each of its hats is
@@ -18,7 +18,7 @@ constexpr Index SPACING = 2;  // distance of nodes of the finest hats, pixels
 // Heights of the finest hats at the pixels beside a node, and at the next ones.
 constexpr float NEAR = 0.75f, FAR = 0.25f;
 
-// Entries of the stencil: rows and columns from one pixel to the other.
+// Entries of the stencil, which may have the first of them alone: rows and columns from one pixel to the other.
 constexpr Index ENTRIES[7][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 0}, {2, 0}, {1, 1}, {1, -1}};
 
 // Add values, times a factor, to a row.
@@ -76,7 +76,7 @@ double bend(Array<const Number, 3> stencil, Array<const Number, 2> direction, Ar
         const Number *own = stencil.at(0, y, MARGIN), *here = direction.at(y, MARGIN);
         Number *__restrict target = out.at(y, MARGIN);
         for (Index x = 0; x < W; ++x) target[x] = own[x] * here[x];
-        for (Index k = 1; k < 7; ++k) {
+        for (Index k = 1; k < stencil.shape[0]; ++k) {
             // one entry and its transpose; few arrays at a time, so that the loop vectorises
             const auto [dy, dx] = ENTRIES[k];
             const Number *forth = stencil.at(k, y, MARGIN), *there = direction.at(y + dy, MARGIN + dx);
@@ -158,7 +158,7 @@ void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<doubl
         const Scratch<double, 1> lines(spacing * (w + 1));
         double *line = lines.array().data, *__restrict target = out.at(i);
         std::fill_n(target, w, 0.0);
-        for (Index k = 0; k < 7; ++k) {
+        for (Index k = 0; k < stencil.shape[0]; ++k) {
             const auto [dy, dx] = ENTRIES[k];
             std::fill_n(line, spacing * (w + 1), 0.0);
             for (Index p = 0; p < reach; ++p) {
