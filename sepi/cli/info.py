@@ -104,14 +104,15 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
 
     Programs differ in the direction of rows and columns of views, and in which of them comes first. In a wrong order,
     depth is inside out or meaningless. The command compares the views in all eight orders, and names the flag for the
-    right one. It also names views that match none of the others, and warns if a part of the scene lies outside the
-    disparity range. The exit code is 1 if another order fits clearly better, the views fit in no order, or some match
-    none of the others; 2 if INPUT cannot be read.
+    right one. It also names views that match none of the others, tells how much of the texture is too sharp to be
+    interpolated, and warns if a part of the scene lies outside the disparity range. The exit code is 1 if another order
+    fits clearly better, the views fit in no order, or some match none of the others; 2 if INPUT cannot be read.
     """
     from sepi.inspection.disparity_range import settle_range
     from sepi.inspection.odd_views import odd_views
     from sepi.inspection.row_spacing import settle_row_spacing
     from sepi.inspection.view_order import check_order
+    from sepi.matching.softening import LEAST_SHARE, share_too_sharp
 
     try:
         light_field = reading.read(light_field_path, check_order=False)
@@ -120,7 +121,11 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
     except SepiError as error:
         click.echo(f"sepi: {error}", err=True)
         context.exit(2)
-    found, odd = check_order(light_field, reading.options.order), odd_views(light_field)
+    found, odd, sharp = check_order(light_field, reading.options.order), odd_views(light_field), 0.0
+    if not odd and found.warning() is None:
+        # views without texture have no range; this is no failure here
+        with suppress(SepiError):
+            sharp = share_too_sharp(settle_range(light_field))
     if as_json:
         known = {
             **_described(light_field),
@@ -135,6 +140,7 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
             "warning": found.warning(),
             "fits_none": bool(found.fits_none),
             "odd_views": odd,
+            "too_sharp": sharp,
         }
         click.echo(json.dumps(known, allow_nan=False))
     else:
@@ -142,13 +148,15 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
         click.echo("order, and how well the views match in it (matching cost, 0 to 1; less is better):")
         for order, cost in found.fits.items():
             click.echo(f"  {order:24}{cost:8.4f}{'  best' if order == found.best and found.clear else ''}")
+        if sharp >= LEAST_SHARE:
+            click.echo(
+                f"{100 * sharp:.0f} % of the picture has texture above 0.3 cycles a pixel, as downscaling without "
+                "smoothing leaves it; depth compares slightly blurred views there"
+            )
         for line in (*odd, found.verdict()):
             click.echo(line)
     if odd or found.warning() is not None:
         context.exit(1)
-    # views without texture have no range; this is no failure here
-    with suppress(SepiError):
-        settle_range(light_field)
 
 
 def size_text(light_field: LightField) -> str:

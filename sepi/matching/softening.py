@@ -154,15 +154,34 @@ def sharpness(picture: FloatMap, variance: FloatMap) -> FloatMap:
     return np.asarray(cv2.blur(share, (_DENSE, _DENSE)), np.float32)
 
 
+def share_too_sharp(light_field: LightField) -> float:
+    """Share of the reference view, 0..1, whose texture is too sharp for interpolation.
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
+    """
+    return _share_too_sharp(light_field, _grey_variance(light_field, measured_noise(light_field)))
+
+
+def _grey_variance(light_field: LightField, noise: ViewNoise) -> FloatMap:
+    """Variance of the noise in grey; within the window, views are as bright as the reference view."""
+    return (_OF_GREY**2 * expected_variance(light_field, noise)).astype(np.float32)
+
+
+def _share_too_sharp(light_field: LightField, variance: FloatMap) -> float:
+    return float(np.mean(_too_sharp(light_field.views[light_field.reference_position], variance) > 0))
+
+
 def _softened_views(light_field: LightField, noise: ViewNoise, blur: float) -> npt.NDArray[Any] | None:
     """Views blurred where they are too sharp; None if hardly any place is."""
     views = light_field.views
     if light_field.missing is not None:
         # pixels that a view does not show are black; a blur would mix them into their neighbours
         return None
-    # within the window, views are as bright as the reference view
-    variance = (_OF_GREY**2 * expected_variance(light_field, noise)).astype(np.float32)
-    if np.mean(_too_sharp(views[light_field.reference_position], variance) > 0) < LEAST_SHARE:
+    variance = _grey_variance(light_field, noise)
+    if _share_too_sharp(light_field, variance) < LEAST_SHARE:
         return None
     out = np.zeros_like(views)
 

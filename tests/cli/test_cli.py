@@ -339,6 +339,20 @@ def test_depth_and_check_tell_that_near_and_far_are_open(scene: Path) -> None:
     assert f"note: {said}\n" in call("depth", "plane.npy", "-o", "out", *FAST).stdout
 
 
+def test_check_tells_that_texture_is_too_sharp_to_be_interpolated(scene: Path) -> None:
+    """Whoever made the views smaller without smoothing can make better ones."""
+    soft = np.random.default_rng(0).random((96, 96, 3))
+    for _ in range(3):
+        soft = (soft + np.roll(soft, 1, axis=0) + np.roll(soft, 1, axis=1) + np.roll(soft, (1, 1), axis=(0, 1))) / 4
+    small = np.random.default_rng(0).random((96, 96, 3))
+    for picture, expected in ((soft, False), (small, True)):
+        moved = [np.roll(picture, (2 - t, 2 - s), axis=(0, 1)) for t in range(5) for s in range(5)]
+        np.save("views.npy", np.uint8(255 * np.reshape(moved, (5, 5, 96, 96, 3))))
+        called = call("check", "views.npy")
+        assert ("smoothing" in called.stdout) == expected, called.stdout
+        assert called.exit_code == 0
+
+
 def test_check_fails_where_a_view_is_of_another_scene(scene: Path) -> None:
     views = render("curved_occluders", size=96, views=5).views
     views[0, 1] = render("dots", size=96, views=5).views[0, 1]
