@@ -11,7 +11,7 @@ from types import NoneType
 import numpy as np
 
 from sepi.errors import SepiError, SepiWarning
-from sepi.inspection.coded_views import coded_views
+from sepi.inspection.coded_views import told_of_coding
 from sepi.io.provenance import reading_record
 from sepi.io.readers.arrays import UnclearAxesError
 from sepi.io.readers.camera_positions import with_row_spacing
@@ -117,7 +117,7 @@ def read_light_field(
         light_field = replace(light_field, source=str(path), reading=record)
     if given is not None:
         light_field = light_field.with_range(given)
-    if coded := coded_views(light_field):
+    if coded := told_of_coding(light_field):
         light_field = replace(light_field, notes=(*light_field.notes, coded))
     found = [_depth_warning(light_field)]
     if check_order:

@@ -1,24 +1,40 @@
 """Views that were compressed with loss are told, and no others."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from sepi.inspection.coded_views import coded_views
+from sepi import estimate_depth
+from sepi.inspection.coded_views import coding_error, without_blocks
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
+
+
+def coded(view: np.ndarray, quality: int) -> np.ndarray:
+    return cv2.imdecode(cv2.imencode(".jpg", view, [cv2.IMWRITE_JPEG_QUALITY, quality])[1], 1)
+
+
+@pytest.mark.parametrize(("name", "most"), [("fronto_parallel", 0.02), ("dots", 0.15)])
+def test_blocks_do_not_draw_surfaces_to_disparity_0(name: str, most: float) -> None:
+    """Most of both scenes went there."""
+    scene = render(name, size=160, views=5)
+    views = np.reshape([coded(view, 30) for view in scene.views.reshape(25, 160, 160, 3)], scene.views.shape)
+    error = np.abs(estimate_depth(replace(scene, views=views), "fast").disparity - scene.ground_truth)
+    assert np.mean(error > 0.1) < most
+    faint = LightField(np.stack([[coded(view, 95) for view in scene.views[0]]]), name)
+    assert without_blocks(faint) is faint
 
 
 def test_blocks_are_told_wherever_they_begin(tmp_path: Path) -> None:
     """Bare walls are drawn to disparity 0, with a narrow interval."""
     views = render("pyramids", size=200, views=3).views
     for row, column in np.ndindex(3, 3):
-        coded = cv2.imdecode(cv2.imencode(".jpg", views[row, column], [cv2.IMWRITE_JPEG_QUALITY, 50])[1], 1)
         # a part of the pictures, as a crop is
-        cv2.imwrite(str(tmp_path / f"{row}_{column}.png"), coded[3:, 5:])
+        cv2.imwrite(str(tmp_path / f"{row}_{column}.png"), coded(views[row, column], 50)[3:, 5:])
     notes = read_light_field(tmp_path, check_order=False).notes
     assert any("compressed with loss" in note for note in notes)
 
@@ -29,4 +45,4 @@ def test_scenes_that_no_coder_saw_have_no_blocks(name: str) -> None:
     views = render(name, size=192, views=2).views
     noise = np.random.default_rng(0).normal(0, 3, views.shape)
     noisy = np.clip(np.rint(views + noise), 0, 255).astype(np.uint8)
-    assert coded_views(LightField(views, name)) is coded_views(LightField(noisy, name)) is None
+    assert coding_error(LightField(views, name)) == coding_error(LightField(noisy, name)) == 0

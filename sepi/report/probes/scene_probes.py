@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sepi.exposure import equally_bright
+from sepi.inspection.coded_views import without_blocks
 from sepi.io.provenance import history_of
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.report.panels import SceneResults
@@ -34,7 +35,7 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
     """
     maps = results.final(MAIN_VARIANT)
     # as in the stages
-    light_field = equally_bright(results.light_field)
+    light_field = without_blocks(equally_bright(results.light_field))
     pixels = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
     parameters = sweep_parameters(final_file)
     return [
