@@ -69,7 +69,7 @@ test-system: $(READY)
 
 # by g++, whose libraries have what the checks need, for this very processor; in place of the built kernels of any, which the
 # next `make` puts back. Python does not free all at its end
-KERNEL_TESTS := tests/matching tests/boundaries tests/regularization tests/error_bars tests/inspection tests/compared tests/applications
+KERNEL_TESTS := tests/matching tests/boundaries tests/regularization tests/error_bars tests/inspection tests/extensions tests/applications
 sanitize: $(READY)
 	mkdir -p build
 	CXX=g++ $(BUILD) -G Ninja -S . -B build/sanitized -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O1 \
@@ -220,7 +220,7 @@ clean:
 
 # then the package itself in place, and its kernels built; those that were edited are built again where pip put them
 BUILD = PATH="$(CURDIR)/$(BIN):$$PATH" cmake
-$(READY): .venv/installed CMakeLists.txt $(wildcard sepi/kernels/*.?pp sepi/*/kernels/*.?pp)
+$(READY): .venv/installed CMakeLists.txt $(wildcard sepi/kernels/*.?pp sepi/*/kernels/*.?pp sepi/extensions/*/kernels/*.?pp)
 	[ -f .venv/placed ] || $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	[ ! -f .venv/placed ] || $(MAKE) --no-print-directory kernels
 	touch .venv/placed $@

@@ -51,7 +51,7 @@ rule scenes:
 rule ablation:
     input:
         ablation_files(),
-        result_files([name for name in VARIANTS if name not in METHODS | LEARNED]),
+        result_files([name for name in VARIANTS if name not in added("variants")]),
     message:
         "all ablations are made"
 
@@ -60,7 +60,7 @@ rule ablation:
 rule comparison:
     input:
         report_files(COMPARISON),
-        result_files(METHODS),
+        result_files(compared_methods()),
     message:
         "all compared methods are computed"
 

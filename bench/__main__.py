@@ -16,7 +16,6 @@ from bench.measure import Case, Measurement, Result, measured, read_result
 from bench.noisy import DIGITS
 from bench.scene import Scene
 from sepi.command import SepiGroup
-from sepi.compared.methods import LEARNED
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
@@ -26,7 +25,7 @@ from sepi.rendered import NOISE_LEVELS
 from sepi.scenes import SCENES, render
 from sepi.scoring.scores import SCORES
 from sepi.threads import available_cores, use_threads
-from sepi.variants import VARIANTS, variant_named
+from sepi.variants import VARIANTS, needing_files, variant_named
 
 if TYPE_CHECKING:
     from bench.error_samples import Sample
@@ -159,7 +158,7 @@ def digests(scene: str, size: int, views: int, threads: tuple[int, ...], variant
 
     conditions = [*map(Condition, threads), Condition(threads[-1], baseline=True)]
     # the package includes no network
-    chosen = variants or tuple(name for name in VARIANTS if name not in LEARNED)
+    chosen = variants or tuple(name for name in VARIANTS if name not in needing_files())
     with tqdm(conditions, disable=None, leave=False, bar_format="{n}/{total} {desc} |{bar}|") as bar:
         found = [digests_of(condition, chosen, scene, size, views) for condition in bar]
     rows = []

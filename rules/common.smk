@@ -10,10 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from sepi.command import WORKFLOW_PROCESS
-from sepi.compared.methods import LEARNED, METHODS
 from sepi.errors import SepiError
 from sepi.io.result_files import RESULT_FILES
-from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of
+from sepi.registry import added
+from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of, compared_methods
 from sepi.report.plan import Plan
 from sepi.validation import require_known
 from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, keep, remember, render_modules, stage_modules

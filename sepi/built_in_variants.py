@@ -1,14 +1,12 @@
 """The built-in variants: a choice for each stage.
 
 ``sepi depth`` uses ``best``, ``fast`` takes half its time, and ``paper`` is the method as published. The others are
-rows of the ablations, and the methods that the paper compares with.
+rows of the ablations. Extensions add more.
 """
 
 from __future__ import annotations
 
 from typing import Any
-
-from sepi.compared.methods import LEARNED, METHODS
 
 UNCORRECTED = "no_noise_correction"
 """The paper's method without the correction of costs for noise; not a column of the paper's tables."""
@@ -66,8 +64,6 @@ ENTRIES: dict[str, dict[str, Any]] = {
     "best_no_surfaces": {"base": "best", "optimize": {"one_surface": False}},
     "best_no_smoothing": {"base": "best", "optimize": {"refinements": 3, "solves": 0}},
     "best_wls": {"base": "best", "optimize": "wls"},
-    **METHODS,
-    **LEARNED,
 }
 """Name to entry of each variant, see :data:`sepi.variants.VARIANT_ENTRIES`."""
 

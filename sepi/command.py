@@ -218,28 +218,29 @@ def write_timing(path: Path, started: float, threads: int, **more: Any) -> None:
 
 
 def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
-    """The command ``python -m sepi.STAGE``, with the stage's own choices and those of the compared methods.
+    """The command ``python -m sepi.STAGE``, with the stage's own choices and those of extensions.
 
     The command reads a light field and the maps of the stage before, runs one choice, and writes one stage file, whole
     or not at all.
     """
-    from sepi.compared.methods import StageChoices
     from sepi.exposure import equally_bright
     from sepi.inspection.coded_views import without_blocks
     from sepi.io.hdf5 import read_light_field, read_stage, write_stage
     from sepi.io.provenance import history_of, stage_attributes
     from sepi.models import validated
+    from sepi.registry import stage_choices
     from sepi.stage import entry
     from sepi.threads import use_threads
+    from sepi.validation import require_known
     from sepi.workspace import Workspace
 
     existing = click.Path(path_type=Path)
-    choices = StageChoices(stage, own)
+    choices = stage_choices(stage, own)
 
     @click.command(name=f"python -m sepi.{stage}", cls=SepiCommand, help=f"Run the stage '{stage}' on one light field.")
     @click.option("--light-field", "light_field_path", type=existing, required=True, help="HDF5 file from ingest.")
     @click.option("--previous", type=existing, help="File of the stage before; not for the first stage.")
-    @click.option("--choice", type=click.Choice(list(choices)), required=True, help="Choice of this stage.")
+    @click.option("--choice", metavar="NAME", required=True, help="Choice of this stage.")
     @click.option("--parameters", default="{}", show_default=True, help="JSON object of parameters.")
     @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
     @click.option("--output", type=existing, required=True, help="Stage file to write.")
@@ -255,6 +256,7 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     ) -> None:
         started = time.perf_counter()
         use_threads(threads)
+        require_known("--choice", [choice], choices)
         chosen = choices[choice]
         settings = validated(chosen.parameters, _json_object(parameters), f"{stage}.{choice}")
         light_field = read_light_field(light_field_path)

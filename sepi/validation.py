@@ -8,7 +8,7 @@ import math
 import operator
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,8 @@ def settings_of(texts: Iterable[str], example: str) -> dict[str, Any]:
 
 def require_known(where: str, names: Iterable[str], known: Iterable[str]) -> None:
     """Raise for the first of ``names`` that is not ``known``; the error suggests the nearest and lists all."""
-    allowed = list(known)
+    # a mapping may load what it lists
+    allowed = known if isinstance(known, Mapping) else list(known)
     unknown = next((str(name) for name in names if name not in allowed), None)
     if unknown is None:
         return

@@ -28,17 +28,17 @@ from typing import Any
 
 from sepi import initial, occlusion, optimize, textureless
 from sepi.built_in_variants import ENTRIES
-from sepi.compared.methods import StageChoices
 from sepi.errors import SepiError
 from sepi.models import validated
+from sepi.registry import Known, added, extensions, stage_choices
 from sepi.stage import Choice, Parameters
 from sepi.validation import require_known, require_type
 
-STAGES: dict[str, StageChoices] = {
-    "initial": StageChoices("initial", initial.CHOICES),
-    "occlusion": StageChoices("occlusion", occlusion.CHOICES),
-    "textureless": StageChoices("textureless", textureless.CHOICES),
-    "optimize": StageChoices("optimize", optimize.CHOICES),
+STAGES: dict[str, Known[Choice]] = {
+    "initial": stage_choices("initial", initial.CHOICES),
+    "occlusion": stage_choices("occlusion", occlusion.CHOICES),
+    "textureless": stage_choices("textureless", textureless.CHOICES),
+    "optimize": stage_choices("optimize", optimize.CHOICES),
 }
 """Stage to its choices, in the order in which the stages run."""
 
@@ -56,7 +56,7 @@ _LONGEST_LABEL = 120
 def add_choice(stage: str, name: str, choice: Choice) -> None:
     """Add a choice of your own to a stage, for variants in this process.
 
-    Adding it again replaces it, as in a notebook whose cell runs twice. See docs/reproduce/compared.md for a method
+    Adding it again replaces it, as in a notebook whose cell runs twice. See docs/develop/extensions.md for a method
     that the command line and the workflow should know, too.
 
     Parameters
@@ -252,11 +252,11 @@ def _chosen(stage: str, given: Any, base: Variant | None, where: str) -> tuple[s
     return choice, {key: getattr(checked, key) for key in own}
 
 
-VARIANT_ENTRIES: dict[str, dict[str, Any]] = ENTRIES
+VARIANT_ENTRIES: Known[dict[str, Any]] = Known("variants", ENTRIES, lambda _, entry: entry)
 """The built-in variants as entries for :func:`variant_from`: the paper's method, the other four columns of its table 4
 in order, the text's other occlusion stage, and the paper's method without noise correction; then the most accurate
-variant, a fast one, and the most accurate one with a part switched off or replaced by the paper's; then the compared
-methods (:mod:`sepi.compared`)."""
+variant, a fast one, and the most accurate one with a part switched off or replaced by the paper's; then what extensions
+add, such as the compared methods."""
 
 
 def variant_named(name: str) -> Variant:
@@ -335,3 +335,13 @@ def _built_in(name: str) -> Variant:
 
 VARIANTS: Mapping[str, Variant] = _BuiltIn()
 """Name to built-in variant."""
+
+
+def needing_files() -> frozenset[str]:
+    """Built-in variants that need files of the user, so that reports have them only on request."""
+    return frozenset(name for extension in extensions().values() for name in extension.on_request)
+
+
+def compared_methods() -> tuple[str, ...]:
+    """Built-in variants that extensions add, other authors' methods, in the order of tables."""
+    return tuple(name for name in added("variants") if name not in needing_files())

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sepi.compared.methods import LEARNED, METHODS
 from sepi.inspection.disparity_range import estimate_range
 from sepi.inspection.view_order import check_order
 from sepi.lightfield import LightField
 from sepi.scenes import render
 from sepi.scoring.regions import textureless
 from sepi.stage import CostVolume, StageMaps, no_progress
-from sepi.variants import STAGES, VARIANTS
+from sepi.variants import STAGES, VARIANTS, compared_methods, needing_files
 
 pytestmark = pytest.mark.slow
 
@@ -34,7 +33,11 @@ def grey_and_rgb(kind: type) -> tuple[LightField, LightField]:
 
 
 # of the compared methods' choices, which are slow, in one kind: they compute with floats whatever the kind
-OWN = {(stage, choice) for name in VARIANTS.keys() - METHODS.keys() for stage, choice in VARIANTS[name].choices.items()}
+OWN = {
+    (stage, choice)
+    for name in VARIANTS.keys() - set(compared_methods())
+    for stage, choice in VARIANTS[name].choices.items()
+}
 
 
 @pytest.mark.parametrize(
@@ -43,7 +46,7 @@ OWN = {(stage, choice) for name in VARIANTS.keys() - METHODS.keys() for stage, c
         (stage, choice, kind)
         for stage, choices in STAGES.items()
         for choice in choices
-        if choice not in LEARNED
+        if choice not in needing_files()
         for kind in (KINDS if (stage, choice) in OWN else ["uint8"])
     ],
 )

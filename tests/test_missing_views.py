@@ -6,17 +6,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sepi.compared.methods import METHODS
 from sepi.inspection.disparity_range import estimate_range
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.scoring.scores import score
+from sepi.variants import compared_methods
 
 pytestmark = pytest.mark.slow
 
 # those that have a choice, or a way through it, that no other has; the rest leave parts of these out
-DIFFERENT = ("paper", "no_sepi", "wang", "best", "best_no_detail", "fast", *METHODS)
+DIFFERENT = ("paper", "no_sepi", "wang", "best", "best_no_detail", "fast", *compared_methods())
 # so many that quick variants look at some of them only
 VIEWS = 7
 C = VIEWS // 2
@@ -62,7 +62,7 @@ def disparity_without(shape: str, variant: str) -> np.ndarray:
 # compared methods are slow, and look at all views, or at those of a row and a column; no_sepi at these alone
 @pytest.mark.parametrize(
     ("shape", "variant"),
-    [(s, v) for s in SHAPES for v in DIFFERENT if v not in METHODS or s in ("star", "row", "diagonals")
+    [(s, v) for s in SHAPES for v in DIFFERENT if v not in compared_methods() or s in ("star", "row", "diagonals")
      if (s, v) != ("diagonals", "no_sepi")],
 )  # fmt: skip
 def test_every_variant_does_without_some_views(shape: str, variant: str) -> None:

@@ -12,11 +12,10 @@ import pytest
 from several_threads import SEVERAL, threads
 
 import sepi
-from sepi.compared.methods import METHODS
 from sepi.inspection.disparity_range import estimate_range
 from sepi.lightfield import DisparityRange, LightField
 from sepi.scenes import render, write_hci
-from sepi.variants import STAGES, VARIANTS, Variant, choice_label, choice_of, stage_parameters
+from sepi.variants import STAGES, VARIANTS, Variant, choice_label, choice_of, compared_methods, stage_parameters
 
 CANDIDATES = {"initial": {"num_disparities": 21}, "occlusion": {"num_disparities": 21}}
 
@@ -52,7 +51,7 @@ ODD = {
 
 
 @pytest.mark.parametrize("name", ODD)
-@pytest.mark.parametrize("variant", ["paper", "no_sepi", "wang", "best", "fast", *METHODS])
+@pytest.mark.parametrize("variant", ["paper", "no_sepi", "wang", "best", "fast", *compared_methods()])
 def test_odd_light_fields_get_finite_maps(name: str, variant: str) -> None:
     """Someone's light field is never quite like a benchmark's: no crash, no NaN, nothing out of bounds."""
     odd = ODD[name]
@@ -154,7 +153,7 @@ for variant in ("paper", "no_sepi", "best"):
 """
 
 
-@pytest.mark.parametrize("variant", ["fast", "wang", *METHODS])
+@pytest.mark.parametrize("variant", ["fast", "wang", *compared_methods()])
 def test_equal_maps_for_any_number_of_threads(variant: str) -> None:
     whole = render("curved_occluders", size=64, views=3)
     scene = LightField(whole.views[:, :, 16:48, 16:48].copy(), "part", disparity_range=whole.disparity_range)

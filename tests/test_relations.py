@@ -16,12 +16,11 @@ import pytest
 from real_scenes import views_of
 
 from sepi import estimate_depth
-from sepi.compared.methods import LEARNED, METHODS
 from sepi.inspection.disparity_range import settle_range
 from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.scenes import render
 from sepi.stage import StageMaps
-from sepi.variants import VARIANTS
+from sepi.variants import VARIANTS, compared_methods, needing_files
 
 pytestmark = pytest.mark.slow
 
@@ -78,7 +77,7 @@ UNLIKE = {
     "pobr": ("its random numbers are drawn row by row", 25.0),
     "occ": ("ties between halves of a patch, by the order of directions", 7.0),
 }
-ESTIMATORS = [name for name in VARIANTS if name not in LEARNED]
+ESTIMATORS = [name for name in VARIANTS if name not in needing_files()]
 
 
 def unlike(first: FloatMap, second: FloatMap) -> float:
@@ -186,7 +185,9 @@ ROUNDED = 1.0
 
 
 # compared methods compute with floats whatever they are given, as the test of darker views shows
-@pytest.mark.parametrize("variant", [*(w for w in WHOLE if w not in METHODS), "best_no_denoising", "best_no_mean"])
+@pytest.mark.parametrize(
+    "variant", [*(w for w in WHOLE if w not in compared_methods()), "best_no_denoising", "best_no_mean"]
+)
 def test_noisy_views_have_the_same_map_in_another_number_format(variant: str) -> None:
     """Whoever has raw pictures as floats would get plain walls in place of everything."""
     floats = replace(noisy(), views=noisy().views.astype(np.float32) / np.float32(255))

@@ -1,4 +1,4 @@
-"""Compiled loops: a submodule for each file ``sepi/*/kernels/NAME.cpp``, built for the kind of processor this is.
+"""Compiled loops: a submodule for each file ``kernels/NAME.cpp`` of a folder, built for the kind of processor this is.
 
 Kernels look at arrays where they are: a wrong type, number of axes or memory order is a ``TypeError``, sizes are the
 caller's care. They run outside Python's lock, on as many threads as :func:`sepi.threads.use_threads` says, to the same

@@ -20,7 +20,8 @@ _BUILT_FROM = Path(__file__).with_name("built_from")
 def source_digest() -> str:
     """SHA-256 of the sources of all kernels and of CMakeLists.txt, in hexadecimal digits."""
     digest = hashlib.sha256(_RECIPE.read_bytes())
-    for source in sorted([*_ROOT.glob("sepi/kernels/*.?pp"), *_ROOT.glob("sepi/*/kernels/*.?pp")]):
+    places = ("sepi", "sepi/*", "sepi/extensions/*")
+    for source in sorted(path for place in places for path in _ROOT.glob(f"{place}/kernels/*.?pp")):
         digest.update(source.read_bytes())
     return digest.hexdigest()
 

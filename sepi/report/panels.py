@@ -8,13 +8,13 @@ from typing import Any, Literal
 
 import numpy.typing as npt
 
-from sepi.compared.methods import METHODS
 from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.unknown import UNKNOWN
 from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
 from sepi.scoring.scores import OWN_BAD_PIXEL, WHOLE_MAP
 from sepi.stage import StageMaps
+from sepi.variants import compared_methods
 
 Kind = Literal["picture", "disparity", "error", "change", "confidence", "sigma", "grey", "mask", "outline"]
 """How a panel is drawn: the reference view; a map on the scale of disparity; an error (a map minus another); a change
@@ -146,12 +146,14 @@ def _scene_panels(results: SceneResults) -> Iterator[Panel]:
 def _stage_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
     """Disparity after every stage for detailed variants; the final map for others."""
     detailed, stages = variant in results.detailed, results.maps[variant]
+    of_others = "Compared methods" if variant in compared_methods() else "Other variants"
+    group = f"Stages of {variant}" if detailed else of_others
     for number, (stage, found) in enumerate(stages.items(), start=1):
         final = number == len(stages)
         yield Panel(
             f"{variant}/{number}_{stage}",
             f"{variant}: final" if final else f"{variant} {number}: {stage}",
-            f"Stages of {variant}" if detailed else "Compared methods" if variant in METHODS else "Other variants",
+            group,
             "disparity",
             found.disparity,
             confidence=found.confidence if final and detailed else None,

@@ -16,9 +16,9 @@ from pydantic import AfterValidator
 from pydantic.dataclasses import dataclass
 
 from sepi.built_in_variants import PARTS_OF_BEST, UNCORRECTED
-from sepi.compared.methods import LEARNED, METHODS
 from sepi.errors import SepiError
-from sepi.variants import HANDED_ON, VARIANTS
+from sepi.registry import added
+from sepi.variants import HANDED_ON, VARIANTS, compared_methods
 from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 from sepi.workflow.result_paths import PARTS_ENDING, SceneFiles, key_of, scene_files
 
@@ -130,7 +130,7 @@ class Plan:
         """The plan of the comparison: this project's variants and the compared methods, computed on the same scenes."""
         ours = [BEST_VARIANT, FAST_VARIANT, MAIN_VARIANT]
         own = [name for name in self.variants if name not in VARIANTS]
-        names = [name for name in (*ours, *own, *METHODS) if name in self.variants]
+        names = [name for name in (*ours, *own, *compared_methods()) if name in self.variants]
         return replace(self, variants={name: self.variants[name] for name in names}, report=COMPARISON)
 
     def rendered(self, scenes: Sequence[str], choosing: Sequence[str], variants: Sequence[str] | None = None) -> Plan:
@@ -249,7 +249,7 @@ class Plan:
     @property
     def listed(self) -> list[str]:
         """Variants of the main tables: all but the ablation of ``best``, the compared methods, and one for noise."""
-        elsewhere = {*PARTS_OF_BEST, *METHODS, *LEARNED, UNCORRECTED} - {BEST_VARIANT, *self.compared}
+        elsewhere = {*PARTS_OF_BEST, *added("variants"), UNCORRECTED} - {BEST_VARIANT, *self.compared}
         return [variant for variant in self.variants if variant not in elsewhere]
 
     def collected(self, parts: bool) -> list[str]:

@@ -157,7 +157,8 @@ def _file_of(module: str, root: Path) -> Path | None:
     if module.endswith(_HEADER):
         return folder / f"{name}{_HEADER}"
     # kernels lie beside their callers, and are imported from one package
-    kernels = folder.parent.glob(f"*/kernels/{name}.cpp") if folder.name == "kernels" else ()
+    below = ("*", "extensions/*") if folder.name == "kernels" else ()
+    kernels = (path for inner in below for path in folder.parent.glob(f"{inner}/kernels/{name}.cpp"))
     return next(filter(Path.is_file, (folder / f"{name}.py", folder / name / "__init__.py", *kernels)), None)
 
 

@@ -136,7 +136,7 @@ class Config(CheckedModel):
         "Other scenes use the range in their parameters.cfg, or one estimated from the views.",
     )
     variants: dict[str, dict[str, Any]] = Field(
-        VARIANT_ENTRIES,
+        dict(VARIANT_ENTRIES),
         description="Each variant has a choice per stage, or {choice: CHOICE, PARAMETER: VALUE} to set parameters; "
         "with base, only its differences from that variant. 'paper' is the published method; 'paper' to "
         "'no_occlusion_no_textureless' are the columns of its table 4, 'no_noise_correction' is for noisy light "

@@ -10,14 +10,13 @@ from pathlib import Path
 
 from pydantic import Field
 
-from sepi.compared.methods import LEARNED
 from sepi.errors import SepiError
 from sepi.io.readers.options import Index
 from sepi.io.scores import ExternalSource
 from sepi.models import CheckedModel
 from sepi.stage import Parameters
 from sepi.validation import require_known
-from sepi.variants import VARIANTS, Variant
+from sepi.variants import VARIANTS, Variant, needing_files
 from sepi.workflow.datasets import Scene
 from sepi.workflow.rendered_dataset import Rendered
 from sepi.workflow.result_paths import RESULTS
@@ -97,7 +96,7 @@ class Settings:
     def rendered_variants(self) -> list[str] | None:
         """The variants chosen for the rendered scenes; None if not configured."""
         if self.rendered.variants == "all":
-            return [name for name in VARIANTS if name not in LEARNED]
+            return [name for name in VARIANTS if name not in needing_files()]
         return self.rendered.variants
 
     @property

@@ -18,7 +18,7 @@ import pytest
 from one_node import one_node_slurm, queue, why_not
 from workflow_copy import SIZE, SLOW_WRITING, TINY, Workflow, copy_of_the_project, edited, files_below, wait_for
 
-from sepi.compared.methods import LEARNED, METHODS
+from sepi.registry import added
 from sepi.scenes import render, write_hci
 from sepi.variants import VARIANTS
 
@@ -31,7 +31,7 @@ TARGETS = tuple(f"results/hci/{scene}/paper/result.h5" for scene in SCENES)
 ALL_VARIANTS = tuple(
     f"results/hci/one/{variant}/result.h5"
     for variant in VARIANTS
-    if variant not in METHODS | LEARNED or variant == "spo"
+    if variant not in added("variants") or variant == "spo"
 )
 # a part of them, of two jobs
 SHORT_TARGETS = tuple(f"results/hci/{scene}/stages/sepi/initial.h5" for scene in SCENES)

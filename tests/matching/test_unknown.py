@@ -6,14 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
-from sepi.compared.methods import LEARNED
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.unknown import held_by_few, unknown_pixels, with_unknown
 from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field
 from sepi.stage import StageMaps
-from sepi.variants import VARIANTS
+from sepi.variants import VARIANTS, needing_files
 
 H, W = 72, 96
 Y, X = np.mgrid[:H, :W]
@@ -168,7 +167,7 @@ def test_what_has_no_disparity_is_held_by_no_view(nothing: float) -> None:
 # --- in the final maps
 
 
-@pytest.mark.parametrize("variant", [name for name in VARIANTS if name not in LEARNED])
+@pytest.mark.parametrize("variant", [name for name in VARIANTS if name not in needing_files()])
 def test_every_variant_tells_what_is_unknown_and_changes_no_depth(variant: str) -> None:
     scene = light_field(np.where(DISC, texture(), 0))
     few = {} if variant == "no_sepi" else {"initial": {"num_disparities": 11}}

@@ -10,10 +10,10 @@ from click.testing import CliRunner
 from report_results import SCENES, VARIANTS, cells_of, csv_rows, numbers_of, only, with_results
 
 from sepi import variants as built_in
-from sepi.compared.methods import LEARNED, METHODS
 from sepi.report import numbers, published, tables
 from sepi.report.page import page_of
 from sepi.report.plan import COMPARISON_TABLES, Plan
+from sepi.variants import compared_methods, needing_files
 
 
 def choices(*names: str) -> Mapping[str, Mapping[str, str]]:
@@ -51,15 +51,15 @@ def test_a_users_own_variant_is_compared_too() -> None:
 def test_all_does_not_run_the_compared_methods() -> None:
     """They would take many times as long as all the rest."""
     plan = Plan(Path("results"), SCENES, choices(*built_in.VARIANTS))
-    assert not set(plan.listed) & {*METHODS, *LEARNED}
-    assert not set(plan.compared) & {*METHODS, *LEARNED}
-    assert set(METHODS) < set(plan.comparison().listed)
+    assert not set(plan.listed) & {*compared_methods(), *needing_files()}
+    assert not set(plan.compared) & {*compared_methods(), *needing_files()}
+    assert set(compared_methods()) < set(plan.comparison().listed)
 
 
 def test_every_compared_method_has_a_published_counterpart() -> None:
     """Its figures would stand beside those of another method."""
     learned_nothing = [one for one in published.methods().values() if one.learning == "none"]
-    assert {one.variant for one in learned_nothing} == {"paper", *METHODS}
+    assert {one.variant for one in learned_nothing} == {"paper", *compared_methods()}
     assert {published.counterpart(variant).key for variant in ("best", "fast", "mine", "paper")} == {"zhou"}
 
 

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from sepi.compared.methods import METHODS
 from sepi.io.readers.formats import FORMATS
-from sepi.variants import STAGES
+from sepi.variants import STAGES, compared_methods
 from sepi.workflow import code_digest as module
 from sepi.workflow.code_digest import (
     code_digest,
@@ -212,13 +211,15 @@ def test_a_stage_is_run_again_for_what_can_change_its_maps_alone(stage: str) -> 
     assert not any(name.startswith("compared") for name in found)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", compared_methods())
 def test_a_compared_method_is_run_again_for_its_own_code_alone(method: str) -> None:
     """A change in one of them must not cost a day of computing all the others, nor be missed."""
     found = imported_modules(*stage_modules("initial", STAGES["initial"][method]))
-    compared = {name.removeprefix("sepi.compared.") for name in found if name.startswith("sepi.compared.")}
+    compared = {
+        name.removeprefix("sepi.extensions.methods.") for name in found if name.startswith("sepi.extensions.methods.")
+    }
     assert method in compared
-    assert not compared & (set(METHODS) - {method})
+    assert not compared & (set(compared_methods()) - {method})
 
 
 @pytest.fixture

@@ -13,7 +13,6 @@ from rendered_files import write_drawn
 from workflow_copy import REPOSITORY, TINY, Workflow
 
 from sepi import ingest, truth
-from sepi.compared.methods import LEARNED
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_light_field
 from sepi.io.truth import read_with_truth
@@ -21,7 +20,7 @@ from sepi.rendered import RENDERED
 from sepi.rendered.exposure import read_exposed
 from sepi.rendered.options import Exposure, RenderOptions
 from sepi.scoring.scores import region_masks, score_regions
-from sepi.variants import VARIANTS
+from sepi.variants import VARIANTS, needing_files
 from sepi.workflow.config import load_settings
 from sepi.workflow.rendered_scenes import RenderedScene, rendered_scene
 
@@ -107,7 +106,7 @@ def test_a_render_becomes_a_light_field_and_apart_from_it_its_truth(tmp_path: Pa
 
 def test_chosen_variants_are_those_and_the_papers() -> None:
     assert load_settings({"rendered": {"variants": "all"}}).rendered_variants == [
-        name for name in VARIANTS if name not in LEARNED
+        name for name in VARIANTS if name not in needing_files()
     ]
     assert load_settings({}).rendered_variants is None
 

@@ -36,7 +36,6 @@ from workflow_copy import (
     wait_for,
 )
 
-from sepi.compared.methods import LEARNED, METHODS
 from sepi.io.hdf5 import read_attributes, read_stage
 from sepi.io.images import write_png
 from sepi.io.pfm import write_pfm
@@ -45,7 +44,7 @@ from sepi.io.scores import Evaluation, read_scores, write_scores
 from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field
 from sepi.scenes import render, write_hci
-from sepi.variants import STAGES, VARIANTS
+from sepi.variants import STAGES, VARIANTS, compared_methods, needing_files
 
 pytestmark = pytest.mark.workflow
 
@@ -424,7 +423,7 @@ class TestComparison:
         """Ours are not computed again, and a second run has nothing to do."""
         shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
         config = {key: value for key, value in finished.config.items() if key != "external"}
-        few = {choice: {"num_disparities": 21} for choice in METHODS}
+        few = {choice: {"num_disparities": 21} for choice in compared_methods()}
         config["stages"] = TINY["stages"] | {"initial": TINY["stages"]["initial"] | few}
         done = replace(finished, folder=tmp_path / "run", config=config)
         methods = {"initial": 7, "occlusion": 2, "optimize": 7}
@@ -448,8 +447,8 @@ class TestComparison:
         np.testing.assert_array_equal(disparity, expected.disparity)
         with (done.folder / target).open(newline="") as file:
             rows = {row["variant"]: row for row in csv.DictReader(file)}
-        assert [*rows] == ["best", "fast", "paper", *METHODS]
-        assert {rows[name]["mse100"] for name in METHODS if name != RUN} == {rows["paper"]["mse100"]}
+        assert [*rows] == ["best", "fast", "paper", *compared_methods()]
+        assert {rows[name]["mse100"] for name in compared_methods() if name != RUN} == {rows["paper"]["mse100"]}
         assert all(float(row["badpix_0.25"]) <= float(row["badpix007"]) for row in rows.values())
         assert done.plan(target) == {}
 
@@ -459,7 +458,7 @@ class TestTargets:
         """What `all` has made is not made again."""
         jobs = finished.jobs("ablation")
         variants = {job.wildcards.variant for job in jobs if job.rule.name == "export"}
-        assert variants == set(VARIANTS) - {*METHODS, *LEARNED, "best", "paper"}
+        assert variants == set(VARIANTS) - {*compared_methods(), *needing_files(), "best", "paper"}
         assert of_stages(Counter(job.rule.name for job in jobs)) == ABLATION
 
     def test_an_unknown_name_in_a_target_is_named(self, workflow: Workflow) -> None:

@@ -1,7 +1,7 @@
 """Filtering of the cost volume with the reference view as guide [1]_, a choice of the global optimisation.
 
-Each candidate's costs are smoothed by a guided filter (:mod:`sepi.compared.guided_filter`); then each pixel selects the
-candidate of least cost.
+Each candidate's costs are smoothed by a guided filter (:mod:`sepi.extensions.methods.guided_filter`); then each pixel
+selects the candidate of least cost.
 
 References
 ----------
@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
-from sepi.compared.guided_filter import GuidedFilter
+from sepi.extensions.methods.cost_volumes import disparity_of, distinctness, least_costs
+from sepi.extensions.methods.guided_filter import GuidedFilter
 from sepi.lightfield import LightField
 from sepi.stage import Choice, CostVolume, Parameters, Progress, StageMaps, require_costs
 

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
 
-from sepi.compared import acc
-from sepi.compared.acc import (
+from sepi.extensions.methods import acc
+from sepi.extensions.methods.acc import (
     AccParameters,
     ConfidentLabelsParameters,
     confident_labels,
     phase_shift_costs,
     truncated_difference,
 )
-from sepi.compared.acc_features import agreed, features_of, matched_disparities, mutual_matches
-from sepi.compared.acc_phase_shift import PhaseShift
-from sepi.compared.cost_volumes import disparity_of, least_costs
-from sepi.compared.guided_filter import GuidedFilter
+from sepi.extensions.methods.acc_features import agreed, features_of, matched_disparities, mutual_matches
+from sepi.extensions.methods.acc_phase_shift import PhaseShift
+from sepi.extensions.methods.cost_volumes import disparity_of, least_costs
+from sepi.extensions.methods.guided_filter import GuidedFilter
 from sepi.lightfield import DisparityRange, LightField
 from sepi.scenes import render
 from sepi.stage import CostVolume, no_progress

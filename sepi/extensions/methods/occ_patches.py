@@ -1,4 +1,4 @@
-"""Splitting of angular patches along nearby image edges (see :mod:`sepi.compared.occ`)."""
+"""Splitting of angular patches along nearby image edges (see :mod:`sepi.extensions.methods.occ`)."""
 
 from __future__ import annotations
 

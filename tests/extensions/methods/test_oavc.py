@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sepi.compared import oavc
-from sepi.compared.cost_volumes import least_costs
-from sepi.compared.oavc import lower_thresholds, vote_costs
+from sepi.extensions.methods import oavc
+from sepi.extensions.methods.cost_volumes import least_costs
+from sepi.extensions.methods.oavc import lower_thresholds, vote_costs
 from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.matching.sheared_views import ShearedViews
 from sepi.pipeline import estimate_depth

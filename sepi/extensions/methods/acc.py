@@ -14,19 +14,20 @@ cost is the initial choice ``acc``, the remaining steps are the choice ``confide
    weighted median, are the first map ``l_a``. Pixels whose costs hardly vary over the candidates are unreliable.
 4. *Labels.* The labels minimise ``sum_x C(x, l) + L1 [x reliable] |l - l_a| + L2 [x matched] |l - l_c| + L3 sum_x'
    |l - l(x')|`` over neighbours ``x'``; ``l_c`` is the disparity of features matched in several views
-   (:mod:`sepi.compared.acc_features`).
+   (:mod:`sepi.extensions.methods.acc_features`).
 5. *Iterative refinement.* From labels to a continuous map, four times: costs of the distance to the current map are
    filtered slice by slice, and the parabola through the least cost and its neighbours,
    ``l - (E(l+) - E(l-)) / (2 (E(l+) + E(l-) - 2 E(l)))``, gives the new map.
 
 Choices made here where the publication is not specific or could not be confirmed:
 
-- The border: views continue as their mirror image (:mod:`sepi.compared.acc_phase_shift`).
+- The border: views continue as their mirror image (:mod:`sepi.extensions.methods.acc_phase_shift`).
 - Colours: differences are means over the channels, and the gradients central differences.
 - All numbers: the share ``a``, truncations, the size of windows and filters, and the weights. Truncations match the
   differences caused by occlusion and texture; costs are scaled to 0..1; weights are in hundredths of the range.
 - The edge-preserving filter: the guided filter.
-- Graph cuts: replaced by message passing on the same energy (for the reason, see :mod:`sepi.compared.message_passing`).
+- Graph cuts: replaced by message passing on the same energy (for the reason, see
+  :mod:`sepi.extensions.methods.message_passing`).
 - Which pixels are unreliable: the standard deviation of their costs over the candidates is below a threshold.
 - Features: mutual nearest neighbours with Lowe's ratio test, and a median instead of the robust regression.
 - The costs of the refinement: the squared distance, truncated at two labels. Truncated at one label, that is 0 at a
@@ -48,12 +49,12 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.compared.acc_features import matched_disparities
-from sepi.compared.acc_phase_shift import PhaseShift
-from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
-from sepi.compared.guided_filter import GuidedFilter
-from sepi.compared.message_passing import labels_of_least_energy
-from sepi.compared.weighted_median import weighted_median
+from sepi.extensions.methods.acc_features import matched_disparities
+from sepi.extensions.methods.acc_phase_shift import PhaseShift
+from sepi.extensions.methods.cost_volumes import disparity_of, distinctness, least_costs
+from sepi.extensions.methods.guided_filter import GuidedFilter
+from sepi.extensions.methods.message_passing import labels_of_least_energy
+from sepi.extensions.methods.weighted_median import weighted_median
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, require_costs

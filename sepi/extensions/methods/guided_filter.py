@@ -37,7 +37,7 @@ class GuidedFilter:
     Noise is smoothed, and the step is preserved, since the guide has it too:
 
     >>> import numpy as np
-    >>> from sepi.compared.guided_filter import GuidedFilter
+    >>> from sepi.extensions.methods.guided_filter import GuidedFilter
     >>> step = np.zeros((32, 32), np.float32)
     >>> step[:, 16:] = 1
     >>> smooth = GuidedFilter(np.repeat(step[..., None], 3, axis=2), radius=4, epsilon=1e-4)

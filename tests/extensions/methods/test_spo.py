@@ -8,8 +8,15 @@ import numpy.typing as npt
 import pytest
 from geometries import GEOMETRIES, standing
 
-from sepi.compared.guided_costs import GuidedCostsParameters, guided_costs
-from sepi.compared.spo import SpoParameters, column_weights, peak_weight, side_distances, spo, views_of_directions
+from sepi.extensions.methods.guided_costs import GuidedCostsParameters, guided_costs
+from sepi.extensions.methods.spo import (
+    SpoParameters,
+    column_weights,
+    peak_weight,
+    side_distances,
+    spo,
+    views_of_directions,
+)
 from sepi.kernels import spo as kernels
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.matching.sheared_views import ShearedViews

@@ -42,7 +42,7 @@ Choices made here where the publication is not specific or could not be confirme
 - The confidence is ``1 - least / mean`` of the costs; disparities in the energy are fractions of the range. The colour
   difference has a lower bound, to avoid a division by 0.
 - ``S`` is the truncated linear function, and the energy is minimised by message passing instead of graph cuts
-  (:mod:`sepi.compared.message_passing`). Occlusions are not predicted anew from the final map.
+  (:mod:`sepi.extensions.methods.message_passing`). Occlusions are not predicted anew from the final map.
 
 References
 ----------
@@ -59,9 +59,9 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.compared.cost_volumes import disparity_of
-from sepi.compared.message_passing import labels_of_least_energy
-from sepi.compared.occ_patches import Edges, colours_beside, edges_to_split, halves_of_views
+from sepi.extensions.methods.cost_volumes import disparity_of
+from sepi.extensions.methods.message_passing import labels_of_least_energy
+from sepi.extensions.methods.occ_patches import Edges, colours_beside, edges_to_split, halves_of_views
 from sepi.image.edges import CannyParameters
 from sepi.kernels import occ as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField

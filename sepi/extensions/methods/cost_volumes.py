@@ -24,7 +24,7 @@ def least_costs(volume: CostVolume) -> npt.NDArray[np.int64]:
     Examples
     --------
     >>> import numpy as np
-    >>> from sepi.compared.cost_volumes import least_costs
+    >>> from sepi.extensions.methods.cost_volumes import least_costs
     >>> from sepi.stage import CostVolume
     >>> volume = CostVolume(np.arange(3, dtype=np.float32), np.float16([[[0.9, 0.5]], [[0.1, 0.5]], [[0.9, 0.5]]]))
     >>> least_costs(volume).tolist()
@@ -52,7 +52,7 @@ def disparity_of(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
     Costs that fall to a minimum at 1.25, between two candidates:
 
     >>> import numpy as np
-    >>> from sepi.compared.cost_volumes import disparity_of, least_costs
+    >>> from sepi.extensions.methods.cost_volumes import disparity_of, least_costs
     >>> from sepi.stage import CostVolume
     >>> candidates = np.arange(3, dtype=np.float32)
     >>> volume = CostVolume(candidates, ((candidates - 1.25) ** 2).astype(np.float16)[:, None, None])
@@ -84,7 +84,7 @@ def distinctness(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
     Examples
     --------
     >>> import numpy as np
-    >>> from sepi.compared.cost_volumes import distinctness, least_costs
+    >>> from sepi.extensions.methods.cost_volumes import distinctness, least_costs
     >>> from sepi.stage import CostVolume
     >>> volume = CostVolume(np.arange(3, dtype=np.float32), np.float16([[[0.75, 0.5]], [[0, 0.5]], [[0.75, 0.5]]]))
     >>> distinctness(volume, least_costs(volume)).tolist()

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from sepi.compared.cae import (
+from sepi.extensions.methods.cae import (
     ConstrainedEntropyParameters,
     cae,
     constrained_defocus,

@@ -6,7 +6,7 @@ import numpy.typing as npt
 import pytest
 from geometries import GEOMETRIES, standing
 
-from sepi.compared.occ import (
+from sepi.extensions.methods.occ import (
     OccFieldParameters,
     OccParameters,
     OccSplitParameters,
@@ -18,7 +18,14 @@ from sepi.compared.occ import (
     split_patch_costs,
     whole_patch_costs,
 )
-from sepi.compared.occ_patches import LEAST_SHARE, ORIENTATIONS, Edges, colours_beside, edges_to_split, halves_of_views
+from sepi.extensions.methods.occ_patches import (
+    LEAST_SHARE,
+    ORIENTATIONS,
+    Edges,
+    colours_beside,
+    edges_to_split,
+    halves_of_views,
+)
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.scenes import render
 from sepi.scoring.scores import score

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.ndimage import gaussian_filter
 
-from sepi.compared.pobr import (
+from sepi.extensions.methods.pobr import (
     PobrCostParameters,
     PobrRegionParameters,
     PobrSmoothingParameters,

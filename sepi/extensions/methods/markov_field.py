@@ -2,7 +2,7 @@
 
 ``markov_field`` takes the previous stage's cost volume and assigns each pixel the candidate that minimises data costs
 and truncated linear smoothness, which is weaker across edges of the reference view. The methods' authors use graph
-cuts; this implementation uses message passing (for the reason, see :mod:`sepi.compared.message_passing`).
+cuts; this implementation uses message passing (for the reason, see :mod:`sepi.extensions.methods.message_passing`).
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from sepi.compared.cost_volumes import disparity_of, distinctness
-from sepi.compared.message_passing import contrast_weights, labels_of_least_energy
+from sepi.extensions.methods.cost_volumes import disparity_of, distinctness
+from sepi.extensions.methods.message_passing import contrast_weights, labels_of_least_energy
 from sepi.lightfield import LightField
 from sepi.stage import Choice, Needs, Parameters, Progress, StageMaps, require_costs
 

@@ -47,7 +47,7 @@ def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float
     An edge of the map that is two pixels away from the guide's edge moves there:
 
     >>> import numpy as np
-    >>> from sepi.compared.weighted_median import weighted_median
+    >>> from sepi.extensions.methods.weighted_median import weighted_median
     >>> guide = np.zeros((9, 12, 3), np.float32)
     >>> guide[:, 6:] = 1
     >>> fattened = np.zeros((9, 12), np.float32)

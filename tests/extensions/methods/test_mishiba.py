@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from sepi.compared.guided_filter import GuidedFilter
-from sepi.compared.mishiba import (
+from sepi.extensions.methods.guided_filter import GuidedFilter
+from sepi.extensions.methods.mishiba import (
     LatticeFit,
     MedianDescentParameters,
     MishibaParameters,

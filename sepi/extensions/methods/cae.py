@@ -5,7 +5,7 @@ that the histogram of its angular patch has a single peak and low entropy; an oc
 are weighted by the similarity of their colour to the pixel's own. At that disparity the refocused light field also
 equals the reference view, near an occluder at least in a sub-patch on the pixel's own surface. The costs are added with
 equal weights, filtered with the reference view as guide [2]_, and the disparity minimises an energy
-(:mod:`sepi.compared.markov_field`).
+(:mod:`sepi.extensions.methods.markov_field`).
 
 Equations, for pixel ``p`` of colour ``P(p)``, disparity ``d``, and the views' samples ``A_v``, ``v = 1..N``, of one
 channel of the light field sheared by ``d``:
@@ -49,8 +49,8 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
-from sepi.compared.guided_filter import GuidedFilter
+from sepi.extensions.methods.cost_volumes import disparity_of, distinctness, least_costs
+from sepi.extensions.methods.guided_filter import GuidedFilter
 from sepi.kernels import cae as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field

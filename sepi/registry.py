@@ -1,0 +1,173 @@
+"""What extensions add to the package by name: choices of stages, variants, readers, commands, flags, datasets, rules.
+
+A distribution adds an :class:`Extension` by an entry point of the group ``sepi.extensions``. It is looked for where a
+name is not the core's own, or where all names are listed; docs/develop/extensions.md shows how to write one.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Collection, Iterator, Mapping, MutableMapping
+from functools import cache
+from glob import glob
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from sepi.errors import SepiError
+
+if TYPE_CHECKING:
+    from sepi.stage import Choice
+
+GROUP = "sepi.extensions"
+"""Group of the entry points."""
+
+_T = TypeVar("_T")
+
+
+class Extension(NamedTuple):
+    """What an extension adds: names, and for most of them the module that is imported when the name is asked for.
+
+    Attributes
+    ----------
+    choices : mapping of str to str
+        ``STAGE.CHOICE`` to a module; its ``CHOICES[STAGE][CHOICE]`` is the :class:`sepi.stage.Choice`.
+    variants : mapping of str to mapping
+        Variant to its entry, as for :func:`sepi.variants.variant_from`: methods that ``snakemake comparison`` computes.
+    on_request : collection of str
+        Variants that need files of the user; ``snakemake comparison`` leaves them out.
+    readers : mapping of str to str
+        Word for ``--format`` to a module, whose ``FORMAT`` is the :class:`sepi.io.readers.formats.Format`.
+    commands : mapping of str to (str, str)
+        Command of ``sepi`` to a module, whose function of that name is the click command, and its line in the list.
+    flags : mapping of str to str
+        ``COMMAND --FLAG`` to a module, whose ``extended`` takes the core's click command and returns one with the flag.
+    datasets : mapping of str to str
+        Key of ``config.yaml`` to a module, whose ``Dataset`` is the :class:`sepi.workflow.datasets.Dataset`.
+    names : mapping of str to str
+        Name in ``sepi`` to the module that has it.
+    rules : collection of str
+        Modules, each of a ``rules.smk`` beside its ``__init__.py``, which the workflow includes.
+    """
+
+    choices: Mapping[str, str] = {}
+    variants: Mapping[str, Mapping[str, Any]] = {}
+    on_request: Collection[str] = ()
+    readers: Mapping[str, str] = {}
+    commands: Mapping[str, tuple[str, str]] = {}
+    flags: Mapping[str, str] = {}
+    datasets: Mapping[str, str] = {}
+    names: Mapping[str, str] = {}
+    rules: Collection[str] = ()
+
+
+def _entry_points() -> dict[str, str]:
+    """Name to object of each entry point, ``MODULE:NAME``; of distributions of one name, the first on the path counts.
+
+    A tenth of the time of :mod:`importlib.metadata`, which is most of ``sepi --help``.
+    """
+    found: dict[str, str] = {}
+    distributions: set[str] = set()
+    for folder in sys.path:
+        for name in sorted(glob("*.dist-info", root_dir=folder or ".")):
+            distribution, file = name.partition("-")[0].lower(), Path(folder, name, "entry_points.txt")
+            if distribution not in distributions and file.is_file():
+                _, _, section = file.read_text(encoding="utf-8").partition(f"[{GROUP}]")
+                lines = section.partition("\n[")[0].splitlines()
+                pairs = (line.partition("=") for line in lines if "=" in line)
+                found |= {key.strip(): value.strip() for key, _, value in pairs}
+            distributions.add(distribution)
+    return found
+
+
+@cache
+def extensions() -> dict[str, Extension]:
+    """Name to extension, of all that are installed; one whose module is gone counts as not installed.
+
+    Raises
+    ------
+    SepiError
+        If the module of one cannot be imported, or has no such extension.
+    """
+    found: dict[str, Extension] = {}
+    for name, target in _entry_points().items():
+        module, _, attribute = target.partition(":")
+        try:
+            found[name] = getattr(import_module(module), attribute)
+        except Exception as error:
+            if isinstance(error, ModuleNotFoundError) and f"{module}.".startswith(f"{error.name}."):
+                continue
+            raise SepiError(f"extension {name}: cannot be loaded from {target}: {error}") from error
+    return found
+
+
+@cache
+def added(kind: str) -> dict[str, Any]:
+    """What all extensions add of a kind, a field of :class:`Extension` with names.
+
+    Raises
+    ------
+    SepiError
+        If two extensions add the same name.
+    """
+    owners: dict[str, str] = {}
+    found: dict[str, Any] = {}
+    for extension, adds in extensions().items():
+        for name, what in getattr(adds, kind).items():
+            if name in found:
+                raise SepiError(f"extensions {owners[name]} and {extension}: both add '{name}' to {kind}")
+            found[name], owners[name] = what, extension
+    return found
+
+
+class Known(MutableMapping[str, _T]):
+    """The core's own by name, then what extensions add, which is loaded on access.
+
+    Parameters
+    ----------
+    kind : str
+        Field of :class:`Extension`.
+    own : mapping
+        The core's own; a name ``none`` is listed last.
+    loaded : callable
+        Makes the value of a name and of what the extension says of it.
+    prefix : str
+        What the extension's names begin with, and those here do not.
+    """
+
+    def __init__(self, kind: str, own: Mapping[str, _T], loaded: Callable[[str, Any], _T], prefix: str = "") -> None:
+        self._kind, self._own, self._loaded, self._prefix = kind, dict(own), loaded, prefix
+        self._found: dict[str, _T] = {}
+
+    def _added(self) -> dict[str, Any]:
+        of_here = {key: what for key, what in added(self._kind).items() if key.startswith(self._prefix)}
+        return {key.removeprefix(self._prefix): what for key, what in of_here.items()}
+
+    def __getitem__(self, name: str) -> _T:
+        if name in self._own:
+            return self._own[name]
+        if name not in self._found:
+            self._found[name] = self._loaded(name, self._added()[name])
+        return self._found[name]
+
+    def __setitem__(self, name: str, value: _T) -> None:
+        self._own[name] = value
+
+    def __delitem__(self, name: str) -> None:
+        del self._own[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(sorted(dict.fromkeys([*self._own, *self._added()]), key="none".__eq__))
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
+
+def stage_choices(stage: str, own: Mapping[str, Choice]) -> Known[Choice]:
+    """The choices of a stage by name: its own, and those of extensions, whose modules are imported on access."""
+
+    def loaded(name: str, module: str) -> Choice:
+        choice: Choice = import_module(module).CHOICES[stage][name]
+        return choice
+
+    return Known("choices", own, loaded, f"{stage}.")
