@@ -114,7 +114,7 @@ lint-imports: $(READY)
 	$(BIN)/lint-imports --no-logo --no-cache
 
 lint-rules: $(READY)
-	$(BIN)/snakefmt --line-length 120 --check Snakefile rules
+	$(BIN)/snakefmt --line-length 120 --check Snakefile rules sepi/extensions
 
 lint-spelling: $(READY)
 	$(BIN)/codespell *.md *.yaml ./docs config reports/README.md Snakefile rules sepi bench tools

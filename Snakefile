@@ -16,7 +16,6 @@ configfile: f"{workflow.current_basedir}/config.yaml"
 include: "rules/package.smk"
 include: "rules/common.smk"
 include: "rules/targets.smk"
-include: "rules/render.smk"
 include: "rules/ingest.smk"
 include: "rules/truth.smk"
 include: "rules/initial.smk"
@@ -28,6 +27,11 @@ include: "rules/evaluate.smk"
 include: "rules/external.smk"
 include: "rules/report.smk"
 include: "rules/run.smk"
+
+
+for path in ADDED_RULES:
+
+    include: path
 
 
 # Tables and figures, and the maps of variant best, of the paper's, and of the user's variants
@@ -63,14 +67,6 @@ rule comparison:
         result_files(compared_methods()),
     message:
         "all compared methods are computed"
-
-
-# The rendered scenes in every level of noise: tables by property, page and images
-rule rendered:
-    input:
-        lambda wildcards: rendered_files(),
-    message:
-        "all rendered scenes are made"
 
 
 onsuccess:

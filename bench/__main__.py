@@ -21,11 +21,11 @@ from sepi.io.files import atomic_path
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
 from sepi.machine import this_machine
 from sepi.reading import read_light_field
-from sepi.rendered import NOISE_LEVELS
 from sepi.scenes import SCENES, render
 from sepi.scoring.scores import SCORES
 from sepi.threads import available_cores, use_threads
 from sepi.variants import VARIANTS, needing_files, variant_named
+from sepi.workflow.rendered_scenes import NOISE_LEVELS
 
 if TYPE_CHECKING:
     from bench.error_samples import Sample

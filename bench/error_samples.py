@@ -16,13 +16,12 @@ from bench.noisy import with_noise
 from bench.sweep import scene_for_choosing
 from sepi.error_bars.bars import ErrorBars, error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
+from sepi.extensions.rendered.exposure import read_scene
 from sepi.io.hdf5 import has_dataset
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
-from sepi.rendered.catalogue import NOISE_LEVELS
-from sepi.rendered.exposure import read_exposed
 from sepi.stage import REACH
-from sepi.workflow.rendered_scenes import rendered_scene
+from sepi.workflow.rendered_scenes import NOISE_LEVELS, rendered_scene
 
 PIXELS = 6000
 """Number of random pixels per map."""
@@ -68,7 +67,7 @@ def light_fields(
     for scene in scenes:
         if has_dataset(Path(scene), "turns"):
             for level in NOISE_LEVELS:
-                light_field = read_exposed(Path(scene), level, 1) if held_out else scene_for_choosing(scene, level)
+                light_field = read_scene(Path(scene), level, 1) if held_out else scene_for_choosing(scene, level)
                 yield light_field.name, light_field
             continue
         light_field = scene_for_choosing(scene, NOISE_LEVELS[0])

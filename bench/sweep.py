@@ -1,6 +1,6 @@
 """Scores of a parameter's values over scenes, and the best value with each scene left out in turn.
 
-Rendered scenes that are held out from choosing (:data:`sepi.rendered.RENDERED`) are refused.
+Rendered scenes that are held out from choosing (:data:`sepi.extensions.rendered.catalogue.RENDERED`) are refused.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from tabulate import tabulate
 
 from sepi.errors import SepiError
 from sepi.exposure import equally_bright
+from sepi.extensions.rendered.catalogue import RENDERED
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import has_dataset
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
-from sepi.rendered import RENDERED
 from sepi.scenes import SCENES, render
 from sepi.scoring.scores import score
 from sepi.stage import Parameters, StageMaps, no_progress
@@ -40,9 +40,9 @@ def scene_for_choosing(given: str, noise: str) -> LightField:
     if given in SCENES:
         light_field = render(given)
     elif has_dataset(Path(given), "turns"):
-        from sepi.rendered.exposure import read_exposed
+        from sepi.extensions.rendered.exposure import read_scene
 
-        light_field = read_exposed(Path(given), noise, 1)
+        light_field = read_scene(Path(given), noise, 1)
     else:
         light_field = read_light_field(Path(given))
     # the name in the files, since folders may have any name

@@ -11,10 +11,10 @@ from pathlib import Path
 import click
 from PIL import Image
 
+from sepi.extensions.rendered.catalogue import RENDERED
 from sepi.io.hdf5 import read_stage
 from sepi.io.truth import read_with_truth
 from sepi.lightfield import FloatMap, LightField
-from sepi.rendered.catalogue import RENDERED
 from sepi.report.plan import RENDERED_TABLES
 from sepi.report.plots.overview import write_overview
 from sepi.report.plots.pictures import Picture, disparity_limits, error_picture, map_picture, reference_picture

@@ -7,20 +7,19 @@ import os
 import re
 import sys
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 from sepi.command import WORKFLOW_PROCESS
 from sepi.errors import SepiError
 from sepi.io.result_files import RESULT_FILES
-from sepi.registry import added
+from sepi.registry import added, extensions
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of, compared_methods
 from sepi.report.plan import Plan
 from sepi.validation import require_known
-from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, keep, remember, render_modules, stage_modules
+from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, keep, remember, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
-from sepi.rendered import RENDERED
-from sepi.workflow.rendered_scenes import rendered_scene
 from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
 
 # the folder of the Snakefile, and whether another workflow uses it as a module
@@ -89,11 +88,7 @@ REPORTS = {
     for plan in (
         PLAN,
         PLAN.comparison(),
-        PLAN.rendered(
-            [scene for _, scene in SETTINGS.rendered_scenes],
-            [name for name, entry in RENDERED.items() if entry.for_choosing],
-            SETTINGS.rendered_variants,
-        ),
+        *(dataset.report(PLAN, SETTINGS.scenes_of(name)) for name, dataset in SETTINGS.apart.items()),
     )
 }
 
@@ -112,7 +107,11 @@ def source_file(name):
 # the Snakefile, the files that it includes, and the template that they read
 INCLUDED = re.findall(r'^include: "(.+)"$', Path(source_file("Snakefile")).read_text(), re.MULTILINE)
 PLAN_TEMPLATE = "rules/plan.json.j2"
-RULE_FILES = [source_file(name) for name in ["Snakefile", *INCLUDED, PLAN_TEMPLATE]]
+# rules of extensions
+ADDED_RULES = [
+    str(Path(find_spec(name).origin).with_name("rules.smk")) for one in extensions().values() for name in one.rules
+]
+RULE_FILES = [*(source_file(name) for name in ["Snakefile", *INCLUDED, PLAN_TEMPLATE]), *ADDED_RULES]
 
 
 # patterns of a scene's files in rules
@@ -244,7 +243,7 @@ def source_files(kind):
 
     def files(wildcards):
         scene = scene_of(wildcards)
-        return list(map(str if scene.is_rendered else own_file, getattr(scene, kind)))
+        return list(map(str if scene.is_made else own_file, getattr(scene, kind)))
 
     return files
 
@@ -267,17 +266,15 @@ def ingest_source(wildcards):
     scene = scene_of(wildcards)
     if scene.source is None:
         return ["--builtin", scene.name, "--size", str(scene.height)]
-    if scene.is_rendered:
-        return ["--rendered", placed(scene.source), *scene.flags]
-    return [str(scene.source), *scene.flags]
+    reader = [] if scene.module is None else ["--module", scene.module]
+    return [placed(scene.source) if scene.is_made else str(scene.source), *reader, *scene.flags]
 
 
 def truth_source(wildcards):
     """Source of a scene's ground truth, as arguments of its command; empty without ground truth."""
     scene = scene_of(wildcards)
-    if scene.is_rendered:
-        return ["--rendered", placed(scene.source)]
-    return ingest_source(wildcards) if scene.source is None or scene.brought_truth else []
+    words = ingest_source(wildcards) if scene.source is None or scene.brought_truth else []
+    return words if scene.module is None else words[: -len(scene.flags) or None]
 
 
 def own_truth_size(wildcards):
@@ -359,11 +356,11 @@ def minutes_for(*seconds, **more):
     return minutes
 
 
-def of_source(read, rendered):
-    """Function of wildcards: ``rendered`` for path-traced scenes, which have wider values, else ``read``."""
+def of_source(read, of_module):
+    """Function of wildcards: ``of_module`` for scenes that a module of an extension reads, else ``read``."""
 
     def ask(wildcards, attempt):
-        return (rendered if scene_of(wildcards).is_rendered else read)(wildcards, attempt)
+        return (read if scene_of(wildcards).module is None else of_module)(wildcards, attempt)
 
     return ask
 

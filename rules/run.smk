@@ -20,7 +20,7 @@ def is_new(file):
 def print_warnings():
     """Show the warnings that reading light fields, ground truth and external maps gave in this run, from the logs."""
     shown, without_map = set(), {}
-    for dataset, scene in (*SETTINGS.scenes, *SETTINGS.rendered_scenes):
+    for dataset, scene in (*SETTINGS.scenes, *SETTINGS.scenes_apart):
         for kind in ("ingest", "truth", "external"):
             log = Path(placed(f"logs/{dataset}/{scene}/{kind}.log"))
             for line in log.read_text().splitlines() if is_new(log) else ():

@@ -1,14 +1,7 @@
 # Files of pages, tables and images, and the inputs that they are made from.
 
-from importlib.util import find_spec
-
 from sepi.report.plan import COMPARISON, PARTS_TABLES, TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
-from sepi.workflow.datasets import Scene
-from sepi.workflow.rendered_scenes import DATASET
-from sepi.workflow.result_paths import render_file
-
-RENDERING = SETTINGS.rendered
 
 PARTS = "reports/report_parts.json" if SETTINGS.report.parts_of_best else []
 # ending of a file of numbers to the folder and the names of its tables
@@ -110,23 +103,3 @@ def folder_of_scenes(wildcards, output):
 def results_folder(wildcards):
     """Folder in which commands look for results."""
     return placed(RESULTS)
-
-
-def without_renderer(wildcards):
-    """No input; ends the run before any job if the renderer is missing."""
-    if find_spec("mitsuba") is None and not os.path.exists(placed(render_file(wildcards.world))):
-        sys.exit("sepi: rendered scenes need the package mitsuba: pip install 'sepi[render]'")
-    return []
-
-
-def rendered_files():
-    """All files of the report on rendered scenes."""
-    if not SETTINGS.rendered_scenes:
-        sys.exit("sepi: config.rendered.scenes: names no scene; leave the key out for all scenes")
-    return report_files(DATASET)
-
-
-def of_render(ask):
-    """Function of wildcards: memory or time of a render of this size."""
-    size = RENDERING.size
-    return lambda wildcards, attempt: attempt * ask(Scene(DATASET, "", None, (), RENDERING.views**2, size, size))

@@ -16,6 +16,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from types import FrameType
 from typing import IO, TYPE_CHECKING, Any
@@ -23,6 +24,7 @@ from typing import IO, TYPE_CHECKING, Any
 import click
 
 from sepi.errors import SepiError, SepiWarning, one_line
+from sepi.registry import added
 
 # every command imports this module, so imports for the commands of stages stand in their function
 if TYPE_CHECKING:
@@ -55,6 +57,24 @@ class _Shown(click.ClickException):
 
 class SepiCommand(click.Command):
     """A click command that shows a :class:`SepiError` as one line and cleans up when it is terminated."""
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+    ) -> click.Context:
+        """The context of these words; a flag that the command lacks, and --help, are those of extensions, too."""
+        own = {flag for param in self.params for flag in (*param.opts, *param.secondary_opts)}
+        more = {word.partition("=")[0] for word in args if word == "-h" or word.startswith("--")} - own
+        command = self.extended() if more else self
+        return super(SepiCommand, command).make_context(info_name, args, parent, **extra)
+
+    def extended(self) -> SepiCommand:
+        """The command with the flags that extensions add."""
+        command = self
+        with shown_errors():
+            for name, module in added("flags").items():
+                if name.partition(" ")[0] == self.name:
+                    command = import_module(module).extended(command)
+        return command
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command."""

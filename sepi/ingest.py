@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import click
@@ -15,8 +16,8 @@ from sepi.cli.input_options import Reading, range_to_search, reading_flags, scen
 from sepi.command import SepiCommand, write_timing
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import write_light_field
-from sepi.rendered.catalogue import NOISE_LEVELS, WITHOUT_NOISE
 from sepi.threads import use_threads
+from sepi.validation import settings_of
 
 _PATH = click.Path(path_type=Path)
 
@@ -24,10 +25,7 @@ _PATH = click.Path(path_type=Path)
 @click.command(name="python -m sepi.ingest", cls=SepiCommand)
 @click.argument("path", type=_PATH, required=False)
 @scene_flags
-@click.option(
-    "--noise", type=click.Choice(NOISE_LEVELS), default=WITHOUT_NOISE, show_default=True, help="Rendered: noise."
-)
-@click.option("--seed", type=click.IntRange(min=1), default=1, show_default=True, help="Rendered: seed of the noise.")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Setting of the module; repeatable.")
 @range_to_search
 @reading_flags
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
@@ -38,9 +36,8 @@ def main(
     builtin: str | None,
     size: int,
     views: int,
-    rendered: Path | None,
-    noise: str,
-    seed: int,
+    module: str | None,
+    settings: tuple[str, ...],
     disparity_range: tuple[float, float] | None,
     reading: Reading,
     threads: int,
@@ -50,14 +47,13 @@ def main(
     """Read the light field at PATH and write it as one HDF5 file with a disparity range."""
     started = time.perf_counter()
     use_threads(threads)
-    if [path, builtin, rendered].count(None) != 2:
-        raise click.UsageError("expected one of PATH, --builtin NAME and --rendered FILE")
-    if path is not None:
+    if (path is None) == (builtin is None):
+        raise click.UsageError("expected PATH or --builtin NAME")
+    if path is not None and module is not None:
+        light_field = import_module(module).read_scene(path, **settings_of(settings, "seed=2"))
+        light_field = replace(light_field, ground_truth=None, masks={})
+    elif path is not None:
         light_field = reading.read(path, truth=False)
-    elif rendered is not None:
-        from sepi.rendered.exposure import read_exposed
-
-        light_field = replace(read_exposed(rendered, noise, seed), ground_truth=None, masks={})
     else:
         from sepi.scenes import render
 

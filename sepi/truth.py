@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
 import click
@@ -28,7 +29,7 @@ def main(
     builtin: str | None,
     size: int,
     views: int,
-    rendered: Path | None,
+    module: str | None,
     reading: Reading,
     own: TruthFile | None,
     light_field: Path | None,
@@ -39,14 +40,12 @@ def main(
     --truth replaces the light field's own ground truth.
     """
     truth: Truth = (None, {})
-    if path is not None:
+    if path is not None and module is not None:
+        truth = import_module(module).read_truth(path)
+    elif path is not None:
         from sepi.io.readers.formats import read_truth
 
         truth = read_truth(path, reading.options, reading.file_format)
-    elif rendered is not None:
-        from sepi.rendered.render_file import read_truth as read_render_truth
-
-        truth = read_render_truth(rendered)
     elif builtin is not None:
         from sepi.scenes.light_field import scene_truth
 

@@ -127,7 +127,7 @@ _SCENES = (
     click.option("--builtin", help="Built-in scene, in place of PATH."),
     click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Built-in: pixels a side."),
     click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Built-in: views a side."),
-    click.option("--rendered", type=click.Path(path_type=Path), help="Render of a scene, in place of PATH."),
+    click.option("--module", help="Module of an extension that reads PATH."),
 )
 
 view_of_result = click.option(
@@ -156,7 +156,7 @@ def _flagged(command: Callable[..., Any], flags: Iterable[Callable[..., Any]]) -
 
 
 def scene_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the flags of built-in and rendered scenes to a command."""
+    """Add the flags of built-in scenes, and of those that extensions read, to a command."""
     return _flagged(command, _SCENES)
 
 

@@ -14,9 +14,7 @@ It does not cover:
   cannot change the maps. :func:`stage_modules` adds the module that writes them;
 - code below ``if TYPE_CHECKING:``, which never runs;
 - the ``__init__`` of a package on the way to a module, unless a name is imported from the package itself;
-- the format readers and the built-in and rendered scenes, of which a job runs only one, which :func:`ingest_modules`
-  names;
-- descriptions of the rendered scenes, since rendering takes long;
+- the format readers and the built-in scenes, of which a job runs only one, which :func:`ingest_modules` names;
 - other libraries: a new version of NumPy reruns nothing.
 
 No stage imports another stage, so a change in one does not change the digests of others.
@@ -54,7 +52,6 @@ _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
 # packages and modules of which a job runs one
 _ALTERNATIVES = (
     "scenes",
-    "rendered",
     *(
         f"io.readers.{name}"
         for name in (
@@ -74,9 +71,8 @@ _ALTERNATIVES = (
     ),
 )
 _HEADER = ".hpp"
-# arguments of calls that are texts for people: help, and descriptions of the rendered scenes
+# arguments of calls that are texts for people
 _TOLD = ("help", "description")
-_TELLING = "rendered.catalogue"
 
 # result for a source: digest of its code; level, module and names of its imports, as written
 _Code = tuple[str, list[tuple[int, str, list[str]]]]
@@ -98,11 +94,6 @@ def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
 def ingest_modules(reader: str) -> tuple[str, ...]:
     """Modules that determine a light field's file: ingest, and the module that reads or renders the views."""
     return ("sepi.ingest", reader)
-
-
-def render_modules(world: str) -> tuple[str, ...]:
-    """Modules that determine the file of a rendered scene: the renderer, and the module of the scene."""
-    return ("sepi.rendered.rendering", f"sepi.rendered.worlds.{world}")
 
 
 @cache
@@ -140,7 +131,7 @@ def imported_modules(*modules: str, root: Path = ROOT) -> set[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            followed = [other for other in _code_and_imports(name, root)[1] if other.partition(".")[2] != _TELLING]
+            followed = _code_and_imports(name, root)[1]
             waiting.extend(other for other in followed if _is_alternative(name) or not _is_alternative(other))
     return found
 

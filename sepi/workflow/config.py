@@ -8,6 +8,7 @@ import re
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import fields, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -20,12 +21,12 @@ from sepi.io.readers.options import AS_GIVEN, ORDERS, Positive, ReadOptions
 from sepi.io.scores import ExternalSource
 from sepi.lightfield import DisparityRange
 from sepi.models import CheckedModel, validated
+from sepi.registry import added
 from sepi.scenes import SCENES
 from sepi.validation import require_known
 from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
-from sepi.workflow.datasets import LONGEST_NAME, Scene, own_scene, require_plain_path, scenes_in
+from sepi.workflow.datasets import LONGEST_NAME, Dataset, Scene, own_scene, require_plain_path, scenes_in
 from sepi.workflow.parameters import stage_settings
-from sepi.workflow.rendered_dataset import Rendered
 from sepi.workflow.settings import Report, Settings
 
 # names already in use for folders, panels and table columns, where variants have theirs too
@@ -87,8 +88,8 @@ OwnLightField: type[_Own] = create_model(  # type: ignore[call-overload]
 """Keys of one of the ``light_fields``, including the reading flags of ``sepi depth``."""
 
 
-class Config(CheckedModel):
-    """Keys of ``config.yaml``."""
+class _Config(CheckedModel):
+    """Keys of ``config.yaml``, apart from those of datasets that extensions add."""
 
     builtin: Builtin = Field(
         Builtin(),
@@ -112,11 +113,6 @@ class Config(CheckedModel):
         "order, exclude, view, row_spacing, white, images, reference, crop_of, follow_links, which are flags of "
         "'sepi depth'; truth, a ground truth file, and truth_scale, pixels per view step per unit of its values "
         "(docs/reproduce/real_truth.md).",
-    )
-    rendered: Rendered = Field(
-        Rendered(),
-        description="Dataset 'rendered', used only by 'snakemake rendered': path-traced scenes with exact ground "
-        "truth, at several noise levels (docs/reproduce/rendered.md). Rendering needs the extra sepi[render].",
     )
     external: dict[str, dict[str, Any]] = Field(
         {},
@@ -149,6 +145,17 @@ class Config(CheckedModel):
     )
 
 
+DATASETS: dict[str, type[Dataset]] = {name: import_module(module).Dataset for name, module in added("datasets").items()}
+"""Key to dataset, of those that extensions add."""
+
+Config: type[_Config] = create_model(  # type: ignore[call-overload]
+    "Config",
+    __base__=_Config,
+    **{name: (kind, Field(kind(), description=kind.description)) for name, kind in DATASETS.items()},
+)
+"""Keys of ``config.yaml``."""
+
+
 def load_settings(values: Mapping[str, Any]) -> Settings:
     """Check a configuration (as read from YAML) and find its scenes.
 
@@ -164,28 +171,29 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
     except RecursionError as error:
         raise SepiError("config: a key contains itself (through & and *), or values are nested too deeply") from error
     config = validated(Config, spelled, "config")
-    scenes, rendered = _scenes(config), config.rendered.found("config.rendered")
+    entries = {**VARIANT_ENTRIES, **config.variants}
+    datasets: dict[str, Dataset] = {name: getattr(config, name) for name in DATASETS}
+    found = {name: dataset.found(f"config.{name}", entries) for name, dataset in datasets.items()}
+    scenes = _scenes(config, [scene for name in found if not datasets[name].apart for scene in found[name]])
+    apart = {f"{name}/{scene.name}": scene for name in found if datasets[name].apart for scene in found[name]}
     ranges = config.disparity_range
-    require_known("config.disparity_range", ranges, scenes | rendered)
+    require_known("config.disparity_range", ranges, scenes | apart)
     for name, (minimum, maximum) in ranges.items():
         DisparityRange(minimum, maximum, f"config.disparity_range of {name}")
-    _require_inside(config.report.pixels, scenes | rendered)
-    entries = {**VARIANT_ENTRIES, **config.variants}
+    _require_inside(config.report.pixels, scenes | apart)
     variants = {name: _variant(name, entries) for name in entries}
-    chosen = config.rendered.variants
-    require_known("config.rendered.variants", chosen if isinstance(chosen, list) else (), variants)
 
     def with_ranges(found: Mapping[str, Scene]) -> dict[tuple[str, str], Scene]:
         return {(one.dataset, one.name): replace(one, disparity_range=ranges.get(name)) for name, one in found.items()}
 
     return Settings(
         with_ranges(scenes),
-        with_ranges(rendered),
+        with_ranges(apart),
         variants,
         stage_settings(config.stages, variants),
         {name: _external(name, entry, variants) for name, entry in config.external.items()},
         config.report,
-        config.rendered,
+        {name: dataset for name, dataset in datasets.items() if dataset.apart},
         tuple(config.bad_thresholds),
     )
 
@@ -223,8 +231,8 @@ def _with_numbers(value: Any, top: bool = True) -> Any:
     return value
 
 
-def _scenes(config: Config) -> dict[str, Scene]:
-    """Every scene, by ``DATASET/NAME``."""
+def _scenes(config: _Config, more: list[Scene]) -> dict[str, Scene]:
+    """Every scene, with these more, by ``DATASET/NAME``."""
     require_known("config.builtin.scenes", config.builtin.scenes, SCENES)
     size = config.builtin.size
     scenes = [Scene("builtin", name, None, (), _BUILTIN_VIEWS, size, size) for name in config.builtin.scenes]
@@ -240,6 +248,7 @@ def _scenes(config: Config) -> dict[str, Scene]:
         if own.truth is None and own.truth_scale is not None:
             raise SepiError(f"{where}.truth_scale: needs a ground truth file; give truth as well")
         scenes.append(own_scene(name, Path(own.path).expanduser(), own.flags, where, own.own_truth))
+    scenes += more
     if not scenes:
         raise SepiError("config: no scenes; list some in builtin.scenes or light_fields, or set hci_root")
     for scene in scenes:

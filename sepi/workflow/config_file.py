@@ -34,10 +34,11 @@ def default_yaml() -> str:
         "# This file is generated: python -m sepi.workflow.config_file > config.yaml",
         "",
     ]
-    for key, field in Config.model_fields.items():
+    # long ones last
+    for key, field in sorted(Config.model_fields.items(), key=lambda item: item[0] in ("variants", "stages")):
         lines += _comment(field, "")
         default = field.get_default(call_default_factory=True)
-        if key in ("builtin", "rendered", "report"):
+        if isinstance(default, BaseModel):
             lines += [f"{key}:", *_without_effect(_fields(type(default), "  ", default.model_dump()))]
         elif key == "variants":
             lines += ["variants:", *_without_effect(f"  {name}: {_flow(entry)}" for name, entry in default.items())]

@@ -6,13 +6,14 @@ import math
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
 
 from sepi.cameras.files import cameras_in, described_by, read_model
 from sepi.errors import SepiError
@@ -22,7 +23,11 @@ from sepi.io.readers import exported, hci, hci_2013
 from sepi.io.readers.formats import Format, format_of, size_of
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import view_files
-from sepi.workflow.rendered_scenes import DATASET
+from sepi.models import CheckedModel
+from sepi.workflow.result_paths import RESULTS
+
+if TYPE_CHECKING:
+    from sepi.report.plan import Plan
 
 VIEW_PATTERN = "input_Cam*.png"
 
@@ -53,7 +58,7 @@ class Scene:
     dataset, name : str
         Name of the scene's folder, ``results/DATASET/NAME``.
     source : Path or None
-        Folder or file to read; None for a built-in scene, the file of :mod:`sepi.rendered` for a rendered one.
+        Folder or file to read; None for a built-in scene.
     files : tuple of Path
         Files that ingest reads, without ground truth; a change in one of them is a change of the scene.
     views : int
@@ -68,6 +73,8 @@ class Scene:
         Flags for the command line of ingest.
     own_truth : TruthFile or None
         The user's ground truth, instead of the light field's.
+    module : str or None
+        Module of an extension, whose ``read_scene(source, **settings)`` and ``read_truth(source)`` read the source.
     """
 
     dataset: str
@@ -81,6 +88,7 @@ class Scene:
     disparity_range: tuple[float, float] | None = None
     flags: tuple[str, ...] = ()
     own_truth: TruthFile | None = None
+    module: str | None = None
 
     @property
     def samples(self) -> int:
@@ -88,17 +96,17 @@ class Scene:
         return self.views * self.height * self.width
 
     @property
-    def is_rendered(self) -> bool:
+    def is_made(self) -> bool:
         """Whether a job of the workflow makes the source."""
-        return self.dataset == DATASET
+        return self.source is not None and self.source.is_relative_to(RESULTS)
 
     @property
     def reader(self) -> str:
         """Module that reads the views, or renders them."""
         if self.source is None:
             return "sepi.scenes"
-        if self.is_rendered:
-            return "sepi.rendered.exposure"
+        if self.module is not None:
+            return self.module
         # ingest reports an unknown format
         return format_of.__module__ if self._format is None else self._format.reader.__name__
 
@@ -111,7 +119,7 @@ class Scene:
     @property
     def brought_truth(self) -> tuple[Path, ...]:
         """Files with ground truth and masks that belong to the light field itself."""
-        if self.is_rendered:
+        if self.module is not None:
             return self.files
         return () if self.source is None or self._format is None else tuple(self._format.truth_files(self.source))
 
@@ -146,6 +154,30 @@ class Scene:
         """
         measured = (seconds_per_megasample * self.samples + seconds_per_megapixel * self.height * self.width) / 1e6
         return math.ceil((_START_SECONDS + _SLOWER * measured) / 60)
+
+
+class Dataset(CheckedModel):
+    """Keys of a dataset that an extension adds to the configuration."""
+
+    description: ClassVar[str]
+    """Text of its key in ``config.yaml``."""
+
+    apart: ClassVar[bool] = False
+    """Whether ``snakemake all`` leaves its scenes out, for rules and a report of its own."""
+
+    def found(self, where: str, variants: Collection[str]) -> list[Scene]:
+        """Its scenes.
+
+        Raises
+        ------
+        SepiError
+            If a value is wrong, such as a variant that is none of these; ``where`` is the key in the message.
+        """
+        raise NotImplementedError
+
+    def report(self, plan: Plan, scenes: Sequence[str]) -> Plan:
+        """The plan of the report of its scenes, of that of the main report; asked if they stand apart."""
+        raise NotImplementedError
 
 
 def require_plain_path(path: str, where: str) -> None:

@@ -1,14 +1,21 @@
-"""Names of rendered scenes in the workflow: scene of :mod:`sepi.rendered`, noise level and noise seed."""
+"""Names of rendered scenes in the workflow and in reports: scene, noise level and noise seed."""
 
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
-
-from sepi.rendered.catalogue import NOISE_LEVELS, WITHOUT_NOISE, exposed_name
+from typing import Literal, NamedTuple, get_args
 
 DATASET = "rendered"
 """Name of the dataset of rendered scenes and of its report."""
+
+
+NoiseLevel = Literal["off", "low", "high"]
+
+NOISE_LEVELS: tuple[NoiseLevel, ...] = get_args(NoiseLevel)
+"""Levels of sensor noise: none, that of a quiet camera, and that of a dim evening."""
+
+WITHOUT_NOISE: NoiseLevel = "off"
+"""The level without noise; it is not part of a scene's name, and has one seed only."""
 
 
 class RenderedScene(NamedTuple):
@@ -17,9 +24,9 @@ class RenderedScene(NamedTuple):
     Attributes
     ----------
     world : str
-        Name in :data:`sepi.rendered.RENDERED`.
+        Name of the scene without noise.
     noise : str
-        One of :data:`sepi.rendered.NOISE_LEVELS`.
+        One of :data:`NOISE_LEVELS`.
     seed : int
         Seed of the noise, from 1.
     """
@@ -40,3 +47,9 @@ def rendered_scene(name: str) -> RenderedScene:
     found = re.fullmatch(rf"(.+?)(?:_({levels})(?:_(\d+))?)?", name)
     assert found is not None
     return RenderedScene(found[1], found[2] or WITHOUT_NOISE, int(found[3] or 1))
+
+
+def exposed_name(scene: str, noise: str = WITHOUT_NOISE, seed: int = 1) -> str:
+    """Name of a scene at a noise level: ``sticks``, ``sticks_low``, or with another seed ``sticks_low_2``."""
+    parts = [scene] if noise == WITHOUT_NOISE else [scene, noise, *([str(seed)] if seed != 1 else [])]
+    return "_".join(parts)

@@ -18,11 +18,6 @@ PARTS_ENDING = "_parts"
 """Ending of the files that only the ablation of the best variant has."""
 
 
-def render_file(world: str) -> Path:
-    """The renderer's output for a scene: noise-free views and ground truth, shared by all noise levels."""
-    return RESULTS / "renders" / f"{world}.h5"
-
-
 @dataclass(frozen=True)
 class SceneFiles:
     """The files of one scene.

@@ -16,9 +16,8 @@ from sepi.io.scores import ExternalSource
 from sepi.models import CheckedModel
 from sepi.stage import Parameters
 from sepi.validation import require_known
-from sepi.variants import VARIANTS, Variant, needing_files
-from sepi.workflow.datasets import Scene
-from sepi.workflow.rendered_dataset import Rendered
+from sepi.variants import VARIANTS, Variant
+from sepi.workflow.datasets import Dataset, Scene
 from sepi.workflow.result_paths import RESULTS
 
 # image files and page data of a scene
@@ -62,8 +61,8 @@ class Settings:
     ----------
     scenes : mapping of (dataset, scene) to Scene
         Every scene of ``all``, ``ablation`` and ``comparison``, in the tables' order.
-    rendered_scenes : mapping of (dataset, scene) to Scene
-        Scenes of ``rendered``.
+    scenes_apart : mapping of (dataset, scene) to Scene
+        Scenes of datasets that stand apart.
     variants : mapping of str to Variant
         The built-in variants, then the user's own.
     parameters : mapping of stage to label to Parameters
@@ -72,32 +71,25 @@ class Settings:
         External methods and the paths of their maps.
     report : Report
         Settings of the report.
-    rendered : Rendered
-        Settings of the rendered scenes.
+    apart : mapping of str to Dataset
+        Settings of these datasets, by name.
     bad_thresholds : tuple of float
         Additional error thresholds.
     """
 
     scenes: Mapping[tuple[str, str], Scene]
-    rendered_scenes: Mapping[tuple[str, str], Scene]
+    scenes_apart: Mapping[tuple[str, str], Scene]
     variants: Mapping[str, Variant]
     parameters: Mapping[str, Mapping[str, Parameters]]
     external: Mapping[str, ExternalSource]
     report: Report
-    rendered: Rendered
+    apart: Mapping[str, Dataset]
     bad_thresholds: tuple[float, ...] = ()
 
     @property
     def datasets(self) -> list[str]:
-        """Names of the datasets that have scenes, except ``rendered``."""
+        """Names of the datasets that have scenes, except those that stand apart."""
         return list(dict.fromkeys(dataset for dataset, _ in self.scenes))
-
-    @property
-    def rendered_variants(self) -> list[str] | None:
-        """The variants chosen for the rendered scenes; None if not configured."""
-        if self.rendered.variants == "all":
-            return [name for name in VARIANTS if name not in needing_files()]
-        return self.rendered.variants
 
     @property
     def own_variants(self) -> list[str]:
@@ -106,7 +98,7 @@ class Settings:
 
     def scenes_of(self, dataset: str) -> list[str]:
         """Names of a dataset's scenes."""
-        return [name for other, name in (*self.scenes, *self.rendered_scenes) if other == dataset]
+        return [name for other, name in (*self.scenes, *self.scenes_apart) if other == dataset]
 
     def scene(self, dataset: str, name: str) -> Scene:
         """A scene by name.
@@ -117,10 +109,10 @@ class Settings:
             If it does not exist; the message suggests the nearest name.
         """
         # called by thousands of jobs: names are listed only on an error
-        for known in (self.scenes, self.rendered_scenes):
+        for known in (self.scenes, self.scenes_apart):
             if (dataset, name) in known:
                 return known[dataset, name]
-        require_known("dataset", [dataset], dict.fromkeys([*self.datasets, *(one for one, _ in self.rendered_scenes)]))
+        require_known("dataset", [dataset], dict.fromkeys([*self.datasets, *(one for one, _ in self.scenes_apart)]))
         require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
         raise AssertionError(f"{dataset}/{name} is among the known ones")
 

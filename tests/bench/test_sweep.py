@@ -11,7 +11,7 @@ from rendered_files import write_drawn
 from bench import sweep
 from bench.__main__ import main
 from sepi.errors import SepiError
-from sepi.rendered.exposure import read_exposed
+from sepi.extensions.rendered.exposure import read_scene
 from sepi.scenes import render, write_hci
 from sepi.variants import VARIANTS
 
@@ -30,7 +30,7 @@ def test_the_value_for_a_scene_is_chosen_on_the_others() -> None:
 def test_held_out_scenes_are_refused_whatever_their_files_are_called(tmp_path: Path) -> None:
     """A parameter that was chosen on them would say nothing about other scenes."""
     write_drawn(tmp_path / "innocent.h5", "foliage")
-    write_hci(read_exposed(tmp_path / "innocent.h5", "low", 2), tmp_path / "folder")
+    write_hci(read_scene(tmp_path / "innocent.h5", "low", 2), tmp_path / "folder")
     write_drawn(tmp_path / "sticks.h5", "sticks")
     for name in ("innocent.h5", "folder"):
         with pytest.raises(SepiError, match=f"{name}: scene 'foliage' is held out, .*; on sticks, wires"):

@@ -30,6 +30,7 @@ from snakemake.cli import get_argument_parser, parse_config
 from workflow_copy import Workflow
 
 from sepi.cli.main import main
+from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import DisparityRange, LightField
@@ -83,6 +84,8 @@ def resolved(words: list[str]) -> tuple[click.Command, list[str]] | None:
         name, *rest = rest
         command = command.get_command(click.Context(command), name)
         assert command is not None, f"no command {name}"
+    if isinstance(command, SepiCommand):
+        command = command.extended()
     return (command, rest) if isinstance(command, click.Command) else None
 
 

@@ -14,11 +14,11 @@ sys.path.insert(0, str(REPOSITORY / "tests" / "report"))
 from make_tables import TABLE, filled
 from report_results import numbers_of, report_of, with_results
 
-from sepi.rendered import NOISE_LEVELS
 from sepi.report.plan import Plan
 from sepi.report.tabular.properties import PROPERTIES
 from sepi.scenes import SCENES
 from sepi.variants import STAGES, VARIANTS
+from sepi.workflow.rendered_scenes import NOISE_LEVELS
 
 HCI = ("cotton", "antinous")
 

@@ -16,7 +16,6 @@ from sepi.workflow.code_digest import (
     ingest_modules,
     keep,
     remember,
-    render_modules,
     stage_modules,
 )
 
@@ -128,19 +127,6 @@ def test_a_light_field_is_read_again_for_its_own_reader_alone() -> None:
         readers - {"sepi.io.readers.numpy_files"}
     )
     assert not any(name.startswith("sepi.scenes") for name in imported_modules("sepi.ingest"))
-
-
-def test_a_scene_is_rendered_again_for_the_renderer_and_itself_alone() -> None:
-    """It takes minutes: neither another scene, nor what is told of scenes, nor noise may ask for that."""
-    found = imported_modules(*render_modules("sticks"))
-    assert {"sepi.rendered.rendering", "sepi.rendered.tracing", "sepi.rendered.worlds.sticks"} <= found
-    assert not found & {
-        "sepi.rendered.worlds.room",
-        "sepi.rendered.catalogue",
-        "sepi.rendered.exposure",
-        "sepi.command",
-    }
-    assert not any("rendered" in name for name in imported_modules(*ingest_modules("sepi.scenes")))
 
 
 def test_a_module_that_does_not_exist_is_an_error(tree: Path) -> None:

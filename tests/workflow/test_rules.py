@@ -16,7 +16,7 @@ from sepi.errors import SepiError
 from sepi.report.plan import TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
 from sepi.variants import HANDED_ON, STAGES
-from sepi.workflow.code_digest import code_digest, ingest_modules, render_modules, stage_modules
+from sepi.workflow.code_digest import code_digest, ingest_modules, stage_modules
 from sepi.workflow.datasets import Scene
 from sepi.workflow.settings import MOST_ON_PAGE, Report
 
@@ -74,7 +74,7 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
             if rule.name == "ingest":
                 modules = ingest_modules("sepi.scenes")
             if rule.name == "render":
-                modules = render_modules("sticks")
+                modules = tuple(f"sepi.extensions.rendered.{name}" for name in ("rendering", "worlds.sticks"))
             if rule.name == "truth":
                 modules = ("sepi.truth", "sepi.scenes")
             given = code(scene(**{rule.name: name})) if callable(code) else code

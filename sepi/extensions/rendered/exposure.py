@@ -1,0 +1,120 @@
+"""Pictures of a sensor from rendered light: photon and read noise, vignetting, exposure, tone curve, bits."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.camera import camera_from
+from sepi.extensions.rendered.options import NOISE, Exposure
+from sepi.extensions.rendered.render_file import Render, read_render
+from sepi.extensions.rendered.render_file import read_truth as read_truth
+from sepi.extensions.rendered.srgb import srgb_encoded
+from sepi.lightfield import DisparityRange, LightField
+from sepi.models import validated
+from sepi.workflow.rendered_scenes import exposed_name
+
+
+def read_scene(path: Path, noise: str = "off", seed: int = 1) -> LightField:
+    """The light field of a render at a noise level.
+
+    Parameters
+    ----------
+    path : Path
+        File that :func:`sepi.extensions.rendered.rendering.render_world` wrote.
+    noise : str
+        One of :data:`sepi.workflow.rendered_scenes.NOISE_LEVELS`.
+    seed : int
+        Seed of the noise.
+
+    Returns
+    -------
+    LightField
+        From :func:`exposed`.
+
+    Raises
+    ------
+    SepiError
+        If the file is not a render, or there is no such level or seed.
+    """
+    return exposed(read_render(path), validated(Exposure, {"noise": noise, "noise_seed": seed}, "noise"))
+
+
+def exposed(render: Render, exposure: Exposure) -> LightField:
+    """The light field that a sensor takes of a rendered scene.
+
+    Parameters
+    ----------
+    render : Render
+    exposure : Exposure
+
+    Returns
+    -------
+    LightField
+        Views uint8 or uint16 RGB, with disparity range, camera, and ground truth and masks of the centre view. Equal
+        arguments give equal bytes. It has no true positions of the views, like a camera's.
+    """
+    rows, columns = render.views.shape[:2]
+    views = np.empty(render.views.shape, np.uint8 if exposure.bits == 8 else np.uint16)
+    # seeded by scene, level and seed, so that no two pictures share their noise
+    key = zlib.crc32(f"{render.name} {exposure.noise}".encode())
+    factors = np.exp2(
+        exposure.exposure_spread * np.random.default_rng([exposure.noise_seed, key]).standard_normal((rows, columns))
+    )
+    factors[render.centre] = 1
+    shade = _vignette(render.views.shape[2:4], exposure.vignetting)
+    for t, s in np.ndindex(rows, columns):
+        light = np.maximum(render.views[t, s].astype(np.float64), 0) * (factors[t, s] * shade)
+        rng = np.random.default_rng([exposure.noise_seed, key, t * columns + s])
+        views[t, s] = _values(_noisy(light, exposure, render.light, rng), exposure)
+    return LightField(
+        views=views,
+        name=exposed_name(render.name, exposure.noise, exposure.noise_seed),
+        source="rendered",
+        disparity_range=_range_of(render.disparity),
+        ground_truth=render.disparity[render.centre],
+        masks=render.masks_of(render.centre),
+        camera=camera_from(**render.settings, shape=render.views.shape[2:4], crop_of=None),
+    )
+
+
+def _noisy(
+    light: npt.NDArray[np.float64], exposure: Exposure, share: float, rng: np.random.Generator
+) -> npt.NDArray[np.float64]:
+    """Light with photon noise and read noise."""
+    sensor = NOISE[exposure.noise]
+    if sensor is None:
+        return light
+    white = sensor.white * share
+    # a full well is white
+    electrons = rng.poisson(np.minimum(light, 1) * white) + sensor.read * rng.standard_normal(light.shape)
+    return electrons / white
+
+
+def _values(light: npt.NDArray[np.float64], exposure: Exposure) -> npt.NDArray[np.float64]:
+    """Pixel values before rounding."""
+    light = np.clip(light, 0, 1)
+    curve = (
+        np.float64(srgb_encoded(light.astype(np.float32))) if exposure.gamma is None else light ** (1 / exposure.gamma)
+    )
+    values: npt.NDArray[np.float64] = np.round(curve * (2**exposure.bits - 1))
+    return values
+
+
+def _vignette(shape: tuple[int, int], strength: float) -> npt.NDArray[np.float64]:
+    """Share of the light that arrives, falling with the squared distance from the middle; shape (H, W, 1)."""
+    down, across = (np.linspace(-1, 1, length) for length in shape)
+    return (1 - strength * (down[:, None] ** 2 + across[None, :] ** 2) / 2)[..., None]
+
+
+def _range_of(disparity: npt.NDArray[np.float32]) -> DisparityRange:
+    """Disparity range of all views, rounded outwards to tenths as in the benchmark."""
+    # rounded first, so that a bound at a tenth, up to the last bits, stays there
+    low, high = (round(10 * float(value), 3) for value in (disparity.min(), disparity.max()))
+    low, high = math.floor(low) / 10, math.ceil(high) / 10
+    # a scene of one plane still needs a range
+    return DisparityRange(low, max(high, low + 0.2), "parameters")

@@ -1,0 +1,119 @@
+"""Files of path-traced light fields: linear light, and ground truth of every view.
+
+An HDF5 file holds ``views (T, S, H, W, 3) float16`` (linear, 1 is white), ``disparity (T, S, H, W) float32`` (pixels
+per view step, at pixel centres), ``normal (T, S, H, W, 3) float16`` (right, down, away), ``masks (T, S, H, W) uint16``
+(bits in the order of its attribute ``names``), ``positions (T, S, 2) float64`` (view steps), ``turns (T, S, 3)
+float64`` (radians), and attributes with the scene, the camera and the options.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.extensions.rendered.masks import MASKS, mask
+from sepi.io.hdf5 import attribute, create_hdf5, fixed_text, open_hdf5, read_dataset
+from sepi.lightfield import BoolMap, FloatMap
+
+_ARRAYS = ("views", "disparity", "normal", "masks", "positions", "turns")
+_AXES = {
+    "views": "t s y x channel",
+    "disparity": "t s y x",
+    "normal": "t s y x (right, down, away)",
+    "masks": "t s y x",
+}
+
+
+@dataclass(frozen=True)
+class Render:
+    """A path-traced light field.
+
+    Attributes
+    ----------
+    name : str
+        Name of the scene.
+    views : ndarray, shape (T, S, H, W, 3), float16
+        Linear light; 1 is white.
+    disparity : ndarray, shape (T, S, H, W), float32
+        Disparity of the first surface at the middle of each pixel, pixels per view step.
+    normal : ndarray, shape (T, S, H, W, 3), float16
+        Normal of that surface, towards the camera: right, down, away.
+    masks : ndarray, shape (T, S, H, W), uint16
+        Bits, in the order of :data:`sepi.extensions.rendered.masks.MASKS`.
+    positions : ndarray, shape (T, S, 2), float64
+        Positions of the views from the centre view, ``(down, across)`` in view steps.
+    turns : ndarray, shape (T, S, 3), float64
+        Rotations of the views about x, y and z, radians.
+    settings : mapping of str to float
+        ``focal_length_mm``, ``baseline_mm``, ``focus_distance_m``, ``sensor_size_mm``.
+    light : float
+        Light of the scene relative to other scenes.
+    made_by : mapping
+        Record of the scene's options and versions.
+    """
+
+    name: str
+    views: npt.NDArray[np.float16]
+    disparity: npt.NDArray[np.float32]
+    normal: npt.NDArray[np.float16]
+    masks: npt.NDArray[np.uint16]
+    positions: npt.NDArray[np.float64]
+    turns: npt.NDArray[np.float64]
+    settings: dict[str, float]
+    light: float = 1.0
+    made_by: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def centre(self) -> tuple[int, int]:
+        """Grid position of the reference view."""
+        rows, columns = self.views.shape[:2]
+        return rows // 2, columns // 2
+
+    def masks_of(self, view: tuple[int, int]) -> dict[str, BoolMap]:
+        """The masks of a view by name."""
+        return {name: mask(self.masks[view], name) for name in MASKS}
+
+
+def write_render(path: Path, render: Render) -> None:
+    """Write a render, whole or not at all; equal content gives equal bytes."""
+    with create_hdf5(path) as file:
+        for name in _ARRAYS:
+            values = getattr(render, name)
+            # compression is worth while for masks only
+            file.create_dataset(name, data=values, **({"compression": "gzip"} if name == "masks" else {}))
+            if name in _AXES:
+                file[name].attrs["axes"] = _AXES[name]
+        file["masks"].attrs["names"] = [fixed_text(name) for name in MASKS]
+        file["disparity"].attrs["units"] = "pixels per view step"
+        file.attrs["render"] = fixed_text(render.name)
+        file.attrs["light"] = render.light
+        for key in ("settings", "made_by"):
+            file.attrs[key] = fixed_text(json.dumps(getattr(render, key), sort_keys=True))
+
+
+def read_render(path: Path) -> Render:
+    """The render in a file.
+
+    Raises
+    ------
+    SepiError
+        If the file is not a render, or damaged.
+    """
+    with open_hdf5(path, "render of a scene") as file:
+        arrays: dict[str, Any] = {name: read_dataset(path, file[name]) for name in _ARRAYS}
+        told: dict[str, Any] = {key: json.loads(attribute(file, key)) for key in ("settings", "made_by")}
+        return Render(name=str(attribute(file, "render")), light=float(attribute(file, "light")), **arrays, **told)
+
+
+def read_truth(path: Path) -> tuple[FloatMap, dict[str, BoolMap]]:
+    """Disparity and masks of a render's reference view, read without its pictures."""
+    with open_hdf5(path, "render of a scene") as file:
+        rows, columns = file["disparity"].shape[:2]
+        centre = (rows // 2, columns // 2)
+        bits = read_dataset(path, file["masks"], centre)
+        return read_dataset(path, file["disparity"], centre), {name: mask(bits, name) for name in MASKS}

@@ -1,0 +1,237 @@
+"""Rendering of a path-traced scene, view by view; a later run continues an interrupted one."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.extensions.rendered.masks import seen_bits, surface_bits
+from sepi.extensions.rendered.options import RenderOptions
+from sepi.extensions.rendered.render_file import Render, write_render
+from sepi.extensions.rendered.rig import Rig, rig_of
+from sepi.extensions.rendered.sampling import Plan, pictured, planned
+from sepi.extensions.rendered.shared_light import with_shared_light
+from sepi.extensions.rendered.tracing import Position, Tracer
+from sepi.extensions.rendered.world import FloatArray, World
+from sepi.io.files import atomic_path
+from sepi.io.provenance import package_version
+from sepi.stage import no_progress
+from sepi.threads import threads_used, use_threads
+
+# arrays of a view that are kept until all views are finished
+_TYPES = {
+    "views": np.float32,
+    "albedo": np.float32,
+    "disparity": np.float32,
+    "normal": np.float16,
+    "masks": np.uint16,
+    "upright": np.float32,
+    "things": np.int16,
+    "whole": np.bool_,
+}
+
+
+def made_by(name: str, options: RenderOptions) -> dict[str, Any]:
+    """Record of the options and versions of a render, for its file."""
+    return {"scene": name, "version": package_version(), **options.model_dump(mode="json")}
+
+
+def render_world(
+    name: str, world: World, options: RenderOptions, path: Path, progress: Callable[[float], None] = no_progress
+) -> None:
+    """Render a world into a file.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene.
+    world : World
+        That of a scene of the catalogue, or your own.
+    options : RenderOptions
+    path : Path
+        HDF5 file to write (:mod:`sepi.extensions.rendered.render_file`). Finished views lie in a folder beside it until
+        all are finished; a later run with the same scene and options uses them.
+    progress : callable, optional
+        Called with the fraction done.
+
+    Raises
+    ------
+    SepiError
+        If the files cannot be written.
+    """
+    rig = rig_of(world, options.size, options.grid, options.baseline)
+    count = math.prod(options.grid)
+    parts = _parts(path)
+    _take_over(parts, json.dumps({**made_by(name, options), "world": _digest(world)}, sort_keys=True))
+    files = [parts / f"view_{number:03d}.npz" for number in range(count)]
+    missing = [number for number, file in enumerate(files) if not _is_whole(file)]
+    for done, (number, values) in enumerate(_views(world, rig, options, missing), count - len(missing) + 1):
+        with atomic_path(files[number]) as temporary, temporary.open("wb") as stream:
+            np.savez(stream, allow_pickle=False, **values)
+        progress(done / (count + 1))
+    write_render(path, _assembled(name, world, rig, options, files))
+    shutil.rmtree(parts)
+    progress(1.0)
+
+
+def views_done(path: Path) -> int:
+    """Number of finished views of a scene that is being rendered into this file."""
+    return len(list(_parts(path).glob("view_*.npz")))
+
+
+def _parts(path: Path) -> Path:
+    """The folder of finished views."""
+    return path.with_name(f"{path.name}.parts")
+
+
+class _View(NamedTuple):
+    """A view before its picture: ground truth by name, position, and plan of samples."""
+
+    truth: dict[str, npt.NDArray[Any]]
+    position: Position
+    seed: int
+    plan: Plan | None
+
+
+def _views(
+    world: World, rig: Rig, options: RenderOptions, numbers: Sequence[int]
+) -> Iterator[tuple[int, dict[str, npt.NDArray[np.generic]]]]:
+    """Picture and ground truth of each of these views.
+
+    A thread prepares the next view while the renderer works, since the preparation uses one core only.
+    """
+    if not numbers:
+        return
+    tracer = Tracer(world, rig, options.lens * rig.baseline)
+    with ThreadPoolExecutor(1, initializer=use_threads, initargs=(threads_used(),)) as beside:
+        coming = beside.submit(_looked_at, world, tracer, rig, options, numbers[0])
+        for number, following in zip(numbers, [*numbers[1:], None], strict=True):
+            view = coming.result()
+            if following is not None:
+                coming = beside.submit(_looked_at, world, tracer, rig, options, following)
+            found = {**view.truth, "views": _picture(tracer, options, view)}
+            yield number, {part: values.astype(_TYPES[part]) for part, values in found.items()}
+
+
+def _looked_at(world: World, tracer: Tracer, rig: Rig, options: RenderOptions, number: int) -> _View:
+    """A view before its picture."""
+    positions, turns = _stand(rig, options)
+    (down, across), (x, y, z) = positions.reshape(-1, 2)[number].tolist(), turns.reshape(-1, 3)[number].tolist()
+    # one seed per view, far from others: a view's tiles use several in a row
+    seed = int(np.random.SeedSequence([options.seed, number]).generate_state(1)[0])
+    at = tracer.position(down, across, (x, y, z))
+    seen = tracer.first_surface(at)
+    disparity = rig.disparity(seen.depth).astype(np.float32)
+    straight = tracer.first_surface(tracer.position(down, across)) if any((x, y, z)) else seen
+    count = math.prod(options.grid)
+    plan = None
+    if options.shares_light:
+        plan = planned(tracer, at, seen, disparity, options.samples, count, seed, world.paths)
+    truth = {
+        "albedo": plan.albedo if plan else np.zeros((*disparity.shape, 3)),
+        "whole": plan.whole if plan else np.zeros(disparity.shape),
+        "things": seen.thing,
+        "disparity": disparity,
+        "normal": seen.normal,
+        "masks": surface_bits(world.things, seen, disparity),
+        # occlusion masks need a view without a turn
+        "upright": rig.disparity(straight.depth),
+    }
+    return _View(truth, at, seed, plan)
+
+
+def _picture(tracer: Tracer, options: RenderOptions, view: _View) -> FloatArray:
+    """Picture of a view, shape (H, W, 3)."""
+    return pictured(tracer, view.plan) if view.plan else tracer.picture(view.position, view.seed, options.samples)
+
+
+def _stand(rig: Rig, options: RenderOptions) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Positions and turns of the views; those of the reference view are exact."""
+    rng = np.random.default_rng(options.seed)
+    positions = rig.positions
+    shift, turns = rng.standard_normal(positions.shape), rng.standard_normal((*positions.shape[:2], 3))
+    centre = positions.shape[0] // 2, positions.shape[1] // 2
+    shift[centre], turns[centre] = 0, 0
+    return positions + options.position_error * shift, np.radians(options.rotation_error) * turns
+
+
+def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files: Sequence[Path]) -> Render:
+    """The render of all views, with their occlusion masks."""
+    positions, turns = _stand(rig, options)
+    views: dict[str, npt.NDArray[Any]] = {}
+    for number, file in enumerate(files):
+        with np.load(file) as values:
+            for part, kind in _TYPES.items():
+                if number == 0:
+                    views[part] = np.empty((len(files), *values[part].shape), kind)
+                views[part][number] = values[part]
+    upright, albedo, things, whole = (views.pop(part) for part in ("upright", "albedo", "things", "whole"))
+    stands, turned = positions.reshape(-1, 2), turns.reshape(-1, 3).any(axis=1)
+    if options.shares_light:
+        views["views"] = with_shared_light(views["views"], albedo, upright, things, whole, stands)
+    # the limit of half precision lies far beyond white
+    views["views"] = np.minimum(views["views"], 60000.0).astype(np.float16)
+    # unknown for turned views
+    views["masks"][~turned] |= seen_bits(upright, stands)[~turned]
+    return Render(
+        name=name,
+        **{part: values.reshape(*options.grid, *values.shape[1:]) for part, values in views.items()},
+        positions=positions,
+        turns=turns,
+        settings=rig.settings,
+        light=world.light,
+        made_by=made_by(name, options),
+    )
+
+
+def _digest(world: World) -> str:
+    """Digest of a world's contents, so that views of a changed world are not mixed with older ones."""
+    digest = hashlib.sha256()
+
+    def add(part: Any) -> None:
+        if is_dataclass(part):
+            for member in fields(part):
+                add(getattr(part, member.name))
+        elif isinstance(part, np.ndarray):
+            digest.update(np.ascontiguousarray(part).data)
+        elif isinstance(part, Sequence) and not isinstance(part, str):
+            for member in part:
+                add(member)
+        else:
+            digest.update(repr(part).encode())
+
+    add(world)
+    return digest.hexdigest()
+
+
+def _take_over(parts: Path, made_by: str) -> None:
+    """Make the folder of views; keep an existing one with the same scene and options."""
+    note = parts / "made_by.json"
+    if note.is_file() and note.read_text(encoding="utf-8") == made_by:
+        return
+    shutil.rmtree(parts, ignore_errors=True)
+    parts.mkdir(parents=True)
+    with atomic_path(note) as temporary:
+        temporary.write_text(made_by, encoding="utf-8")
+
+
+def _is_whole(file: Path) -> bool:
+    """Whether a view's file is complete."""
+    if not file.is_file():
+        return False
+    try:
+        with np.load(file) as values:
+            return set(_TYPES) == set(values.files)
+    except (OSError, ValueError, BadZipFile):
+        return False

@@ -1,0 +1,133 @@
+"""The command ``sepi scenes`` with ``--rendered``."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from contextlib import closing
+from inspect import cleandoc
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from click.core import ParameterSource
+
+from sepi.camera import camera_from
+from sepi.cli.scenes import list_scenes, require_new
+from sepi.command import SepiCommand
+from sepi.errors import SepiError
+from sepi.extensions.rendered.catalogue import RENDERED
+from sepi.extensions.rendered.exposure import exposed
+from sepi.extensions.rendered.options import Exposure, RenderOptions
+from sepi.extensions.rendered.render_file import Render, read_render
+from sepi.extensions.rendered.rendering import made_by
+from sepi.extensions.rendered.side_by_side import render_scenes
+from sepi.extensions.rendered.tracing import require_mitsuba
+from sepi.models import validated
+from sepi.scenes.folder import write_hci
+from sepi.validation import require_known, settings_of
+from sepi.workflow.rendered_scenes import NOISE_LEVELS, WITHOUT_NOISE, exposed_name
+
+_TEXT = """
+Scenes of --rendered are path-traced, with plain walls, gloss, mirrors and glass; a file NAME.h5 beside the folder has
+their light, and disparity, normals and masks of every view.
+
+\b
+Example:
+  sepi scenes --rendered sticks --size 256 --samples 16 --noise off --noise low
+"""
+_FLAGS = (
+    click.Option(["--rendered"], is_flag=True, help="Path-traced scenes (Mitsuba 3, extra [render]); minutes each."),
+    click.Option(["--samples"], type=click.IntRange(min=1), help="With --rendered: paths for each pixel; default: 64."),
+    click.Option(
+        ["--noise", "levels"],
+        type=click.Choice(NOISE_LEVELS),
+        multiple=True,
+        help="With --rendered: noise of the sensor; repeatable, a folder for each; default: off.",
+    ),
+    click.Option(
+        ["--set", "settings"],
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="With --rendered: lens=0.5, vignetting=0.4, ...; repeatable. docs/reproduce/rendered.md lists them.",
+    ),
+    click.Option(["--all-views"], is_flag=True, help="With --rendered: also write a disparity map for each view."),
+)
+
+
+def extended(command: SepiCommand) -> SepiCommand:
+    """The command with flags for path-traced scenes."""
+    built_in = command.callback
+    assert built_in is not None
+
+    @click.pass_context
+    def scenes(context: click.Context, /, rendered: bool, **given: Any) -> None:
+        own = {flag.name: given.pop(flag.name) for flag in _FLAGS if flag.name in given}
+        if not rendered:
+            for flag in (flag for flag in _FLAGS if own.get(flag.name)):
+                raise click.UsageError(f"{flag.opts[0]} needs --rendered")
+            built_in(**given)
+        elif given["only_list"]:
+            list_scenes({name: f"{entry.description}: {entry.tests}" for name, entry in RENDERED.items()})
+        else:
+            usual = context.get_parameter_source("size") is ParameterSource.DEFAULT
+            size = 512 if usual else given["size"]
+            values = {"grid": [given["views"]] * 2, "size": size, **settings_of(own["settings"], "lens=0.5")}
+            if own["samples"] is not None:
+                values.setdefault("samples", own["samples"])
+            levels = dict.fromkeys(own["levels"] or (WITHOUT_NOISE,))
+            _write_rendered(given["names"], given["output"], values, list(levels), own["all_views"])
+
+    help_text = f"{cleandoc(command.help or '')}\n{_TEXT}"
+    return SepiCommand(command.name, params=[*command.params, *_FLAGS], callback=scenes, help=help_text)
+
+
+def _write_rendered(
+    names: Sequence[str],
+    output: Path,
+    settings: dict[str, Any],
+    levels: Sequence[str],
+    all_views: bool,
+) -> None:
+    require_known("path-traced scenes", names, RENDERED)
+    chosen = list(dict.fromkeys(names or RENDERED))
+    require_known("--set", settings, (*RenderOptions.model_fields, *Exposure.model_fields))
+    of_render, of_sensor = (
+        {key: value for key, value in settings.items() if key in model.model_fields}
+        for model in (RenderOptions, Exposure)
+    )
+    options = validated(RenderOptions, of_render, "--set")
+    exposures = [validated(Exposure, {"noise": level, **of_sensor}, "--set") for level in levels]
+    folders = [exposed_name(name, one.noise, one.noise_seed) for name in chosen for one in exposures]
+    require_new(output, folders)
+    require_mitsuba()
+    with closing(_renders(chosen, options, output)) as renders:
+        for render in renders:
+            for exposure in exposures:
+                folder = output / exposed_name(render.name, exposure.noise, exposure.noise_seed)
+                _write_folder(render, exposure, folder, all_views)
+                click.echo(f"written: {folder}/")
+
+
+def _renders(names: Sequence[str], options: RenderOptions, output: Path) -> Generator[Render]:
+    """Renders from existing files if made with the same options; others are computed."""
+    files = {name: output / f"{name}.h5" for name in names}
+    missing = [name for name, path in files.items() if not path.is_file()]
+    for name, path in files.items():
+        if name not in missing:
+            known = read_render(path)
+            if known.made_by != made_by(name, options):
+                raise SepiError(f"{path}: was rendered with other options; remove it, or choose another folder with -o")
+            yield known
+    with closing(render_scenes(missing, options, output)) as rendered:
+        yield from (read_render(files[name]) for name in rendered)
+
+
+def _write_folder(render: Render, exposure: Exposure, folder: Path, all_views: bool) -> None:
+    light_field = exposed(render, exposure)
+    camera = camera_from(**render.settings, shape=light_field.shape, crop_of=None)
+    maps = {"gt_depth_lowres": camera.depth(render.disparity[render.centre])}
+    if all_views:
+        views = render.disparity.reshape(-1, *light_field.shape)
+        maps |= {f"gt_disp_lowres_Cam{number:03d}": np.ascontiguousarray(view) for number, view in enumerate(views)}
+    write_hci(light_field, folder, render.settings, maps)

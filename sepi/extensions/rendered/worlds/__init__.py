@@ -1,0 +1,1 @@
+"""A module for each path-traced scene, whose function ``world`` makes it; the catalogue lists them."""

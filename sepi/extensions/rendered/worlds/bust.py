@@ -1,0 +1,132 @@
+"""A marble head in a painted niche, between vases: surfaces that curve strongly and outlines that turn away.
+
+The table runs into the niche; :mod:`~sepi.extensions.rendered.worlds.sculpture` makes the bust.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.extensions.rendered import patterns, shapes
+from sepi.extensions.rendered.world import Lamp, Material, Mesh, Pattern, Thing, Vector, World
+from sepi.extensions.rendered.worlds import sculpture, ware
+
+Array = npt.NDArray[np.float64]
+TABLE, WALL = 0.33, 2.35
+
+
+def world() -> World:
+    """By a large window at the upper left, and what a bright room sends back."""
+    marble = Material(patterns.stone(3, 0.5, (0.86, 0.84, 0.8), (0.75, 0.73, 0.71)))
+    limestone = Material(patterns.noise(11, (0.66, 0.62, 0.55), 0.07, 0.5, finest=3))
+    plaster = Material(patterns.noise(21, (0.78, 0.72, 0.6), 0.022, 1.6, finest=4, coarsest=300))
+    paint = Material(patterns.noise(31, (0.36, 0.46, 0.45), 0.03, 1.2, finest=4, coarsest=300))
+    glaze = Material(patterns.noise(41, (0.2, 0.42, 0.4), 0.05, 0.4, coarsest=500), "glossy", 0.08)
+    clay = Material(_amphora_paint())
+    fruit = Material(patterns.noise(51, (0.72, 0.26, 0.14), 0.05, 0.12, finest=3))
+    return World(
+        things=[
+            Thing(shapes.moved(sculpture.bust(), (0, 0.5, 0), (0.03, TABLE - 0.59, 1.62)), marble),
+            Thing(shapes.turned_body(ware.profile(_FOOT), (0.03, TABLE - 0.06, 1.62)), marble),
+            Thing(shapes.box((0.03, TABLE - 0.03, 1.62), (0.26, 0.06, 0.26), (0, 0.12, 0)), limestone),
+            Thing(shapes.box((0, TABLE + 0.06, 2.05), (3.6, 0.12, 1.8)), limestone),
+            Thing(_wall(0.48, -0.12), plaster),
+            Thing(_niche(0.48, -0.12), paint),
+            Thing(_amphora((-0.4, TABLE, 1.85)), clay),
+            Thing(_urn((0.37, TABLE, 1.78)), Material(patterns.noise(61, (0.7, 0.68, 0.62), 0.05, 0.3))),
+            Thing(ware.vessel(_BOWL, 0.005, (-0.26, TABLE, 1.41)), glaze),
+            *(Thing(ware.fruit((x, TABLE - y, z), 0.038, n), fruit) for n, (x, y, z) in enumerate(_FRUIT)),
+        ],
+        near=1.15,
+        far=2.83,
+        at_near=2.1,
+        at_far=-1.9,
+        sky=(0.22, 0.23, 0.26),
+        lamps=[Lamp((-2.5, -1.0, 0.3), (0, 0, 1.3), (0.6, -1.2, 0), (15.0, 14.2, 13.0))],
+        exposure=1.35,
+        field_of_view=31,
+        depth=4,
+    )
+
+
+_FOOT = [(0.001, 0.125), (0.05, 0.125), (0.052, 0.112), (0.036, 0.09), (0.034, 0.07), (0.05, 0.05), (0.075, 0.035),
+         (0.08, 0.025), (0.074, 0.014), (0.088, 0.012), (0.09, 0.0)]  # fmt: skip
+_BOWL = [(0.11, 0.075), (0.108, 0.07), (0.09, 0.04), (0.055, 0.018), (0.04, 0.012), (0.042, 0.0)]
+_FRUIT = [(-0.3, 0.06, 1.42), (-0.225, 0.058, 1.45), (-0.26, 0.06, 1.37), (0.2, 0.036, 1.33), (0.285, 0.034, 1.4)]
+
+
+def _arch(radius: float, spring: float, rows: int = 40) -> Array:
+    """Outline of the niche from the table up and over and down, ``(N, 2)``."""
+    angle = np.linspace(np.pi, 0, 2 * rows)
+    left = np.stack([np.full(rows, -radius), np.linspace(TABLE, spring, rows, endpoint=False)], -1)
+    top = np.stack([radius * np.cos(angle), spring - radius * np.sin(angle)], -1)
+    return np.concatenate([left, top, (left * [-1, 1])[::-1]])
+
+
+def _wall(radius: float, spring: float) -> Mesh:
+    inner = _arch(radius, spring)
+    out = inner - [0, TABLE]
+    flat = np.stack([inner, [0, TABLE] + 2.5 * out / np.abs(out).max(1, keepdims=True)])
+    mesh = shapes.sheet(np.concatenate([flat, np.full((*flat.shape[:2], 1), WALL)], -1), smooth=False)
+    return replace(mesh, uv=mesh.vertices[:, :2])
+
+
+def _niche(radius: float, spring: float) -> Mesh:
+    """Half a cylinder below a quarter of a ball."""
+    turn = np.linspace(0, np.pi, 80)[:, None]
+    # a little wider than the hole, so that no ray slips through between
+    radius += 0.004
+    x = radius * np.cos(turn)
+    low = np.linspace(TABLE, spring, 30)[None, :]
+    wall = np.stack(np.broadcast_arrays(x, low, WALL + radius * np.sin(turn)), -1)
+    rise = np.linspace(0, np.pi / 2, 40)[None, :]
+    dome = [x * np.cos(rise), spring - radius * np.sin(rise) + 0 * x, WALL + radius * np.sin(turn) * np.cos(rise)]
+    return shapes.joined([shapes.sheet(wall), shapes.sheet(np.stack(np.broadcast_arrays(*dome), -1))])
+
+
+def _amphora(foot: Vector) -> Mesh:
+    outline = [(0.062, 0.5), (0.066, 0.49), (0.045, 0.475), (0.04, 0.4), (0.075, 0.365), (0.125, 0.29), (0.122, 0.2),
+               (0.075, 0.08), (0.046, 0.03), (0.062, 0.02), (0.064, 0.0)]  # fmt: skip
+    handles, turn = [], np.linspace(0, np.pi, 30)
+    for side in (-1, 1):
+        out = 0.042 + 0.035 * turn / np.pi + 0.065 * np.sin(turn)
+        path = np.stack([side * out, -0.455 + 0.115 * turn / np.pi, 0 * turn], 1)
+        handles.append(shapes.tube(path @ _about_y(0.5) + np.array(foot), 0.011))
+    return shapes.joined([ware.vessel(outline, 0.006, foot), *handles])
+
+
+def _about_y(angle: float) -> Array:
+    return np.array([[np.cos(angle), 0, -np.sin(angle)], [0, 1, 0], [np.sin(angle), 0, np.cos(angle)]])
+
+
+def _urn(foot: Vector) -> Mesh:
+    """Its belly is fluted."""
+    outline = [(0.085, 0.27), (0.09, 0.262), (0.072, 0.25), (0.07, 0.235), (0.12, 0.19), (0.125, 0.15), (0.09, 0.08),
+               (0.045, 0.045), (0.045, 0.03), (0.07, 0.02), (0.072, 0.0)]  # fmt: skip
+    mesh = ware.vessel(outline, 0.008, foot)
+    points = mesh.vertices - np.array(foot, np.float32)
+    belly = np.clip(np.minimum(-points[:, 1] - 0.055, 0.215 + points[:, 1]) / 0.03, 0, 1)
+    flute = 1 - 0.05 * belly * np.abs(np.cos(11 * np.arctan2(points[:, 2], points[:, 0])))
+    points[:, [0, 2]] *= flute[:, None]
+    return replace(mesh, vertices=(points + np.array(foot)).astype(np.float32))
+
+
+def _amphora_paint() -> Pattern:
+    """Bands of black gloss, keys and tongues on orange clay; ``v`` begins inside, at the foot."""
+    y, x = np.mgrid[:1024, :1024] / 1024
+    rows = ("111111", "100000", "101110", "101010", "100010", "111110")
+    key = np.array([[int(cell) for cell in row] for row in rows])
+    key = key[(6 * 24 * y).astype(int) % 6, (6 * 24 * x).astype(int) % 6]
+    tongue = np.cos(2 * np.pi * 48 * x) > 0.2
+    band = (y * 24).astype(int)
+    black = np.select(
+        [np.isin(band, (5, 14)), np.isin(band, (4, 6, 13, 15)), np.isin(band, (9, 18, 19)), band % 4 == 0],
+        [key, 0 * y, tongue, 1 + 0 * y],
+        0,
+    )
+    worn = 1 + 0.06 * patterns.field(71, 3, 120)
+    colour = np.where(black[..., None] > 0, [0.17, 0.13, 0.12], [0.74, 0.42, 0.24]) * worn[..., None]
+    return patterns.painted(colour, 0.6)

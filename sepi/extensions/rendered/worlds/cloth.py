@@ -1,0 +1,149 @@
+"""Curtains, a table cloth, a blanket on a rack and folded linen: folds, faint texture, soft shading.
+
+All cloth is a sheet bent by formula: a hanging one has folds that are gathered where it is held and open towards its
+hem, the table's falls from the rim in flutes that deepen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.extensions.rendered import patterns, shapes
+from sepi.extensions.rendered.world import Lamp, Material, Mesh, Thing, Vector, World
+
+Array = npt.NDArray[np.float64]
+FLOOR, TABLE = 1.0, 0.26
+
+
+def world() -> World:
+    """By daylight from a wide window on the left."""
+    blue = Material(patterns.linen(1, 1.0, (0.56, 0.63, 0.68), 0.05))
+    cream = Material(patterns.plaid(11, 0.9, (0.84, 0.8, 0.7), (0.72, 0.6, 0.5), 5, 0.35))
+    wool = Material(patterns.plaid(21, 0.8, (0.55, 0.5, 0.34), (0.3, 0.36, 0.3), 4, 0.8))
+    velvet = Material(patterns.noise(31, (0.55, 0.2, 0.17), 0.022, 0.7, finest=4, coarsest=80))
+    sheets = [(0.86, 0.84, 0.8), (0.62, 0.68, 0.6), (0.78, 0.66, 0.56), (0.86, 0.85, 0.83)]
+    planks = Material(patterns.wood(41, 1.1, (0.56, 0.42, 0.29), (0.38, 0.26, 0.17)))
+    beech = Material(patterns.wood(51, 0.4))
+    rug = Material(patterns.weave(61, 0.9, (0.5, 0.42, 0.4), 0.14))
+    return World(
+        things=[
+            Thing(_curtain(), blue),
+            Thing(shapes.rectangle((-3, -2.5, 3.55), (6, 0, 0), (0, 4, 0)), Material((0.8, 0.78, 0.72))),
+            Thing(shapes.rectangle((-3, FLOOR, 0.5), (6, 0, 0), (0, 0, 3.2)), planks),
+            Thing(shapes.rectangle((-0.95, FLOOR - 0.012, 1.6), (2.0, 0, 0.1), (-0.07, 0, 1.35)), rug),
+            Thing(_table_cloth((0.16, TABLE, 2.6), 0.46), cream),
+            Thing(_tied((0.83, 0.4, 1.98)), velvet),
+            Thing(_blanket((-0.72, -0.1, 2.45)), wool),
+            Thing(_rack((-0.72, -0.1, 2.45)), beech),
+            *(
+                Thing(
+                    _folded((0.32 + 0.008 * (n % 2), TABLE - 0.032 - 0.06 * n, 2.58), n),
+                    Material(patterns.linen(70 + 3 * n, 0.6, c)),
+                )
+                for n, c in enumerate(sheets)
+            ),
+            Thing(_crumpled((-0.07, TABLE - 0.003, 2.42)), Material(patterns.linen(91, 0.6, (0.8, 0.74, 0.72), 0.05))),
+        ],
+        near=1.85,
+        far=3.5,
+        at_near=1.9,
+        at_far=-1.7,
+        sky=(0.26, 0.27, 0.29),
+        lamps=[Lamp((-3.0, -1.2, 0.4), (0, 0, 1.6), (0.9, -1.3, 0), (13.0, 12.5, 11.8))],
+        exposure=2.0,
+        field_of_view=46,
+        depth=4,
+    )
+
+
+def _waves(along: Array, seed: int, period: float) -> Array:
+    """Phase of folds that are not all as wide."""
+    rng = np.random.default_rng(seed)
+    found: Array = 2 * np.pi * along / period
+    for factor in (3.1, 5.3, 9.7):
+        found = found + 0.22 * factor * np.sin(along * 2 * np.pi / (period * factor) + rng.uniform(0, 6))
+    return found
+
+
+def _curtain() -> Mesh:
+    """From beyond one border to beyond the other, as deep in its folds as it is gathered."""
+    along, down = np.linspace(-2.3, 2.3, 1100)[None, :], np.linspace(0, 1, 60)[:, None]
+    phase = _waves(along + 0.05 * np.sin(3 * down + along), 3, 0.19)
+    depth = 0.035 + 0.03 * down + 0.012 * np.sin(1.7 * along + 4 * down)
+    x = along - 0.02 * np.sin(2 * phase)
+    z = 3.3 + depth * (np.cos(phase) + 0.18 * np.cos(2 * phase + 1.5 * down)) + 0.01 * np.sin(5 * along + 6 * down)
+    return shapes.sheet(np.stack(np.broadcast_arrays(x, -1.9 + 2.88 * down, z), -1))
+
+
+def _tied(tie: Vector) -> Mesh:
+    """A curtain held at a point on the right: it swings across above and falls straight below."""
+    along, y = np.linspace(0, 1, 300)[None, :], np.linspace(-1.7, 0.99, 110)[:, None]
+    above = np.clip((tie[1] - y) / 1.6, 0, 1)
+    half = 0.075 + np.where(y < tie[1], 0.42 * above**1.3, 0.09 * (1 - np.exp(-((y - tie[1]) / 0.25))))
+    centre = tie[0] - 0.3 * above**1.3 + 0.06 * np.exp(-(((y - tie[1]) / 0.1) ** 2))
+    phase = _waves(1.5 * along, 8, 0.21)
+    x = centre + half * (2 * along - 1) - 0.12 * half * np.sin(2 * phase)
+    z = tie[2] + (0.03 + 0.035 * np.minimum(half / 0.2, 1)) * np.cos(phase + 0.5 * above)
+    return shapes.sheet(np.stack(np.broadcast_arrays(x, y, z), -1))
+
+
+def _table_cloth(centre: Vector, radius: float) -> Mesh:
+    angle, length = np.linspace(0, 2 * np.pi, 481)[None, :], np.linspace(1e-4, radius + 0.62, 130)[:, None]
+    fall = np.maximum(length - radius, 0)
+    bend = 0.02 * (1 - np.exp(-fall / 0.02))
+    flute = _waves(radius * angle, 5, 2 * np.pi * radius / 13)
+    flute = flute - angle / (2 * np.pi) * (flute[:, -1:] - flute[:, :1] - 26 * np.pi)
+    depth = 0.075 * (1 - np.exp(-((fall / 0.35) ** 2))) * (0.75 + 0.25 * np.sin(3 * angle + 1))
+    out = np.minimum(length, radius) + bend + depth * (0.5 + np.cos(flute)) + 0.01 * np.cos(2 * flute) * fall
+    turn = angle + 0.35 * depth / radius * np.sin(2 * flute)
+    drop = np.maximum(fall - 0.008, 0) * (0.97 - 0.03 * np.cos(flute))
+    points = np.stack(np.broadcast_arrays(out * np.cos(turn), drop, -out * np.sin(turn)), -1)
+    mesh = shapes.sheet(points + np.array(centre))
+    laid = np.stack(np.broadcast_arrays(length * np.cos(angle), length * np.sin(angle)), -1).reshape(-1, 2)
+    return replace(mesh, uv=laid.astype(np.float32))
+
+
+def _blanket(bar: Vector) -> Mesh:
+    """Over a bar, its hind part shorter."""
+    along, length = np.linspace(-0.3, 0.3, 110)[None, :], np.linspace(-0.5, 0.78, 140)[:, None]
+    curve = np.clip(length / 0.022, -np.pi / 2, np.pi / 2)
+    hang = np.maximum(np.abs(length) - 0.022 * np.pi / 2, 0)
+    phase = _waves(along + 0.1 * hang, 12, 0.2)
+    z = -0.022 * np.sin(curve) - np.sign(length) * hang * 0.06 + 0.05 * hang * np.cos(phase) / (0.3 + hang)
+    y = -0.022 * np.cos(curve) + hang * (1 + 0.015 * np.sin(5 * along))
+    x = along * (1 - 0.07 * hang) - 0.012 * np.sin(2 * phase) * np.minimum(hang / 0.3, 1)
+    mesh = shapes.sheet(np.stack(np.broadcast_arrays(x, y, z), -1))
+    return shapes.moved(mesh, (0, 0.3, 0), bar)
+
+
+def _rack(bar: Vector) -> Mesh:
+    """Two frames of round wood with a bar between."""
+    bars = [shapes.tube(np.array([[-0.38, 0, 0], [0.38, 0, 0]]), 0.016)]
+    for side in (-0.36, 0.36):
+        for foot in (-0.2, 0.2):
+            bars.append(shapes.tube(np.array([[side, -0.03, -foot * 0.03], [side, FLOOR - bar[1], foot]]), 0.014))
+    return shapes.moved(shapes.joined(bars), (0, 0.3, 0), bar)
+
+
+def _folded(centre: Vector, number: int) -> Mesh:
+    """Linen in four layers, which its front shows."""
+    around, along = np.linspace(0, 2 * np.pi, 160)[None, :], np.linspace(-1, 1, 60)[:, None]
+    c, s = np.cos(around), np.sin(around)
+    end = (1 - np.abs(along) ** 14) ** 0.3
+    z = 0.13 * np.sign(c) * np.abs(c) ** 0.25 * (1 - 0.035 * np.abs(np.cos(2 * np.pi * (s + 1))) * np.abs(c))
+    y = 0.031 * np.sign(s) * np.abs(s) ** 0.45 * end + 0.003 * np.sin(6 * along + number) * s
+    points = np.stack(np.broadcast_arrays(0.17 * along, y, z * (0.97 + 0.03 * end)), -1)
+    return shapes.moved(shapes.sheet(points), (0, 0.25 - 0.09 * (number % 3), 0), centre)
+
+
+def _crumpled(centre: Vector) -> Mesh:
+    """A napkin that was let fall: ridges between hollows."""
+    relief = np.abs(patterns.field(101, 20, 90, 128)) + 0.35 * np.abs(patterns.field(102, 9, 40, 128))
+    v, u = np.mgrid[-1:1:128j, -1:1:128j]
+    round_ = np.hypot(u + 0.12 * patterns.field(103, 40, 120, 128), v + 0.12 * patterns.field(104, 40, 120, 128))
+    height = 0.075 * np.clip(1.15 - round_, 0, 1) * (0.6 + 0.5 * (1.3 - relief))
+    points = np.stack([0.17 * u + 0.01 * relief, -np.maximum(height, 0), 0.13 * v], -1)
+    return shapes.moved(shapes.sheet(points), (0, 0.4, 0), centre)

@@ -1,0 +1,160 @@
+"""A workbench with tools before a boarded wall, by one lamp: a tenth of the light, so noise is in the shadows.
+
+The lamp hangs above the picture on the left; what the room sends back is little beside it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sepi.extensions.rendered import patterns, shapes
+from sepi.extensions.rendered.world import Lamp, Material, Mesh, Thing, Vector, World
+from sepi.extensions.rendered.worlds import tools, ware
+
+BENCH, WALL = 0.33, 1.95
+HUNG = WALL - 0.035
+_TIN = [(0.045, 0.12), (0.047, 0.118), (0.045, 0.112), (0.045, 0.006), (0.046, 0.0)]
+_JAR = [(0.034, 0.115), (0.034, 0.1), (0.04, 0.09), (0.041, 0.01), (0.038, 0.0)]
+_CAN = [
+    (0.003, 0.2),
+    (0.004, 0.17),
+    (0.011, 0.11),
+    (0.014, 0.1),
+    (0.045, 0.075),
+    (0.05, 0.06),
+    (0.05, 0.004),
+    (0.049, 0.0),
+]
+
+
+def world() -> World:
+    """At night; the door behind stands ajar."""
+    boards = Material(patterns.wood(1, 0.7, (0.58, 0.44, 0.31), (0.36, 0.25, 0.17)))
+    beech = Material(patterns.wood(11, 0.3, (0.74, 0.56, 0.37), (0.52, 0.36, 0.22)))
+    top = Material(patterns.wood(21, 0.9, (0.62, 0.47, 0.32), (0.36, 0.24, 0.15)))
+    red = Material(patterns.noise(31, (0.55, 0.13, 0.1), 0.05, 0.3, finest=3), "glossy", 0.15)
+    things = [
+        Thing(_boards(), boards),
+        Thing(shapes.box((0, BENCH + 0.03, 1.52), (2.6, 0.06, 0.9)), top),
+        Thing(shapes.box((0, BENCH + 0.35, 1.5), (2.6, 0.6, 0.8)), boards),
+        Thing(shapes.box((0.46, -0.28, WALL - 0.09), (0.66, 0.022, 0.17)), beech),
+        Thing(shapes.box((-0.3, -0.05, HUNG), (0.62, 0.05, 0.03)), beech),
+        *_shelf_ware(),
+        *tools.chisels((-0.3, -0.05, HUNG - 0.02), beech),
+        *tools.saw((0.43, -0.02, HUNG), beech),
+        *tools.hammer((-0.14, BENCH - 0.014, 1.25), (np.pi / 2, 0.5, 0), beech),
+        *tools.hammer((0.09, -0.12, HUNG), (0, 0, 0), beech),
+        *tools.vice((-0.42, BENCH, 1.36), red),
+        *tools.plane((0.3, BENCH, 1.36), beech),
+        *(
+            Thing(tools.spanner(length, (x, 0.05, HUNG), 0.08), tools.STEEL)
+            for x, length in ((0.19, 0.2), (0.235, 0.165), (0.275, 0.13))
+        ),
+        Thing(ware.vessel(_CAN, 0.001, (0.03, BENCH, 1.6)), Material(kind="mirror", metal="Cu", roughness=0.2)),
+        Thing(_cable((-0.68, -0.2, HUNG - 0.02)), tools.IRON, thin=True),
+        Thing(_plan(), Material(patterns.printed(51, 0.36, 18, (0.86, 0.82, 0.7), 0.25))),
+        *_shavings(),
+        *_blocks(beech),
+        *_brushes((-0.16, BENCH, 1.66), beech),
+    ]
+    return World(
+        things=things,
+        near=1.1,
+        far=WALL,
+        at_near=1.8,
+        at_far=-1.8,
+        sky=(0.022, 0.025, 0.034),
+        lamps=[Lamp((-0.65, -0.88, 1.12), (0, 0, 0.42), (0.7, 0, 0), (4.6, 3.8, 2.7))],
+        exposure=4.5,
+        field_of_view=44,
+        light=0.1,
+        depth=5,
+    )
+
+
+def _boards() -> Mesh:
+    """Upright boards, each a little before or behind the next, grain along them."""
+    rng = np.random.default_rng(3)
+    found = []
+    for x in np.arange(-1.5, 1.5, 0.135):
+        board = shapes.box((0, 0, 0), (3.0, 0.131, 0.03), (rng.normal(0, 0.01), 0, 0))
+        shifted = type(board)(board.vertices, board.faces, board.uv + rng.random(2).astype(np.float32), False)
+        found.append(
+            shapes.moved(shifted, (0, 0, np.pi / 2), (float(x), -0.3, WALL + 0.015 + rng.uniform(-0.004, 0.004)))
+        )
+    back = shapes.rectangle((-2, -2, WALL + 0.035), (4, 0, 0), (0, 4, 0))
+    return shapes.joined([*found, back])
+
+
+def _shelf_ware() -> list[Thing]:
+    """Tins with stripes, and jars, on the shelf."""
+    found, shelf, z = [], -0.291, WALL - 0.09
+    colours = [
+        ((0.7, 0.3, 0.16), (0.85, 0.8, 0.66)),
+        ((0.2, 0.36, 0.5), (0.8, 0.8, 0.76)),
+        ((0.36, 0.44, 0.22), (0.86, 0.74, 0.4)),
+    ]
+    for number, x in enumerate((0.2, 0.31, 0.53)):
+        label = patterns.stripes(0.08, [*colours[number], colours[number][1]], across=False)
+        found.append(Thing(ware.vessel(_TIN, 0.001, (x, shelf, z)), Material(label)))
+    for number, x in enumerate((0.42, 0.64, 0.735)):
+        content = patterns.noise(
+            41 + 5 * number, (0.5 - 0.1 * number, 0.4, 0.3 + 0.06 * number), 0.12, 0.12, finest=3, coarsest=40
+        )
+        found.append(Thing(ware.vessel(_JAR, 0.002, (x, shelf, z)), Material(content, "glossy")))
+    return found
+
+
+def _plan() -> Mesh:
+    """A sheet of paper, pinned above, that curls below."""
+    x, y = np.meshgrid(np.linspace(0, 0.34, 30), np.linspace(0, 0.26, 30))
+    lift = 0.004 + 0.05 * (y / 0.26) ** 3 * (0.3 + (x / 0.34 - 0.5) ** 2)
+    return shapes.sheet(np.stack([-0.4 + x, -0.47 + 0.02 * x + y, HUNG + 0.028 - lift], -1))
+
+
+def _cable(at: Vector) -> Mesh:
+    """A coil on a nail."""
+    turn = np.linspace(0, 14 * np.pi, 500)
+    radius = 0.1 + 0.007 * np.sin(2.3 * turn) + 0.004 * np.cos(0.71 * turn)
+    path = np.stack([radius * np.sin(turn), 1.2 * radius * np.cos(turn), 0.012 * np.sin(1.37 * turn)], 1)
+    return shapes.moved(shapes.tube(path, 0.0035, 8), (0, 0, 0), at)
+
+
+def _shavings() -> list[Thing]:
+    """Curls that lie about before the plane."""
+    rng, curls = np.random.default_rng(7), []
+    for _ in range(16):
+        turn = np.linspace(0, rng.uniform(6, 14), 80)[:, None]
+        radius, across = (
+            rng.uniform(0.008, 0.016) * (1 - 0.02 * turn),
+            np.array([[-1.0, 1.0]]) * rng.uniform(0.006, 0.014),
+        )
+        points = [across + 0.003 * turn, radius * np.cos(turn) + 0 * across, radius * np.sin(turn) + 0 * across]
+        curl = shapes.sheet(np.stack(np.broadcast_arrays(*points), -1))
+        place = (rng.uniform(0.0, 0.4), BENCH - 0.016, rng.uniform(1.16, 1.3))
+        curls.append(shapes.moved(curl, (0, rng.uniform(0, 6), 0), place))
+    return [Thing(shapes.joined(curls), Material(patterns.wood(61, 0.08, (0.86, 0.7, 0.48), (0.72, 0.54, 0.34))))]
+
+
+def _blocks(wood: Material) -> list[Thing]:
+    """Offcuts in a pile on the right."""
+    laid = [((0.62, -0.02, 1.62), (0.34, 0.04, 0.09), 0.15), ((0.63, -0.02, 1.74), (0.4, 0.04, 0.08), 0.05)]
+    laid += [((0.6, -0.065, 1.66), (0.28, 0.05, 0.1), -0.2), ((0.56, -0.105, 1.67), (0.2, 0.03, 0.07), 0.5)]
+    boxes = [shapes.box((x, BENCH + y, z), size, (0, turn, 0)) for (x, y, z), size, turn in laid]
+    return [Thing(shapes.joined(boxes), wood)]
+
+
+def _brushes(foot: Vector, wood: Material) -> list[Thing]:
+    """In a tin."""
+    found = [Thing(ware.vessel(_TIN, 0.001, foot), tools.STEEL)]
+    sticks, hairs = [], []
+    for angle, rise in ((0.3, 0.2), (2.2, 0.23), (4.0, 0.18), (5.2, 0.25)):
+        out = np.array([np.cos(angle), 0, np.sin(angle)])
+        path = np.array(foot) + np.array(
+            [0.01 * out, 0.03 * out + [0, -0.11, 0], 0.03 * out * rise / 0.1 + [0, -rise, 0]]
+        )
+        sticks.append(shapes.tube(path, 0.004, 8))
+        tip = path[-1] + (path[-1] - path[-2]) / np.linalg.norm(path[-1] - path[-2]) * np.linspace(0, 0.04, 6)[:, None]
+        hairs.append(shapes.tube(tip, np.array([0.006, 0.008, 0.009, 0.009, 0.006, 0.001])))
+    found.append(Thing(shapes.joined(sticks), wood, thin=True))
+    return [*found, Thing(shapes.joined(hairs), Material((0.3, 0.22, 0.16)))]

@@ -1,1 +1,0 @@
-"""A module for each path-traced scene, whose function ``world`` makes it; :mod:`sepi.rendered.catalogue` lists them."""

@@ -1,0 +1,490 @@
+"""Path-traced scenes: pictures, truth and masks must agree, or every score made from them is wrong."""
+
+import hashlib
+import importlib.util
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy import ndimage
+from small_worlds import ball, bar, depth_of_room, lamp_above, room, taking
+
+import sepi
+from sepi.cli.main import main
+from sepi.errors import SepiError
+from sepi.extensions.rendered import patterns, rendering, shapes, side_by_side, tracing
+from sepi.extensions.rendered.catalogue import RENDERED, world_of
+from sepi.extensions.rendered.exposure import exposed
+from sepi.extensions.rendered.masks import MASKS, mask, seen_bits
+from sepi.extensions.rendered.options import NOISE, Exposure
+from sepi.extensions.rendered.render_file import Render, read_render
+from sepi.extensions.rendered.rendering import made_by, render_world
+from sepi.extensions.rendered.rig import rig_of
+from sepi.extensions.rendered.sampling import gloss_samples, pictured, planned
+from sepi.extensions.rendered.side_by_side import _started, render_scenes
+from sepi.extensions.rendered.tracing import Tracer
+from sepi.extensions.rendered.world import Material, Sun, World
+from sepi.scenes.folder import write_hci
+from sepi.threads import available_cores, use_threads
+from sepi.workflow.rendered_scenes import NOISE_LEVELS
+
+
+def rendered(folder: Path, world: World, **values: object) -> Render:
+    path = folder / "room.h5"
+    path.unlink(missing_ok=True)
+    render_world("room", world, taking(**values), path)
+    return read_render(path)
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Render:
+    """A wall and a floor, evenly lit."""
+    return rendered(tmp_path_factory.mktemp("room"), room(), size=96, samples=9)
+
+
+def steps(render: Render) -> list[tuple[int, int]]:
+    rows, columns = render.views.shape[:2]
+    return [(t, s) for t in range(rows) for s in range(columns) if (t, s) != render.centre]
+
+
+def carried(values: np.ndarray, render: Render, view: tuple[int, int]) -> np.ndarray:
+    """What another view has at the points that the reference view sees; NaN outside."""
+    d = render.disparity[render.centre].astype(float)
+    y, x = np.mgrid[: d.shape[0], : d.shape[1]]
+    down, across = render.positions[view]
+    at = [y - d * down, x - d * across]
+    return ndimage.map_coordinates(values.astype(float), at, order=1, mode="constant", cval=np.nan)
+
+
+def test_planes_have_the_disparity_of_their_formula(plain: Render) -> None:
+    rig = rig_of(room(), 96, (3, 3))
+    expected = rig.disparity(depth_of_room(96, rig.focal_px))
+    # but for the row in which they meet
+    assert (
+        np.abs(plain.disparity[plain.centre] - expected)[np.abs(np.arange(96) - 48 - rig.focal_px / 5) > 1].max() < 1e-4
+    )
+    assert rig.disparity(np.array([1.2, 3.0])) == pytest.approx([2.0, -1.5])
+
+
+def test_truth_of_every_view_is_of_the_same_points(plain: Render) -> None:
+    """If this fails, the truth of some view is not where its picture is."""
+    for view in steps(plain):
+        apart = np.abs(carried(plain.disparity[view], plain, view) - plain.disparity[plain.centre])
+        # across the line where wall and floor meet there is nothing to interpolate
+        assert np.nanquantile(apart, 0.95) < 1e-3
+        turned = carried(plain.normal[view][..., 1], plain, view) - plain.normal[plain.centre][..., 1]
+        assert np.nanquantile(np.abs(turned), 0.95) < 1e-3
+    assert plain.normal[plain.centre][5, 5].tolist() == [0, 0, -1]
+    assert plain.normal[plain.centre][90, 5].tolist() == [0, -1, 0]
+
+
+def test_points_have_one_colour_in_all_views(tmp_path: Path) -> None:
+    """By the light of a sun alone, which leaves no noise of paths."""
+    sunny = room(sky=(0.0, 0.0, 0.0), suns=[Sun((0.3, 0.6, 1.0), (4.0, 4.0, 4.0))], depth=2)
+    render = rendered(tmp_path, sunny, size=96, samples=4)
+    light_field = exposed(render, Exposure())
+    centre = light_field.views[light_field.reference_position].astype(float)
+    assert 40 < np.median(centre) < 200
+    for view in steps(render):
+        seen = np.stack([carried(light_field.views[view][..., c], render, view) for c in range(3)], axis=-1)
+        assert np.nanmedian(np.abs(seen - centre)) <= 1
+
+
+def test_the_folder_is_as_the_benchmark_lays_it_out(plain: Render, tmp_path: Path) -> None:
+    write_hci(exposed(plain, Exposure()), tmp_path / "room", plain.settings)
+    light_field = sepi.read_light_field(tmp_path / "room")
+    assert light_field.camera is not None
+    rig = rig_of(room(), 96, (3, 3))
+    depth = light_field.camera.depth(light_field.ground_truth)
+    assert np.allclose(depth[:40], 3.0, rtol=1e-4)
+    assert np.allclose(depth[90:], depth_of_room(96, rig.focal_px)[90:], rtol=1e-4)
+    known = light_field.require_disparity_range()
+    assert known.source == "parameters"
+    assert known.minimum == -1.5
+    # signs, and the order of the grid
+    result = CliRunner().invoke(main, ["check", str(tmp_path / "room")])
+    assert (result.exit_code, "wrong" in result.output) == (0, False), result.output
+    estimate = sepi.estimate_depth(light_field, "fast").disparity
+    assert np.median(np.abs(estimate - light_field.ground_truth)) < 0.02
+
+
+def test_the_same_bytes_whatever_the_threads(tmp_path: Path) -> None:
+    found = set()
+    for threads in (1, 2):
+        use_threads(threads)
+        rendered(tmp_path, room(ball(0, Material(kind="mirror"))), size=48, views=2)
+        found.add(hashlib.sha256((tmp_path / "room.h5").read_bytes()).hexdigest())
+    assert len(found) == 1
+
+
+def test_no_number_of_threads_changes_a_picture() -> None:
+    """Mitsuba makes blocks smaller for many threads, and seeds each: machines with many cores had other bytes."""
+    import drjit
+
+    world = room()
+    tracer = Tracer(world, rig_of(world, 48, (1, 1)))
+    at = tracer.position(0, 0)
+    found = []
+    for threads in (1, 16):
+        drjit.set_thread_count(threads)
+        found.append(tracer.picture(at, 3, 2))
+    drjit.set_thread_count(1)
+    assert np.array_equal(*found)
+
+
+def test_few_paths_show_the_light_of_many() -> None:
+    """If this fails, pictures of few samples are too bright or too dark, not only noisy."""
+    world = room()
+    tracer = Tracer(world, rig_of(world, 64, (1, 1)))
+    at = tracer.position(0, 0)
+    many = tracer.picture(at, 1, 64).mean()
+    assert [tracer.picture(at, 2, few).mean() for few in (1, 2, 4)] == pytest.approx(3 * [many], rel=0.03)
+
+
+def test_paths_are_traced_where_views_differ() -> None:
+    """A matte room takes few, a mirror all; a bar too thin for the rays through middles is not painted over."""
+    world = room(ball(0.3, Material(kind="mirror")), bar(depth=1.5, width=0.01))
+    size, samples = 64, 64
+    rig = rig_of(world, size, (9, 9))
+    tracer = Tracer(world, rig)
+    at = tracer.position(0, 0)
+    seen = tracer.first_surface(at)
+    disparity = rig.disparity(seen.depth).astype(np.float32)
+    plan = planned(tracer, at, seen, disparity, samples, 81, 0)
+    taken = np.zeros((size, size), int)
+    for tiles, before in plan.tiles:
+        rows, columns = tiles.pixels[..., 0], tiles.pixels[..., 1]
+        assert (taken[rows, columns] <= samples + before).all()
+        taken[rows, columns] = before + tiles.paths
+    shown, mirror = pictured(tracer, plan), seen.thing == 2
+    # a tile of another kind may hold some of the mirror's border
+    inside = ndimage.minimum_filter(mirror, 3)
+    assert set(np.unique(taken[inside])) == {samples}
+    assert set(np.unique(taken[~plan.whole])) <= {12, samples}
+    assert (taken == 3).mean() > 0.5
+    assert taken.mean() < samples / 4
+    # tiles lie where they belong
+    many = tracer.picture(at, 9, 64)
+    assert np.corrcoef(shown[mirror].ravel(), many[mirror].ravel())[0, 1] > 0.9
+    assert abs(shown.mean() / many.mean() - 1) < 0.03
+    # the bar is a quarter of a pixel wide and stands between the middle columns
+    assert not plan.whole[:20, 31:33].any()
+    # the wall is whole up to what stands before it, but for the pixels that show both
+    beside = ndimage.maximum_filter(mirror, 3) & ~mirror
+    assert plan.whole[beside].any()
+
+
+def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each view is rendered once, and what comes out is what an undisturbed run gives."""
+    whole = rendered(tmp_path, room(), size=32)
+    (tmp_path / "room.h5").unlink()
+    made: list[int] = []
+    picture = rendering._picture
+
+    def interrupted(*arguments: object) -> object:
+        if len(made) == 4:
+            made.append(-1)
+            raise KeyboardInterrupt
+        made.append(1)
+        return picture(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(rendering, "_picture", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        render_world("room", room(), taking(size=32), tmp_path / "room.h5")
+    # a view that was cut short does not count
+    (tmp_path / "room.h5.parts" / "view_003.npz").write_bytes(b"PK")
+    render_world("room", room(), taking(size=32), tmp_path / "room.h5")
+    assert made.count(1) == 4 + 9 - 3
+    again = read_render(tmp_path / "room.h5")
+    assert all(np.array_equal(getattr(again, key), getattr(whole, key)) for key in ("views", "disparity", "masks"))
+    assert not (tmp_path / "room.h5.parts").exists()
+    # what other options left is not taken over
+    (tmp_path / "room.h5.parts").mkdir()
+    (tmp_path / "room.h5.parts" / "made_by.json").write_text("{}")
+    (tmp_path / "room.h5.parts" / "view_000.npz").write_bytes(b"")
+    render_world("room", room(), taking(size=32), tmp_path / "room.h5")
+
+
+def test_masks_say_what_a_pixel_shows(tmp_path: Path) -> None:
+    """A bar, and balls of mirror, glass and lacquer; the bar hides the wall behind it as geometry says."""
+    lacquer = ball(0.0, Material((0.7, 0.1, 0.1), "glossy", 0.1), y=0.55, radius=0.35)
+    balls = [ball(-0.45, Material(kind="mirror")), ball(0.45, Material(kind="glass")), lacquer]
+    world = room(bar(depth=1.5, width=0.06), *balls)
+    render = rendered(tmp_path, world, size=96, samples=1)
+    masks = render.masks_of(render.centre)
+    assert list(masks) == list(MASKS)
+    rig = rig_of(world, 96, (3, 3))
+    d_bar, d_wall = rig.disparity(np.array([1.5, 3.0]))
+    # the row lies above the balls: a bar of 0.06 m, and the wall
+    half = rig.focal_px * 0.03 / 1.5
+    columns = np.abs(np.arange(96) + 0.5 - 48) < half
+    assert (masks["thin"][10] == columns).all()
+    hidden = masks["occluded"][10]
+    reach = half + d_bar - d_wall
+    from_middle = np.abs(np.arange(96) + 0.5 - 48)
+    assert not hidden[from_middle > reach + 1].any()
+    assert hidden[(from_middle > half + 1) & (from_middle < reach - 1)].all()
+    assert not hidden[columns].any()
+    for name, x in (("mirror", -0.45), ("glass", 0.45)):
+        column = round(48 + rig.focal_px * x / 1.9)
+        assert masks[name][round(48 + rig.focal_px * 0.3 / 1.9), column]
+        assert not (masks[name] & (masks["textured"] | masks["textureless"])).any()
+    assert masks["glossy"].any()
+    # painted walls are textured, lacquer of one colour is not
+    assert masks["textured"][3, 3]
+    assert (masks["glossy"] & masks["textureless"]).sum() > 0.4 * masks["glossy"].sum()
+    assert not masks["alone"].any()
+
+
+def test_what_one_view_alone_sees_is_told() -> None:
+    """A wall seen through a slit: the columns beside it are hidden from the one view, those that leave it are not."""
+    disparities = np.zeros((2, 4, 12), np.float32)
+    # the other view stands two steps to the right, and a board of disparity 2 before it hides columns 4 to 7
+    disparities[1, :, 4:8] = 2
+    positions = np.array([(0, 0), (0, 2)], float)
+    bits = seen_bits(disparities, positions)[0]
+    for name in ("occluded", "alone"):
+        # all of them, whether a mirror would swap right and left or not
+        assert mask(bits, name)[1].nonzero()[0].tolist() == [4, 5, 6, 7]
+    # what lies outside the other picture is hidden by nothing, and seen by nobody else
+    shifted = seen_bits(np.ones((2, 4, 12), np.float32), positions)[0]
+    assert not mask(shifted, "occluded").any()
+    assert mask(shifted, "alone")[1].nonzero()[0].tolist() == [0, 1]
+
+
+def test_a_mirrored_scene_has_mirrored_masks() -> None:
+    """Points that land on whole pixels, in rows and columns of views as between them."""
+    disparities = np.random.default_rng(0).integers(0, 3, (9, 6, 7)).repeat(3, 1).repeat(3, 2).astype(np.float32) / 2
+    positions = np.array([(t, s) for t in (-1, 0, 1) for s in (-1, 0, 1)], float)
+    bits = seen_bits(disparities, positions)
+    assert {name for name in MASKS if mask(bits, name).any()} == {"occluded", "alone"}
+    for axis, turned in ((1, (-1, 1)), (2, (1, -1))):
+        mirrored = seen_bits(np.ascontiguousarray(np.flip(disparities, axis)), positions * turned)
+        np.testing.assert_array_equal(np.flip(mirrored, axis), bits)
+
+
+def test_noise_is_that_of_the_stated_sensor(plain: Render) -> None:
+    """Electrons' variance is their number and what reading adds; a scene with a tenth of the light has a tenth."""
+    linear = Exposure(gamma=1.0, bits=16)
+    clean = exposed(plain, linear).views / 65535
+    for level in NOISE_LEVELS[1:]:
+        sensor = NOISE[level]
+        assert sensor is not None
+        for light in (1.0, 0.1):
+            dim = Render(**{**vars(plain), "light": light})
+            noisy = exposed(dim, linear.model_copy(update={"noise": level})).views / 65535
+            inside = (clean > 0.1) & (clean < 0.15)
+            expected = np.sqrt(
+                clean[inside].mean() / (sensor.white * light) + (sensor.read / sensor.white / light) ** 2
+            )
+            # of what is not cut off at black and white
+            if light == 1.0:
+                assert (noisy - clean)[inside].std() == pytest.approx(expected, rel=0.03)
+                assert abs((noisy - clean)[inside].mean()) < expected / 50
+            else:
+                assert (noisy - clean)[inside].std() > 2.0 * expected / np.sqrt(10)
+    again, other = (exposed(plain, Exposure(noise="low", noise_seed=seed)) for seed in (1, 2))
+    assert np.array_equal(again.views, exposed(plain, Exposure(noise="low")).views)
+    assert not np.array_equal(again.views, other.views)
+    assert (again.name, other.name, exposed(plain, Exposure()).name) == ("room_low", "room_low_2", "room")
+
+
+def test_what_a_sensor_makes_of_the_light(plain: Render) -> None:
+    centre = plain.centre
+    base = exposed(plain, Exposure(gamma=1.0, bits=16)).views.astype(float)
+    shaded = exposed(plain, Exposure(gamma=1.0, bits=16, vignetting=0.5)).views / np.maximum(base, 1)
+    assert shaded[centre][0, 0].mean() == pytest.approx(0.5, abs=0.01)
+    assert shaded[centre][48, 48].mean() == pytest.approx(1.0, abs=0.01)
+    spread = exposed(plain, Exposure(gamma=1.0, bits=16, exposure_spread=0.2)).views
+    dark = (base > 0) & (base < 30000)
+    stops = [np.log2(np.median(spread[view][dark[view]] / base[view][dark[view]])) for view in steps(plain)]
+    assert 0.08 < np.std(stops) < 0.4
+    assert np.array_equal(spread[centre], base[centre])
+    coded = exposed(plain, Exposure()).views
+    assert (coded.dtype, spread.dtype) == (np.uint8, np.uint16)
+    # middle grey of the screen's curve
+    assert np.median(coded[np.abs(base / 65535 - 0.2140) < 0.002]) == pytest.approx(127.5, abs=1.5)
+
+
+def test_a_lens_blurs_what_is_out_of_focus(tmp_path: Path) -> None:
+    """Across the edge of a bar before the wall the blur is as wide as its disparity says, and none is in focus."""
+    widths = {}
+    for depth in (1.2, 1.92253):
+        world = room(bar(depth=depth, width=0.5, material=Material((0.9, 0.9, 0.9))))
+        render = rendered(tmp_path, world, size=128, views=1, samples=32, lens=2.0)
+        row = render.views[0, 0][30].astype(float).mean(axis=-1)
+        edge = (row[64:] - row[-10]) / (row[64] - row[-10])
+        widths[depth] = np.flatnonzero(edge < 0.25)[0] - np.flatnonzero(edge < 0.75)[0]
+    # a disc of 2 lens |d| = 8 pixels goes from a quarter to three of them in 0.4 of its width
+    assert 2 <= widths[1.2] <= 4
+    assert widths[1.92253] <= 1
+
+
+def test_errors_of_cameras_move_pictures_and_not_the_reference(tmp_path: Path) -> None:
+    straight = rendered(tmp_path, room(), size=32)
+    turned, off = (rendered(tmp_path, room(), size=32, position_error=0.3, rotation_error=r) for r in (0.1, 0.2))
+    assert np.array_equal(turned.views[1, 1], off.views[1, 1])
+    assert not np.array_equal(turned.views[0, 0], off.views[0, 0])
+    assert np.array_equal(straight.disparity[1, 1], off.disparity[1, 1])
+    assert np.array_equal(turned.masks[1, 1], off.masks[1, 1])
+    assert off.positions[1, 1].tolist() == [0, 0]
+    assert off.turns[1, 1].tolist() == [0, 0, 0]
+    assert 0.1 < np.std((off.positions - straight.positions)[:, :, 0]) < 0.6
+    assert not np.array_equal(straight.disparity[0, 0], off.disparity[0, 0])
+    wide = rendered(tmp_path, room(), size=32, baseline=2.0)
+    assert np.allclose(wide.disparity[1, 1], 2 * straight.disparity[1, 1], atol=1e-5)
+
+
+def test_lights_and_surfaces_do_what_they_say() -> None:
+    """A lamp shines to the stated side, a sun where it is not shaded, a mirror shows what is before it."""
+
+    def mean(world: World) -> np.ndarray:
+        tracer = Tracer(world, rig_of(world, 32, (1, 1)))
+        return tracer.picture(tracer.position(0, 0), 0, 16)
+
+    dark = room()
+    base = {"things": dark.things, "near": 1.2, "far": 3.0, "at_near": 2.0, "at_far": -1.5}
+    below = mean(World(**base, lamps=[lamp_above()]))[-4:].mean()
+    lamp = lamp_above()
+    turned = type(lamp)(lamp.corner, lamp.down, lamp.across, lamp.radiance)
+    assert below > 0.05
+    assert mean(World(**base, lamps=[turned]))[-4:].mean() < 0.2 * below
+    sunny = mean(World(**base, suns=[Sun((0.0, 1.0, 0.0), (3.0, 3.0, 3.0))]))
+    assert sunny[-4:].mean() > 5 * sunny[:8].mean()
+    panorama = np.zeros((64, 128, 3), np.float32)
+    # red above and behind the camera: a mirror that faces it shows red
+    panorama[:32, :32, 0] = panorama[:32, -32:, 0] = 1
+    mirror = shapes.rectangle((-4, -4, 3), (8, 0, 0), (0, 8, 0))
+    seen = mean(World([type(dark.things[0])(mirror, Material(kind="mirror"))], 1.2, 3.0, 2.0, -1.5, sky=panorama))
+    assert seen[:8, 8:24, 0].mean() > 0.5
+    assert seen[-8:].mean() < 0.05
+
+
+def test_a_missing_renderer_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "mitsuba" else find(name))
+    result = CliRunner().invoke(main, ["scenes", "--rendered", "sticks", "-o", str(tmp_path / "new")])
+    assert result.exit_code == 1
+    assert len(result.output.splitlines()) == 1
+    assert "need Mitsuba 3: python -m pip install 'sepi[render]'" in result.output
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["stick"], "did you mean 'sticks'"),
+        (["sticks", "--set", "lens=-1"], "--set.lens"),
+        (["sticks", "--set", "lenses=1"], "'lens'"),
+        (["sticks", "--set", "lens"], "expected KEY=VALUE"),
+        (["sticks", "--size", "8"], "--set.size"),
+    ],
+)
+def test_a_wrong_option_is_one_line(words: list[str], told: str, tmp_path: Path) -> None:
+    result = CliRunner().invoke(main, ["scenes", "--rendered", *words, "-o", str(tmp_path / "new")])
+    assert result.exit_code == 1
+    assert len(result.output.splitlines()) == 1
+    assert told in result.output
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.fixture
+def coarse_patterns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Random fields that repeat after an eighth of a pattern, and few texels: as bright, in a fraction of the time."""
+    field, decoded = patterns.field, tracing.srgb_decoded
+
+    def repeated(
+        seed: int, finest: float, coarsest: float, texels: int = patterns.TEXELS, stretch: float = 1.0
+    ) -> np.ndarray:
+        return np.tile(field(seed, finest, coarsest, texels // 8, stretch), (8, 8))
+
+    monkeypatch.setattr(patterns, "field", repeated)
+    monkeypatch.setattr(
+        tracing, "srgb_decoded", lambda colours: decoded(colours[::4, ::4] if colours.ndim == 3 else colours)
+    )
+
+
+@pytest.mark.usefixtures("coarse_patterns")
+@pytest.mark.parametrize("name", RENDERED)
+def test_every_ray_of_a_scene_meets_something(name: str) -> None:
+    """At the corners of a 9x9 grid, too; disparities stay in what the scene says, and few paths of gloss suffice."""
+    world = world_of(name)
+    rig = rig_of(world, 64, (9, 9))
+    tracer = Tracer(world, rig)
+    slack = 0.1 * (world.at_near - world.at_far)
+    for corner in ((0, 0), (-4, -4), (4, 4)):
+        seen = tracer.first_surface(tracer.position(*corner))
+        assert np.isfinite(seen.depth).all()
+        disparity = rig.disparity(seen.depth)
+        assert world.at_far - slack <= disparity.min()
+        # corners of so small pictures look far down
+        assert disparity.max() <= world.at_near + slack or corner != (0, 0)
+    light = tracer.picture(tracer.position(0, 0), 0, 16)
+    assert 0.02 < np.median(light) < 0.6
+    assert (light.max(axis=2) > 1).mean() < 0.08
+    # scenes that say they need fewer, since theirs end later: against all of those that end at the second surface
+    if world.paths < 1:
+        at_two, at_its_own = (Tracer(tried, rig_of(world, 40, (9, 9))) for tried in (replace(world, roulette=2), world))
+        at = at_two.position(0, 0)
+        gloss = ~at_two.surfaces.matte(at_two.first_surface(at).thing)
+        for samples, bound in ((16, 1.1), (64, 1.05)):
+            # how far two renderings are apart on average: the mean square tells of a few bright pixels, and little else
+            apart = []
+            for tracer, paths in ((at_two, samples), (at_its_own, gloss_samples(samples, world.paths))):
+                pictures = [np.clip(tracer.picture(at, seed, paths), 0, 1) for seed in range(0, 40, 10)]
+                apart.append(np.abs(np.diff(np.power(pictures, 1 / 2.2), axis=0))[:, gloss].mean())
+            assert apart[1] < bound * apart[0], samples
+
+
+@pytest.mark.system
+def test_a_scene_as_a_user_renders_it(tmp_path: Path) -> None:
+    """One command writes folders at two noise levels from one render; the most accurate variant reads the clean one."""
+    words = ["scenes", "--rendered", "wires", "-o", str(tmp_path), "--size", "256", "--views", "5", "--samples", "16"]
+    result = CliRunner().invoke(main, [*words, "--noise", "off", "--noise", "low"], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    light_field = sepi.read_light_field(tmp_path / "wires")
+    noisy = sepi.read_light_field(tmp_path / "wires_low")
+    with pytest.raises(SepiError, match=r"wires\.h5: .* the scene's folder"):
+        sepi.read_light_field(tmp_path / "wires.h5")
+    assert set(light_field.masks) == set(MASKS)
+    assert np.array_equal(light_field.ground_truth, noisy.ground_truth)
+    errors = [np.median(np.abs(sepi.estimate_depth(one).disparity - one.ground_truth)) for one in (light_field, noisy)]
+    assert errors[0] < 0.03
+    assert errors[1] < 0.1
+    # the render is there: another level takes no more paths
+    again = CliRunner().invoke(main, [*words, "--noise", "high", "--all-views"])
+    assert again.exit_code == 0, again.output
+    assert len(list((tmp_path / "wires_high").glob("gt_disp_lowres_Cam*.pfm"))) == 25
+    refused = CliRunner().invoke(main, [*words, "--samples", "4", "--noise", "low", "--set", "noise_seed=2"])
+    assert refused.exit_code == 1
+    assert "was rendered with other options" in refused.output
+
+
+@pytest.mark.system
+def test_scenes_side_by_side(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each has a process of its own, of the options given; an error is told and leaves no process."""
+    begun: list[subprocess.Popen[str]] = []
+
+    def started(*values: object) -> subprocess.Popen[str]:
+        begun.append(_started(*values))
+        return begun[-1]
+
+    monkeypatch.setattr(side_by_side, "_started", started)
+    options = taking(size=32, grid=(2, 3), samples=2, position_error=0.1)
+    assert list(render_scenes(["room"], options, tmp_path)) == ["room"]
+    assert read_render(tmp_path / "room.h5").made_by == made_by("room", options)
+    (tmp_path / "glass.h5.parts").touch()
+    with pytest.raises(SepiError, match=r"glass\.h5\.parts: File exists$"):
+        list(render_scenes(["glass", "cloth"], taking(size=256, grid=(9, 9)), tmp_path))
+    assert len(begun) == 1 + min(2, available_cores())
+    assert all(process.poll() is not None for process in begun)
+    assert not (tmp_path / "cloth.h5").exists()
+
+
+def test_a_light_field_needs_no_albedo_that_it_does_not_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through a lens no point is sharp, and no view has another's."""
+    monkeypatch.delattr(Tracer, "albedo")
+    assert rendered(tmp_path, room(), size=32, samples=1, lens=0.5).views.any()
