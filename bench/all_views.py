@@ -15,11 +15,11 @@ import numpy.typing as npt
 from tqdm import tqdm
 
 from bench import tables
-from sepi.applications.all_views import EDGE_VIEWS, estimate_all_views
-from sepi.applications.carried_map import carried_map
 from sepi.built_in_variants import DEFAULT_VARIANT
 from sepi.command import SepiCommand
+from sepi.extensions.views.all_views import EDGE_VIEWS, estimate_all_views
 from sepi.lightfield import FloatMap, LightField
+from sepi.matching.carried_map import carried_map
 from sepi.pipeline import estimate_depth
 from sepi.scenes import SCENES, render, true_disparity
 from sepi.threads import use_threads

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 
 from sepi.camera import Camera
+from sepi.camera.rig import Lens, Shot
+from sepi.extensions.cameras.reader import read_cameras
 from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.pipeline import estimate_depth
-from sepi.reading import read_cameras
-from sepi.rig import Lens, Shot
 from sepi.scenes import render_shot
 from sepi.scoring.scores import score
 

@@ -20,18 +20,22 @@ True
 from __future__ import annotations
 
 import importlib
+from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sepi.applications.all_views import AllViews, estimate_all_views
-    from sepi.applications.refocusing import all_in_focus, refocus
     from sepi.camera import Camera
     from sepi.errors import SepiError, SepiWarning
+    from sepi.extensions.cameras.reader import read_cameras as read_cameras
+    from sepi.extensions.views.all_views import AllViews as AllViews
+    from sepi.extensions.views.all_views import estimate_all_views as estimate_all_views
+    from sepi.extensions.views.refocusing import all_in_focus as all_in_focus
+    from sepi.extensions.views.refocusing import refocus as refocus
     from sepi.io.readers.options import ReadOptions
     from sepi.io.result_folder import read_result, write_result
     from sepi.lightfield import DisparityRange, LightField
     from sepi.pipeline import estimate_depth
-    from sepi.reading import read_cameras, read_light_field
+    from sepi.reading import read_light_field
     from sepi.stage import StageMaps
 
     __version__: str
@@ -47,7 +51,6 @@ if TYPE_CHECKING:
     """
 
 __all__ = [
-    "AllViews",
     "Camera",
     "DisparityRange",
     "LightField",
@@ -56,18 +59,13 @@ __all__ = [
     "SepiWarning",
     "StageMaps",
     "__version__",
-    "all_in_focus",
-    "estimate_all_views",
     "estimate_depth",
-    "read_cameras",
     "read_light_field",
     "read_result",
-    "refocus",
     "write_result",
 ]
 
 _HOME = {
-    "AllViews": "sepi.applications.all_views",
     "Camera": "sepi.camera",
     "DisparityRange": "sepi.lightfield",
     "LightField": "sepi.lightfield",
@@ -75,13 +73,9 @@ _HOME = {
     "SepiError": "sepi.errors",
     "SepiWarning": "sepi.errors",
     "StageMaps": "sepi.stage",
-    "all_in_focus": "sepi.applications.refocusing",
-    "estimate_all_views": "sepi.applications.all_views",
     "estimate_depth": "sepi.pipeline",
-    "read_cameras": "sepi.reading",
     "read_light_field": "sepi.reading",
     "read_result": "sepi.io.result_folder",
-    "refocus": "sepi.applications.refocusing",
     "write_result": "sepi.io.result_folder",
 }
 
@@ -94,8 +88,16 @@ def __getattr__(name: str) -> Any:
         return package_version()
     if name in _HOME:
         return getattr(importlib.import_module(_HOME[name]), name)
+    # asked for a submodule, too, before it is imported
+    if not name.startswith("_") and PathFinder.find_spec(f"{__name__}.{name}", __path__) is None:
+        from sepi.registry import added
+
+        if name in added("names"):
+            return getattr(importlib.import_module(added("names")[name]), name)
     raise AttributeError(f"module 'sepi' has no attribute '{name}'")
 
 
 def __dir__() -> list[str]:
-    return __all__
+    from sepi.registry import added
+
+    return sorted([*__all__, *added("names")])

@@ -22,8 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera
+from sepi.camera.rig import Rig
 from sepi.errors import SepiError, one_line
-from sepi.rig import Rig
 from sepi.validation import described, is_finite, require_known, require_type, whole_pair
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from sepi.inspection.coded_views import told_of_coding
 from sepi.io.provenance import reading_record
 from sepi.io.readers.arrays import UnclearAxesError
 from sepi.io.readers.camera_positions import with_row_spacing
-from sepi.io.readers.formats import read
+from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ReadOptions, in_grid, unarranged
 from sepi.lightfield import DisparityRange, LightField
 from sepi.memory import give_back_memory
@@ -23,8 +23,6 @@ from sepi.validation import described, require_type
 
 # 16-bit views darker than this, a sixteenth of the full scale, have fewer bits or hardly any light
 _NARROW = 4096
-# distance of cameras from their plane, in view steps, beyond which rectification needs the depth of the scene
-_FLAT = 1e-3
 
 
 def read_light_field(
@@ -95,7 +93,9 @@ def read_light_field(
     except UnclearAxesError as unclear:
         light_field = _with_axes(path, options, file_format, unclear)
     if light_field.rig is not None and light_field.disparity_range is None:
-        light_field = _with_depths(path, light_field, options, given)
+        reader = format_of(path, file_format).reader
+        if hasattr(reader, "with_depths"):
+            light_field = reader.with_depths(path, light_field, options, given)
     if not light_field.arranged:
         from sepi.inspection.arrangement import arrange
 
@@ -152,80 +152,6 @@ def _with_axes(path: Path, options: ReadOptions, file_format: str | None, unclea
     light_field = read(path, replace(options, axes=axes), file_format)
     note = f"axes taken as {' '.join(axes)}, for which the views fit together; set others by --axes"
     return replace(light_field, notes=(note, *light_field.notes))
-
-
-def _with_depths(path: Path, light_field: LightField, options: ReadOptions, given: DisparityRange | None) -> LightField:
-    """The light field rectified for depths estimated from its views, if its cameras have no points and no plane."""
-    from sepi.inspection.disparity_range import estimate_range
-    from sepi.io.readers import calibrated
-
-    rig, camera = light_field.rig, light_field.camera
-    assert rig is not None
-    assert camera is not None
-    centres = np.array([view.shot.centre for view in rig.views.values()])
-    if np.abs((centres - rig.origin) @ rig.rotation[2]).max() < _FLAT * rig.step:
-        return light_field
-    known = given or estimate_range(light_field)
-    low, high = ((bound + camera.offset) / camera.scale for bound in (known.minimum, known.maximum))
-    same = replace(options, reference=rig.views[light_field.reference_position].shot.name)
-    again = calibrated.read(path, same, (max(low, 0.0), max(high, 1e-12)))
-    return replace(again, disparity_range=None)
-
-
-def read_cameras(
-    path: str | Path,
-    *,
-    images: str | Path | None = None,
-    reference: str | None = None,
-    exclude: tuple[str, ...] = (),
-    disparity_range: tuple[float, float] | None = None,
-) -> LightField:
-    """A light field rectified from pictures of calibrated cameras.
-
-    Parameters
-    ----------
-    path : str or Path
-        COLMAP model (extra ``sepi[colmap]``), ``transforms.json``, or a table ``cameras.csv`` or ``cameras.yaml``; or
-        a folder with one of them.
-    images : str or Path, optional
-        Folder of the pictures, if the model does not name it.
-    reference : str, optional
-        Name of the picture whose depth is estimated; default: that of the most central camera.
-    exclude : tuple of str
-        Names of pictures to leave out.
-    disparity_range : tuple of float, optional
-        ``(minimum, maximum)`` in pixels per view step.
-
-    Returns
-    -------
-    LightField
-        Views of float32, with positions, camera and ``rig``; its notes say how far the cameras stand off a plane.
-
-    Raises
-    ------
-    SepiError
-        If cameras or pictures are missing, or the cameras do not suit a light field.
-
-    Examples
-    --------
-    >>> import json
-    >>> from pathlib import Path
-    >>> import cv2
-    >>> import sepi
-    >>> from sepi.scenes import render
-    >>> views = render("pyramids", size=64, views=3).views
-    >>> table = []
-    >>> for t in range(3):
-    ...     for s in range(3):
-    ...         written = cv2.imwrite(f"{t}{s}.png", views[t, s, :, :, ::-1])
-    ...         table.append({"file": f"{t}{s}.png", "position": [0.1 * s, 0.1 * t, 0.0], "focal": 80.0})
-    >>> text = Path("cameras.yaml").write_text(json.dumps({"units": "metres", "cameras": table}))
-    >>> light_field = sepi.read_cameras("cameras.yaml", disparity_range=(-1.5, 1.5))
-    >>> light_field.grid, light_field.shape, light_field.rig.units
-    ((3, 3), (64, 64), 'metres')
-    """
-    options = ReadOptions(images=None if images is None else str(images), reference=reference, exclude=exclude)
-    return read_light_field(path, disparity_range=disparity_range, file_format="cameras", options=options)
 
 
 def _given_range(path: Path, bounds: tuple[float, float]) -> DisparityRange:

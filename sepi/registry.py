@@ -129,13 +129,15 @@ class Known(MutableMapping[str, _T]):
         Field of :class:`Extension`.
     own : mapping
         The core's own; a name ``none`` is listed last.
-    loaded : callable
-        Makes the value of a name and of what the extension says of it.
+    loaded : callable, optional
+        Makes the value of a name and of what the extension says of it; default: that.
     prefix : str
         What the extension's names begin with, and those here do not.
     """
 
-    def __init__(self, kind: str, own: Mapping[str, _T], loaded: Callable[[str, Any], _T], prefix: str = "") -> None:
+    def __init__(
+        self, kind: str, own: Mapping[str, _T], loaded: Callable[[str, Any], _T] | None = None, prefix: str = ""
+    ) -> None:
         self._kind, self._own, self._loaded, self._prefix = kind, dict(own), loaded, prefix
         self._found: dict[str, _T] = {}
 
@@ -147,7 +149,8 @@ class Known(MutableMapping[str, _T]):
         if name in self._own:
             return self._own[name]
         if name not in self._found:
-            self._found[name] = self._loaded(name, self._added()[name])
+            what = self._added()[name]
+            self._found[name] = what if self._loaded is None else self._loaded(name, what)
         return self._found[name]
 
     def __setitem__(self, name: str, value: _T) -> None:

@@ -252,7 +252,7 @@ def _chosen(stage: str, given: Any, base: Variant | None, where: str) -> tuple[s
     return choice, {key: getattr(checked, key) for key in own}
 
 
-VARIANT_ENTRIES: Known[dict[str, Any]] = Known("variants", ENTRIES, lambda _, entry: entry)
+VARIANT_ENTRIES: Known[dict[str, Any]] = Known("variants", ENTRIES)
 """The built-in variants as entries for :func:`variant_from`: the paper's method, the other four columns of its table 4
 in order, the text's other occlusion stage, and the paper's method without noise correction; then the most accurate
 variant, a fast one, and the most accurate one with a part switched off or replaced by the paper's; then what extensions

@@ -11,6 +11,7 @@ import pytest
 import sepi
 from sepi.camera import camera_from
 from sepi.evaluate import evaluation_of, evaluations_of
+from sepi.extensions.benchmark.hci_submission import problems_of, write_submission
 from sepi.inspection.disparity_range import estimate_range
 from sepi.inspection.view_order import check_order
 from sepi.io.disparity_maps import read_disparity
@@ -25,7 +26,6 @@ from sepi.matching.unknown import unknown_pixels
 from sepi.scenes import render, write_hci
 from sepi.scoring.confidence import oracle, sparsification
 from sepi.scoring.edges import edges_of
-from sepi.scoring.hci_submission import problems_of, write_submission
 from sepi.scoring.regions import occluded, textureless
 from sepi.scoring.scores import region_masks, score, score_regions
 from sepi.threads import use_threads

@@ -17,9 +17,9 @@ import numpy as np
 import yaml
 
 import sepi
+from sepi.camera.rig import Lens, Shot
 from sepi.io.pfm import read_pfm
 from sepi.io.result_folder import write_as_taken
-from sepi.rig import Lens, Shot
 from sepi.scenes import render_shot
 
 # %%

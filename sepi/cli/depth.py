@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,12 +18,12 @@ from sepi.errors import SepiError
 
 # other imports stand in the functions, since `sepi depth --help` does not need them
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from sepi.applications.all_views import ViewMaps
     from sepi.lightfield import LightField
     from sepi.stage import MadeBy, StageMaps
     from sepi.variants import Variant
+
+    # writes maps of all views: folder of the result, light field, maps, variant, parameters, limit of memory in bytes
+    _Also = Callable[[Path, LightField, StageMaps, Variant, dict[str, dict[str, Any]], int | None], None]
 
 _PATH = click.Path(path_type=Path)
 
@@ -49,7 +49,6 @@ _PATH = click.Path(path_type=Path)
 )
 @click.option("--force", is_flag=True, help="Also write to a folder with other files or another light field's result.")
 @click.option("--timing", is_flag=True, help="Also write runtime.txt: seconds, for a benchmark submission.")
-@click.option("--all-views", is_flag=True, help="Also write all_views.h5: a map for each view; takes longer.")
 @camera_flags
 @reading_flags
 def depth(
@@ -62,16 +61,15 @@ def depth(
     settings: tuple[str, ...],
     force: bool,
     timing: bool,
-    all_views: bool,
     geometry: Geometry | None,
     reading: Reading,
+    also: _Also | None = None,
 ) -> None:
     """Compute the disparity map of the light field INPUT.
 
     INPUT is a folder of views, a Lytro picture (*_eslf.png), an array (.mat, .npy, .npz) or an HDF5 file. 'sepi info'
     shows how it is read, 'sepi check' whether its views are in the right order. The command writes disparity (numbers
-    and picture), error bars, confidence, masks and a point cloud, and depth in metres if the camera is known. With
-    --all-views it also writes a map for every view (docs/depth/all_views.md).
+    and picture), error bars, confidence, masks and a point cloud, and depth in metres if the camera is known.
 
     Variants: best (the most accurate), fast (less accurate), paper (the method as published); no_sepi, no_occlusion,
     no_textureless, no_occlusion_no_textureless, no_noise_correction (paper with parts switched off), wang (paper with
@@ -82,7 +80,6 @@ def depth(
     Examples:
       sepi depth cotton
       sepi depth cotton -o maps --disparity-range -2 2
-      sepi depth cotton --all-views
       sepi depth flowers_eslf.png --central 7
       sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
       sepi depth cotton --variant paper --set initial.sepi.num_disparities=91
@@ -103,7 +100,6 @@ def depth(
         raise SepiError(f"{folder}: is the light field itself; choose another folder for the result")
     light_field = reading.read(light_field_path, disparity_range=disparity_range)
     from sepi.inspection.disparity_range import settle_range
-    from sepi.io.provenance import result_attributes
     from sepi.io.result_folder import write_result
     from sepi.matching.unknown import UNKNOWN
     from sepi.pipeline import estimate_depth
@@ -117,16 +113,10 @@ def depth(
         maps = estimate_depth(light_field, variant, parameters, progress, memory and memory * 2**20)
     seconds = time.perf_counter() - started if timing else None
     taken = names_of_others(light_field, with_sigma=maps.sigma is not None)
-    others = (ALL_VIEWS, *taken) if all_views else ()
+    others = () if also is None else (ALL_VIEWS, *taken)
     files = write_result(folder, light_field, maps, force=force, seconds=seconds, beside=others)
-    if all_views:
-        from sepi.applications.all_views import maps_of_all_views
-        from sepi.io.all_views import write_all_views
-
-        made_by = result_attributes(light_field, maps)
-        with progress_bar(f"{light_field.name}, all views") as progress:
-            views = maps_of_all_views(light_field, maps, chosen, parameters, progress, memory and memory * 2**20)
-            write_all_views(folder / ALL_VIEWS, light_field, _also_as_taken(folder, light_field, views), made_by)
+    if also is not None:
+        also(folder, light_field, maps, chosen, parameters, memory and memory * 2**20)
         files = (*files, *others)
     click.echo(f"{light_field.name}: {size_text(light_field)}")
     for note in light_field.notes:
@@ -137,18 +127,6 @@ def depth(
         click.echo(f"unknown: {100 * unknown:.2g} % of the pixels; no view has evidence for their depth")
     click.echo(_interval(maps, variant))
     click.echo(f"written to {folder}/: {' '.join(files)}")
-
-
-def _also_as_taken(
-    folder: Path, light_field: LightField, views: Iterable[ViewMaps]
-) -> Iterator[tuple[tuple[int, int], Mapping[str, npt.NDArray[Any]]]]:
-    """The maps of each view, also written for the picture that its calibrated camera took."""
-    from sepi.io.result_folder import write_as_taken
-
-    for view in views:
-        if view.position != light_field.reference_position:
-            write_as_taken(folder, light_field, view.disparity, view.position, view.sigma)
-        yield view.position, view.maps
 
 
 def _interval(maps: StageMaps, variant: str) -> str:

@@ -174,7 +174,7 @@ def range_text(known: DisparityRange) -> str:
 
 def _depth(light_field: LightField, estimated: DisparityRange | None) -> str:
     """Text on the conversion of disparity to depth."""
-    from sepi.rig import METRES
+    from sepi.camera.rig import METRES
 
     camera, rig = light_field.camera, light_field.rig
     if camera is None:

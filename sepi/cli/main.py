@@ -3,54 +3,63 @@
 from __future__ import annotations
 
 import os
-from collections import UserDict
 from importlib import import_module
 from typing import Any
 
 import click
 
-from sepi.command import SepiGroup
+from sepi.command import SepiGroup, shown_errors
+from sepi.registry import Known
 
 # NumPy reads these when imported. Products are small here, so threads of OpenBLAS would only wait. Pages of 2 MB take
 # time and memory, since arrays live shortly
 for _name, _value in {"OPENBLAS_NUM_THREADS": "1", "NUMPY_MADVISE_HUGEPAGE": "0"}.items():
     os.environ.setdefault(_name, _value)
 
-_COMMANDS = {
-    "calibrate": ("calibrate", "Find the cameras of pictures without poses, with COLMAP."),
+_MODULES = {
     "check": ("info", "Check the order of the views of the light field INPUT."),
-    "check-submission": ("results", "Check a submission to the HCI 4D benchmark."),
     "compare": ("compare", "Show two disparity maps side by side on a page."),
     "convert": ("convert", "Write a map of a result as OpenEXR, TIFF or PFM."),
     "depth": ("depth", "Compute the disparity map of the light field INPUT."),
     "evaluate": ("evaluate", "Score a disparity map against ground truth."),
     "export": ("export", "Save the light field INPUT as read, so that it needs no flags."),
     "info": ("info", "Show what is known about the light field INPUT."),
-    "points": ("results", "Write the point cloud of a result."),
-    "poses": ("poses", "Write camera poses and depth for COLMAP or nerfstudio."),
-    "refocus": ("refocus", "Refocus the light field INPUT."),
+    "points": ("points", "Write the point cloud of a result."),
     "scenes": ("scenes", "Write scenes with exact ground truth."),
-    "submission": ("results", "Pack results as a submission to the HCI 4D benchmark."),
 }
 """Command to its module in this folder, and its line in the list of commands."""
 
 
-class _Imported(UserDict[str, Any]):
+class _Imported(Known[Any]):
     """Commands, each imported when looked up."""
 
     def __getitem__(self, name: str) -> click.Command:
         """The command of this name."""
-        module, text = self.data[name]
-        command: click.Command = getattr(import_module(f"{__package__}.{module}"), name.replace("-", "_"))
+        module, text = super().__getitem__(name)
+        command: click.Command = getattr(import_module(module), name.replace("-", "_"))
         command.short_help = text
         return command
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Names and lines of the list of commands, by name."""
+        return [(name, super(_Imported, self).__getitem__(name)[1]) for name in sorted(self)]
+
+
+_COMMANDS = _Imported(
+    "commands", {name: (f"{__package__}.{module}", text) for name, (module, text) in _MODULES.items()}
+)
 
 
 class _Commands(SepiGroup):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, _COMMANDS[name][1]) for name in self.list_commands(ctx)])
+        with shown_errors(), formatter.section("Commands"):
+            formatter.write_dl(_COMMANDS.lines())
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of this name."""
+        with shown_errors():
+            return super().get_command(ctx, cmd_name)
 
 
 def _tell_version(context: click.Context, _: click.Parameter, asked: bool) -> None:
@@ -63,7 +72,7 @@ def _tell_version(context: click.Context, _: click.Parameter, asked: bool) -> No
 
 @click.group(
     cls=_Commands,
-    commands=_Imported(_COMMANDS),
+    commands=_COMMANDS,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 @click.option(

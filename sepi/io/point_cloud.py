@@ -27,9 +27,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera
+from sepi.camera.rig import WORLD, Rig
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.rig import WORLD, Rig
 from sepi.validation import require_map, require_type
 
 Positions = npt.NDArray[np.float32]

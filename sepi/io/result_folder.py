@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera, warn_of_infinity
+from sepi.camera.rig import Rig
 from sepi.errors import SepiError
 from sepi.io import hdf5, map_pictures
 from sepi.io.files import atomic_path, filled_folder, remove_files
@@ -26,7 +27,6 @@ from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import DIGEST, RESULT, result_attributes
 from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, UNKNOWN, names_as_taken, require_own, sound_maps
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
-from sepi.rig import Rig
 from sepi.stage import StageMaps
 from sepi.threads import available_cores
 from sepi.validation import described, is_finite, require_path, require_type
@@ -324,7 +324,7 @@ def write_as_taken(
     """
     if light_field.camera is None or light_field.rig is None:
         return False
-    from sepi.cameras.as_taken import as_taken, sigma_as_taken
+    from sepi.camera.as_taken import as_taken, sigma_as_taken
 
     t, s = position or light_field.reference_position
     down, across = (light_field.baselines[t, s] + light_field.from_centre).tolist()

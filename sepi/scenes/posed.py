@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera
+from sepi.camera.rig import Shot
 from sepi.kernels import rendering as kernels
 from sepi.lightfield import FloatMap
-from sepi.rig import Shot
 from sepi.scenes.light_field import drawn
 from sepi.scenes.rendering import boxes_round
 
@@ -67,7 +67,7 @@ def render_shot(name: str, shot: Shot, *, camera: Camera, size: int = 192) -> Po
 
     >>> import numpy as np
     >>> from sepi import Camera
-    >>> from sepi.rig import Lens, Shot
+    >>> from sepi.camera.rig import Lens, Shot
     >>> from sepi.scenes import render, render_shot
     >>> camera = Camera(scale=10.0, offset=0.0, focal_px=100.0)
     >>> lens = Lens(64, 64, (100.0, 100.0), (31.5, 31.5))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from sepi.camera.rig import Floats
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.rig import Floats
 
 # largest error that is close: fraction of the map's range (2nd to 98th percentile), and minimum in pixels per view step
 _PART, _LEAST = 0.1, 0.07

@@ -50,26 +50,8 @@ _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
 
 
 # packages and modules of which a job runs one
-_ALTERNATIVES = (
-    "scenes",
-    *(
-        f"io.readers.{name}"
-        for name in (
-            "calibrated",
-            "eslf",
-            "exported",
-            "hci",
-            "hci_2013",
-            "hdf5_arrays",
-            "image_folder",
-            "matlab",
-            "mosaic",
-            "numpy_files",
-            "open_lf",
-            "tiff_stack",
-        )
-    ),
-)
+_READERS = ("eslf", "exported", "hci", "hci_2013", "hdf5_arrays", "image_folder", "matlab", "numpy_files")
+_ALTERNATIVES = ("scenes", *(f"io.readers.{name}" for name in _READERS))
 _HEADER = ".hpp"
 # arguments of calls that are texts for people
 _TOLD = ("help", "description")

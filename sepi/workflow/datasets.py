@@ -15,7 +15,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from sepi.cameras.files import cameras_in, described_by, read_model
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import TruthFile
 from sepi.io.images import SUFFIXES
@@ -264,13 +263,15 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str, truth
     word = dict(pairwise(flags)).get("--format")
     if hci.matches(source) and (word == "hci" or (word is None and not exported.matches(source))):
         return replace(_benchmark_scene("own", name, source, flags), own_truth=truth)
-    cameras = cameras_in(source) if word in (None, "cameras") and not exported.matches(source) else None
-    if cameras is not None:
-        # the images may lie in another folder
+    known = None
+    # ingest reports an unknown format
+    with suppress(SepiError):
+        known = format_of(source, word)
+    if known is not None and hasattr(known.reader, "files_of"):
         given = dict(pairwise(flags))
-        model = read_model(source, given.get("--images"), ReadOptions(crop_of=given.get("--crop-of")).part)
-        files = (*described_by(cameras), *model.files)
-        return Scene("own", name, source, files, *size_of(model.pictures), flags=flags, own_truth=truth)
+        options = ReadOptions(images=given.get("--images"), crop_of=given.get("--crop-of"))
+        read, pictures = known.reader.files_of(source, options)
+        return Scene("own", name, source, tuple(read), *size_of(pictures), flags=flags, own_truth=truth)
     inside = [path for path in view_files(source) if path.is_file()] if source.is_dir() else [source]
     files = tuple(path for path in inside if not path.name.startswith("."))
     if truth is not None:

@@ -19,13 +19,13 @@ from mutations import zip_of
 from PIL import Image
 
 from sepi.camera import Camera
+from sepi.extensions.benchmark.hci_submission import SHAPE as SUBMITTED
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.io.pfm import write_pfm
 from sepi.io.readers.exported import MANIFEST, write_exported
 from sepi.io.result_folder import write_result
 from sepi.io.scores import Evaluation, ExternalMap, write_external, write_scores
 from sepi.lightfield import DisparityRange, LightField
-from sepi.scoring.hci_submission import SHAPE as SUBMITTED
 from sepi.stage import StageMaps
 
 H, W = 6, 10

@@ -10,6 +10,7 @@ from executions import Target
 from mutations import MAT, PNG
 
 from sepi.errors import SepiError
+from sepi.extensions.benchmark.hci_submission import problems_of
 from sepi.io.disparity_maps import TruthFile, is_disparity, read_disparity, read_error_bars
 from sepi.io.hdf5 import read_light_field as read_own
 from sepi.io.hdf5 import read_stage
@@ -21,7 +22,6 @@ from sepi.io.result_folder import read_result
 from sepi.io.scores import read_evaluations, read_external, read_scores
 from sepi.reading import read_light_field
 from sepi.report.runs import read_numbers
-from sepi.scoring.hci_submission import problems_of
 
 
 def _each(*reads: Callable[[Path], object]) -> Callable[[Path], object]:

@@ -13,16 +13,16 @@ from click.testing import CliRunner
 
 from sepi.cli.depth import _parameters
 from sepi.cli.main import main
-from sepi.cli.results import _runtime
 from sepi.command import _json_object
 from sepi.errors import SepiError
+from sepi.extensions.benchmark.commands import _runtime
+from sepi.extensions.benchmark.hci_submission import _read_seconds
 from sepi.external import _sources
 from sepi.io.images import write_png
 from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_names import parse_view_numbers
 from sepi.report.plan import Plan
-from sepi.scoring.hci_submission import _read_seconds
 from sepi.variants import stage_parameters, variant_named
 from sepi.workflow.config import load_settings
 

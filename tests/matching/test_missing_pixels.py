@@ -9,7 +9,7 @@ import pytest
 import sepi
 from sepi.boundaries.decision import assigned_to_surfaces
 from sepi.boundaries.parameters import BoundaryParameters
-from sepi.cameras.resampling import completed
+from sepi.extensions.cameras.resampling import completed
 from sepi.io.hdf5 import read_light_field, write_light_field
 from sepi.io.readers.exported import write_exported
 from sepi.io.readers.options import ReadOptions

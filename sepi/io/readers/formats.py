@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -19,12 +20,13 @@ from sepi.io.disparity_maps import is_disparity
 from sepi.io.files import DEFLATE_RATIO, naming
 from sepi.io.hdf5 import has_dataset
 from sepi.io.images import SUFFIXES, picture_header
-from sepi.io.readers import eslf, matlab, numpy_files, open_lf, tiff_stack
+from sepi.io.readers import eslf, matlab, numpy_files
 from sepi.io.readers.arrays import is_likely, with_white
 from sepi.io.readers.named_arrays import Shapes, hdf5_shapes, no_light_field
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import has_rows
 from sepi.lightfield import LightField, Truth
+from sepi.registry import Known
 from sepi.validation import require_known
 
 
@@ -36,13 +38,17 @@ class Format(NamedTuple):
     name, description : str
         For messages.
     module : str
-        Name of a module of this folder. Its ``matches(path)`` quickly says whether a path looks like this format, and
-        never raises; ``read(path, options)`` reads a light field. It may also have ``read_views``, which reads no
-        ground truth and masks, ``read_truth``, which reads only these, and ``truth_files``, which lists their files.
+        Name of a module. Its ``matches(path)`` quickly says whether a path looks like this format, and never raises;
+        ``read(path, options)`` reads a light field. It may also have ``read_views``, which reads no ground truth and
+        masks, ``read_truth``, which reads only these, ``truth_files(path)``, which lists their files, ``size_of(path)``
+        (views, height, width, bytes of a pixel), ``files_of(path, options)`` (files that are read, and pictures of the
+        size of a view), and ``with_depths``, for cameras that need the depth of the scene.
     options : tuple of str
         Fields of :class:`ReadOptions` that not all formats use, and this one does.
     scales : bool
         Whether it reads values of any scale, and uses the option ``white``.
+    loose : bool
+        Whether it also matches what another format describes better; formats of extensions are asked before.
     """
 
     name: str
@@ -50,11 +56,12 @@ class Format(NamedTuple):
     module: str
     options: tuple[str, ...] = ()
     scales: bool = True
+    loose: bool = False
 
     @property
     def reader(self) -> ModuleType:
         """Module of the format."""
-        return import_module(f"sepi.io.readers.{self.module}")
+        return import_module(self.module)
 
     def truth_files(self, path: Path) -> Sequence[Path]:
         """Files with ground truth and masks."""
@@ -70,34 +77,43 @@ _POSES = ("poses_bounds.npy", "cameras.json", "cameras_sphere.npz")
 
 
 _ARRAY_OPTIONS = ("grid", "axes", "variable")
-_CAMERAS = "COLMAP model, transforms.json, cameras.csv or cameras.yaml"
 # options that only some formats use
 _SOME = ("grid", "pattern", "axes", "variable", "images", "reference", "follow_links")
 
-FORMATS = {
+_HERE = "sepi.io.readers"
+_OWN = {
     # before other folders: its images may have any names
-    "exported": Format("exported folder", "written by 'sepi export'", "exported", ("follow_links",)),
-    # before folders of images, which may lie beside a model
-    "cameras": Format("calibrated cameras", _CAMERAS, "calibrated", ("images", "reference"), scales=False),
-    "hci": Format("HCI folder", "input_Cam000.png, ...", "hci", ("grid", "follow_links")),
+    "exported": Format("exported folder", "written by 'sepi export'", f"{_HERE}.exported", ("follow_links",)),
+    "hci": Format("HCI folder", "input_Cam000.png, ...", f"{_HERE}.hci", ("grid", "follow_links")),
     "images": Format(
-        "folder of views", "a numbered image for each", "image_folder", ("grid", "pattern", "follow_links")
+        "folder of views",
+        "a numbered image for each",
+        f"{_HERE}.image_folder",
+        ("grid", "pattern", "follow_links"),
+        loose=True,
     ),
-    "mosaic": Format("mosaic of views", "NAME_qs8x6a0.75.png", "mosaic", ("grid",)),
-    "eslf": Format("Lytro lenslet image", "NAME_eslf.png", "eslf", ("grid",)),
-    "tiff-stack": Format("TIFF stack", "a page for each view", "tiff_stack", ("grid",)),
+    "eslf": Format("Lytro lenslet image", "NAME_eslf.png", f"{_HERE}.eslf", ("grid",)),
     # before other kinds of HDF5: MATLAB's has a header or suffix of its own
-    "matlab": Format("MATLAB file", ".mat with an array such as LF", "matlab", _ARRAY_OPTIONS),
-    "numpy": Format("NumPy file", ".npy or .npz", "numpy_files", _ARRAY_OPTIONS),
-    # before other kinds with something called LF
-    "openlf": Format("OpenLF HDF5", "with a group LF", "open_lf"),
-    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", "hci_2013"),
+    "matlab": Format("MATLAB file", ".mat with an array such as LF", f"{_HERE}.matlab", _ARRAY_OPTIONS),
+    "numpy": Format("NumPy file", ".npy or .npz", f"{_HERE}.numpy_files", _ARRAY_OPTIONS),
+    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", f"{_HERE}.hci_2013"),
     # after the kinds whose arrays have fixed names
-    "hdf5": Format("HDF5 file", "with an array of all views", "hdf5_arrays", _ARRAY_OPTIONS),
+    "hdf5": Format("HDF5 file", "with an array of all views", f"{_HERE}.hdf5_arrays", _ARRAY_OPTIONS, loose=True),
     # last, since it takes files too damaged to tell
-    "sepi": Format("sepi HDF5", "written by this package", "own_files", scales=False),
+    "sepi": Format("sepi HDF5", "written by this package", f"{_HERE}.own_files", scales=False, loose=True),
 }
-"""Word for ``--format`` to format; the first format that matches reads."""
+FORMATS: Known[Format] = Known("readers", _OWN, lambda _, module: import_module(module).FORMAT)
+"""Word for ``--format`` to format."""
+
+
+def matching(path: Path) -> Format | None:
+    """The format that a path looks like; those of extensions are asked only if no other but a loose one matches."""
+    asked = itertools.chain(
+        (known for known in _OWN.values() if not known.loose),
+        (FORMATS[word] for word in FORMATS if word not in _OWN),
+        (known for known in _OWN.values() if known.loose),
+    )
+    return next((known for known in asked if known.reader.matches(path)), None)
 
 
 def format_of(path: Path, file_format: str | None = None) -> Format:
@@ -120,9 +136,9 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
         raise SepiError(f"{path}: no such file or folder")
     if file_format is not None:
         return FORMATS[file_format]
-    for known in FORMATS.values():
-        if known.reader.matches(path) and path.name not in _POSES:
-            return known
+    found = matching(path) if path.name not in _POSES else None
+    if found is not None:
+        return found
     poses = next((one for one in (path, *map(path.joinpath, _POSES)) if one.name in _POSES and one.is_file()), None)
     if poses is not None:
         raise SepiError(
@@ -131,11 +147,11 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
         )
     inner = list(islice(_inside(path), _LISTED + 1)) if path.is_dir() and not _is_result(path) else []
     if inner:
-        found = f", such as {inner[0]}" if len(inner) == 1 else f": {', '.join(map(str, inner[:_LISTED]))}"
-        found += ", ..." if len(inner) > _LISTED else ""
+        named = f", such as {inner[0]}" if len(inner) == 1 else f": {', '.join(map(str, inner[:_LISTED]))}"
+        named += ", ..." if len(inner) > _LISTED else ""
         with suppress(OSError):
-            found += "; if they are the rows of one, pass --format images" * has_rows(path, surely=False)
-        raise SepiError(f"{path}: a folder of light fields; give one of them{found}")
+            named += "; if they are the rows of one, pass --format images" * has_rows(path, surely=False)
+        raise SepiError(f"{path}: a folder of light fields; give one of them{named}")
     expected = ", ".join(f"{known.name} ({known.description})" for known in FORMATS.values())
     raise SepiError(f"{path}: {_what_else(path)}; expected {expected}")
 
@@ -221,7 +237,7 @@ def _inside(folder: Path, depth: int = 1) -> Iterator[Path]:
                 continue
             # tables of numbers, such as poses, are not light fields
             table = entry.suffix.lower() in (".npy", ".npz") and is_disparity(entry)
-            if not table and any(known.reader.matches(entry) for known in FORMATS.values()):
+            if not table and matching(entry) is not None:
                 yield entry
             elif depth and entry.is_dir() and not entry.is_symlink():
                 yield from _inside(entry, depth - 1)
@@ -264,8 +280,9 @@ def size_of(files: Sequence[Path]) -> Size:
         if len(pictures) > 1:
             header = picture_header(pictures[0])
             return Size(len(pictures), header.height, header.width, header.pixel_bytes)
-        if pictures and tiff_stack.matches(pictures[0]):
-            return Size(*tiff_stack.form_of(pictures[0]))
+        known = matching(files[0]) if len(files) == 1 else None
+        if known is not None and hasattr(known.reader, "size_of"):
+            return Size(*known.reader.size_of(files[0]))
         if pictures:
             return _of_lenslets(pictures[0])
     except SepiError:
@@ -302,11 +319,8 @@ def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
     shapes: Shapes = {}
     with suppress(SepiError):
         reader = next((one for one in (numpy_files, matlab) if one.matches(path)), None)
-        if reader is None and open_lf.matches(path):
-            shapes = {"LF": open_lf.views_shape(path)}
-        else:
-            # no digest check for many files: whoever reads the views checks the file
-            shapes = hdf5_shapes(path, check=False) if reader is None else reader.array_shapes(path)
+        # no digest check for many files: whoever reads the views checks the file
+        shapes = hdf5_shapes(path, check=False) if reader is None else reader.array_shapes(path)
     most = path.stat().st_size * DEFLATE_RATIO
     sized = [(shape, kind.itemsize) for shape, kind in shapes.values() if is_likely(shape)]
     return [(shape, itemsize) for shape, itemsize in sized if 0 < math.prod(shape) * itemsize <= most]

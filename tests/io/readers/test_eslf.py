@@ -9,7 +9,7 @@ import pytest
 
 from sepi.errors import SepiError
 from sepi.io.readers import eslf
-from sepi.io.readers.formats import format_of, read
+from sepi.io.readers.formats import FORMATS, format_of, read
 from sepi.io.readers.options import ReadOptions
 
 
@@ -41,7 +41,7 @@ def put(path: Path, picture: np.ndarray) -> Path:
 def test_the_middle_views_are_read_pixel_for_pixel(tmp_path: Path, name: str) -> None:
     views = stack((14, 14))
     path = put(tmp_path / name, lenslets(views))
-    assert format_of(path).module == "eslf"
+    assert format_of(path) == FORMATS["eslf"]
     light_field = read(path, ReadOptions())
     np.testing.assert_array_equal(light_field.views, views[3:12, 3:12])
     assert light_field.present.all()

@@ -1,0 +1,305 @@
+"""A submission to the HCI 4D light field benchmark: a zip archive of disparity maps and run times of its 12 scenes.
+
+The archive contains ``disp_maps/SCENE.pfm``, 512 x 512 pixels with one channel, and ``runtimes/SCENE.txt``, the seconds
+as a number. The benchmark's own check tests for the files and the size of the maps; this one also finds errors that
+pass there but lower the scores, such as missing values, and files that do not belong to a submission.
+
+References
+----------
+.. [1] K. Honauer, O. Johannsen, D. Kondermann, B. Goldluecke, "A dataset and evaluation methodology for depth
+       estimation on 4D light fields", ACCV 2016. doi:10.1007/978-3-319-54187-7_2
+"""
+
+from __future__ import annotations
+
+import math
+import stat
+import struct
+import tempfile
+import zipfile
+import zlib
+from collections import Counter
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.io.files import atomic_path
+from sepi.io.pfm import read_pfm
+from sepi.io.result_files import RUNTIME
+from sepi.io.result_folder import read_result
+from sepi.validation import require_known, require_path, require_type
+
+SCENES = (
+    *("backgammon", "dots", "pyramids", "stripes"),
+    *("boxes", "cotton", "dino", "sideboard"),
+    *("bedroom", "bicycle", "herbs", "origami"),
+)
+"""The benchmark's scenes: stratified, training and test."""
+
+SHAPE = (512, 512)
+"""Height and width of the scenes' views in pixels."""
+
+MAPS, RUNTIMES = "disp_maps", "runtimes"
+
+_NAMES = {part: [f"{part}/{scene}{end}" for scene in SCENES] for part, end in ((MAPS, ".pfm"), (RUNTIMES, ".txt"))}
+_EXPECTED = {name for names in _NAMES.values() for name in names}
+
+_PIXELS = f"{SHAPE[1]}x{SHAPE[0]}"
+# size limits: header of a map; run time with white space
+_MOST_BYTES = {MAPS: 4 * SHAPE[0] * SHAPE[1] + 256, RUNTIMES: 64}
+# maximum number of lines about unexpected files
+_MOST_LINES = 10
+
+
+class Entry(NamedTuple):
+    """One scene of a submission.
+
+    Attributes
+    ----------
+    disparity : Path
+        PFM file of 512 x 512 pixels.
+    seconds : float
+        Run time.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from sepi.extensions.benchmark.hci_submission import Entry
+    >>> Entry(Path("cotton-depth/disparity.pfm"), 7.7).seconds
+    7.7
+    """
+
+    disparity: Path
+    seconds: float
+
+
+def entry_of(folder: Path, runtimes: Mapping[str, float]) -> tuple[str, Entry]:
+    """The scene of a result, and its entry in a submission.
+
+    Parameters
+    ----------
+    folder : Path
+        Written by ``sepi depth --timing``: ``disparity.pfm``, ``result.h5`` (which names the scene), ``runtime.txt``.
+    runtimes : mapping of str to float
+        Scene to seconds, instead of ``runtime.txt``.
+
+    Raises
+    ------
+    SepiError
+        If it is not such a folder, its scene is not one of the benchmark's, or its run time is unknown.
+    """
+    if not folder.is_dir():
+        raise SepiError(f"{folder}: no such folder; expected one that 'sepi depth --timing' wrote")
+    result = read_result(folder)
+    scene = result.scene
+    if result.from_centre != (0, 0):
+        raise SepiError(f"{folder}: depth of another view; expected that of the centre view, made without --view")
+    require_known(f"{folder}: scenes of the benchmark", [scene], SCENES)
+    disparity, runtime = folder / "disparity.pfm", folder / RUNTIME
+    if not disparity.is_file():
+        raise SepiError(f"{disparity}: no such file; run 'sepi depth --timing' again")
+    if scene not in runtimes and not runtime.is_file():
+        raise SepiError(f"{runtime}: no such file; run 'sepi depth --timing', or give --runtime {scene}=SECONDS")
+    return scene, Entry(disparity, runtimes[scene] if scene in runtimes else _read_seconds(runtime))
+
+
+def write_submission(path: str | Path, entries: Mapping[str, Entry], *, partial: bool = False) -> None:
+    """Write a submission atomically; equal content gives equal bytes.
+
+    Parameters
+    ----------
+    path : str or Path
+        Zip archive to write.
+    entries : mapping of str to Entry
+        Scene to entry.
+    partial : bool
+        Allow missing scenes.
+
+    Raises
+    ------
+    SepiError
+        If :func:`problems_of` finds a problem, or the archive cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from zipfile import ZipFile
+    >>> import numpy as np
+    >>> from sepi.io.pfm import write_pfm
+    >>> from sepi.extensions.benchmark.hci_submission import Entry, write_submission
+    >>> write_pfm(Path("disparity.pfm"), np.zeros((512, 512), np.float32))
+    >>> write_submission(Path("submission.zip"), {"cotton": Entry(Path("disparity.pfm"), 7.7)}, partial=True)
+    >>> ZipFile("submission.zip").namelist()
+    ['disp_maps/cotton.pfm', 'runtimes/cotton.txt']
+    """
+    path = require_path("submission", path)
+    require_type(f"{path}: entries", entries, Mapping, "scenes with their entries")
+    files: dict[str, bytes] = {}
+    for scene, entry in entries.items():
+        files[f"{MAPS}/{scene}.pfm"] = entry.disparity.read_bytes()
+        files[f"{RUNTIMES}/{scene}.txt"] = f"{entry.seconds:.10g}\n".encode()
+    with atomic_path(path) as temporary:
+        with zipfile.ZipFile(temporary, "w") as archive:
+            for name, content in sorted(files.items()):
+                # reproducible: no dates, and no compression, whose output depends on the library
+                info = zipfile.ZipInfo(name)
+                info.create_system, info.external_attr = 3, (stat.S_IFREG | 0o644) << 16
+                archive.writestr(info, content)
+        problems = problems_of(temporary, partial=partial)
+        if problems:
+            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+            raise SepiError(f"{path}: not written: {problems[0]}{more}")
+
+
+def problems_of(path: str | Path, *, partial: bool = False) -> list[str]:
+    """Problems of a submission.
+
+    Parameters
+    ----------
+    path : str or Path
+        Zip archive, or a folder with the same content.
+    partial : bool
+        Allow missing scenes.
+
+    Returns
+    -------
+    list of str
+        One line each, beginning with a name inside the submission or with ``path``; empty without problems.
+
+    Raises
+    ------
+    SepiError
+        If ``path`` does not exist or cannot be read.
+
+    Examples
+    --------
+    One scene's map is too small, and its run time is missing:
+
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from sepi.io.pfm import write_pfm
+    >>> from sepi.extensions.benchmark.hci_submission import problems_of
+    >>> write_pfm(Path("mine/disp_maps/dino.pfm"), np.zeros((384, 512), np.float32))
+    >>> for problem in problems_of(Path("mine"), partial=True):
+    ...     print(problem)
+    disp_maps/dino.pfm: 512x384 pixels; expected 512x512
+    runtimes/: no such folder with files of the benchmark's scenes
+    """
+    path = require_path("submission", path)
+    try:
+        if path.is_dir():
+            # files and folders of the first two levels
+            inner = {*path.glob("*/*"), *(entry for entry in path.iterdir() if not entry.is_dir())}
+            names = sorted(file.relative_to(path).as_posix() for file in inner)
+            return _strangers(names) + _problems_in(path, names, {}, partial)
+        if path.is_file():
+            return _problems_of_archive(path, partial)
+    except OSError as error:
+        raise SepiError(f"{path}: cannot be read ({error.strerror or error})") from error
+    raise SepiError(f"{path}: no such file or folder")
+
+
+def _problems_of_archive(path: Path, partial: bool) -> list[str]:
+    try:
+        archive = zipfile.ZipFile(path)
+    except (zipfile.BadZipFile, ValueError, OverflowError, struct.error, NotImplementedError) as error:
+        return [f"{path}: not a readable zip archive ({error})"]
+    with archive, tempfile.TemporaryDirectory(prefix="sepi-") as folder:
+        damaged = _unpack(archive, Path(folder))
+        names = archive.namelist()
+        twice = [f"{_shown(name)}: {count} files of this name" for name, count in Counter(names).items() if count > 1]
+        return twice + _strangers(names) + _problems_in(Path(folder), names, damaged, partial)
+
+
+def _unpack(archive: zipfile.ZipFile, folder: Path) -> dict[str, str]:
+    """Unpack only the files of a submission; returns name to problem for those that cannot be unpacked."""
+    damaged: dict[str, str] = {}
+    for part in _NAMES:
+        (folder / part).mkdir()
+    for info in archive.infolist():
+        if info.filename not in _EXPECTED:
+            continue
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            damaged[info.filename] = f"compressed by method {info.compress_type}; expected 'deflated' or none"
+        # zipfile never unpacks more than the declared size
+        elif problem := _size_problem(info.filename, info.file_size):
+            damaged[info.filename] = problem
+        else:
+            try:
+                (folder / info.filename).write_bytes(archive.read(info))
+            except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError, OSError) as error:
+                damaged[info.filename] = f"cannot be unpacked ({error})"
+    return damaged
+
+
+def _strangers(names: Collection[str]) -> list[str]:
+    """Problems with names that do not belong to a submission."""
+    # some programs write entries for folders, which are harmless
+    strange = {name: name.split("/") for name in names if name not in _EXPECTED and not name.endswith("/")}
+    # disp_maps/ and runtimes/ one level too low; macOS adds __MACOSX/
+    wrapping = {parts[0] for parts in strange.values() if parts[1:2] and parts[1] in _NAMES} - {"", "__MACOSX"}
+    lines = [f"{folder}/: expected {MAPS}/ and {RUNTIMES}/ at the root, not in this folder" for folder in wrapping]
+    others = [name for name, parts in strange.items() if parts[0] not in wrapping]
+    lines = sorted(map(_shown, lines))
+    lines += [f"{_shown(name)}: does not belong to a submission; leave it out" for name in others[:_MOST_LINES]]
+    more = len(others) - _MOST_LINES
+    return lines + ([f"...: {more} more files that do not belong"] if more > 0 else [])
+
+
+def _problems_in(folder: Path, names: Collection[str], damaged: Mapping[str, str], partial: bool) -> list[str]:
+    """Problems with the required files: ``names`` in ``folder``, and the reasons for the ``damaged`` ones."""
+    known = _EXPECTED.intersection(names)
+    problems = []
+    for part, expected in _NAMES.items():
+        if known.isdisjoint(expected):
+            problems.append(f"{part}/: no such folder with files of the benchmark's scenes")
+            continue
+        for name, *both in zip(expected, *_NAMES.values(), strict=True):
+            if name in known:
+                problem = damaged.get(name) or _problem_in(folder / name, name)
+            else:
+                problem = None if partial and known.isdisjoint(both) else "missing"
+            problems += [f"{name}: {problem}"] if problem else []
+    return problems
+
+
+def _problem_in(path: Path, name: str) -> str | None:
+    try:
+        if not name.startswith(MAPS):
+            _read_seconds(path)
+            return None
+        if problem := _size_problem(name, path.stat().st_size):
+            return problem
+        disparity = read_pfm(path)
+    except SepiError as error:
+        return str(error).removeprefix(f"{path}: ")
+    if disparity.shape != SHAPE:
+        return f"{disparity.shape[1]}x{disparity.shape[0]} pixels; expected {_PIXELS}"
+    unknown = np.count_nonzero(~np.isfinite(disparity))
+    return f"{unknown} of {disparity.size} values are not finite" if unknown else None
+
+
+def _read_seconds(path: Path) -> float:
+    if problem := _size_problem(RUNTIMES, path.stat().st_size):
+        raise SepiError(f"{path}: {problem}")
+    text = path.read_bytes().decode("ascii", "replace").strip()
+    try:
+        seconds = float(text)
+    except ValueError as error:
+        raise SepiError(f"{path}: expected the run time in seconds as a number, got {text!r}") from error
+    if not 0 < seconds < math.inf:
+        raise SepiError(f"{path}: expected a positive number of seconds, got {text}")
+    return seconds
+
+
+def _size_problem(name: str, size: int) -> str | None:
+    part = name.partition("/")[0]
+    what = {MAPS: f"a map of {_PIXELS} pixels", RUNTIMES: "one number"}[part]
+    return None if size <= _MOST_BYTES[part] else f"{size} bytes are too many for {what}"
+
+
+def _shown(name: str) -> str:
+    return name if name.isprintable() else ascii(name)

@@ -1,0 +1,199 @@
+"""The frame of rectified views: one pinhole, and the rectangle of pixels that the reference view fills.
+
+Pixels of the frame that another camera does not show are marked as missing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.camera.rig import Floats
+from sepi.errors import SepiError
+from sepi.extensions.cameras.model import CameraModel
+from sepi.extensions.cameras.plane import Plane
+from sepi.lightfield import MIN_SIZE
+
+# samples along the longer side for a first check, before single pixels
+_LATTICE = 80
+# largest distance of a sample outside a picture by rounding, pixels
+_OUTSIDE = 1e-3
+# least share of the frame that a view must show
+_LEAST_SHOWN = 0.1
+# largest growth of a picture by rectification; very wide fisheyes grow by a few times
+_MOST_LARGER = 16.0
+# least share of the reference picture's sides in the frame
+_LEAST_PART = 0.1
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Pixels of the rectified views.
+
+    Attributes
+    ----------
+    focal : float
+        Focal length, pixels.
+    principal : (float, float)
+        Principal point ``(x, y)`` of the reference view in the frame.
+    offset : float
+        Shift of a view's principal point to the right for each view step to the right, pixels: the views' shear.
+    shape : (int, int)
+        Height and width.
+    """
+
+    focal: float
+    principal: tuple[float, float]
+    offset: float
+    shape: tuple[int, int]
+
+    @property
+    def corners(self) -> Floats:
+        """Corners ``(y, x)`` from the principal point, (4, 2)."""
+        (height, width), (x, y) = self.shape, self.principal
+        return np.array([(v - y, u - x) for v in (0, height - 1) for u in (0, width - 1)], np.float64)
+
+
+class Seeing:
+    """Positions of rectified views' pixels in the original pictures."""
+
+    def __init__(self, model: CameraModel, plane: Plane, zoom: Floats) -> None:
+        self.model, self.plane, self.zoom = model, plane, zoom
+        self.focal = float(np.median([sum(shot.lens.focal) / 2 for shot in model.shots]))
+        self.principal = model.shots[plane.reference].lens.principal
+        self.offset = self._offset()
+
+    def rays(self, view: int, pixels: Floats) -> Floats:
+        """Rays (N, 3), in the axes of the plane, of pixels ``(x, y)`` in the reference's original picture."""
+        shifted = pixels - self.principal - self.offset * self.plane.baselines[view, ::-1]
+        return np.column_stack([shifted / (self.focal * self.zoom[view]), np.ones(len(pixels))])
+
+    def pixels(self, view: int, pixels: Floats) -> Floats:
+        """Positions ``(x, y)`` of these pixels in the view's original picture, (N, 2); NaN outside."""
+        shot = self.model.shots[view]
+        seen = shot.lens.project(self.rays(view, pixels) @ (shot.rotation @ self.plane.rotation.T).T)
+        size = np.array([shot.lens.width, shot.lens.height])
+        with np.errstate(invalid="ignore"):
+            inside = ((seen >= -_OUTSIDE) & (seen <= size - 1 + _OUTSIDE)).all(axis=1)
+        return np.where(np.asarray(inside)[:, None], np.clip(seen, 0, size - 1), np.nan)
+
+    def has(self, view: int, pixels: Floats) -> npt.NDArray[np.bool_]:
+        """Mask of the pixels that a view shows."""
+        return np.isfinite(self.pixels(view, pixels)[:, 0])
+
+    def _from_picture(self, view: int, pixels: Floats) -> Floats:
+        """Pixels ``(x, y)`` from the principal point, without shear, of pixels in the view's original picture."""
+        shot = self.model.shots[view]
+        rays = shot.lens.rays(pixels) @ (shot.rotation @ self.plane.rotation.T)
+        return self.focal * rays[:, :2] / np.maximum(rays[:, 2:], 1e-3)
+
+    def _offset(self) -> float:
+        """The shear that aligns the middles of the pictures, by least squares."""
+        middles = []
+        for n, shot in enumerate(self.model.shots):
+            middle = np.array([[(shot.lens.width - 1) / 2, (shot.lens.height - 1) / 2]])
+            middles.append(self._from_picture(n, middle)[0])
+        at = self.plane.baselines[:, ::-1]
+        apart = at - at.mean(axis=0)
+        return -float((apart * np.array(middles)).sum() / (apart**2).sum())
+
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Least and largest pixel ``(x, y)`` of the reference's original picture."""
+        reached = self._from_picture(self.plane.reference, self.model.shots[self.plane.reference].lens.border())
+        reached = reached + self.principal
+        return np.ceil(reached.min(axis=0) - _OUTSIDE), np.floor(reached.max(axis=0) + _OUTSIDE)
+
+
+def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
+    """The largest frame that the reference view fills, and the views that show enough of it.
+
+    Raises
+    ------
+    SepiError
+        If hardly anything of the frame is left.
+    """
+    low, high = seeing.bounds()
+    number, own = len(seeing.model.shots), seeing.plane.reference
+    reference = seeing.model.shots[own]
+    larger = float((high - low).max()) / max(reference.lens.width, reference.lens.height)
+    if not larger <= _MOST_LARGER:
+        large = f"{larger:.3g} times as large" if np.isfinite(larger) else "without bounds"
+        raise SepiError(
+            f"{seeing.model.path}: {reference.name}: would be {large} once rectified; expected "
+            "focal lengths and distortion that fit its size, and are much the same for all cameras"
+        )
+    stride = max(1.0, float((high - low).max()) / _LATTICE)
+    counts = np.maximum(2, np.ceil((high - low) / stride).astype(int) + 1)
+    across, down = (np.round(np.linspace(low[n], high[n], counts[n])) for n in (0, 1))
+    lattice = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2).astype(np.float64)
+    part = largest_rectangle(seeing.has(own, lattice).reshape(len(down), len(across)))
+    if part is not None:
+        top, bottom, left, right = part
+        box = _grown(seeing, (down[top], down[bottom], across[left], across[right]), stride)
+        height, width = int(box[1] - box[0]) + 1, int(box[3] - box[2]) + 1
+        within = lattice[((lattice >= (box[2], box[0])) & (lattice <= (box[3], box[1]))).all(axis=1)]
+        kept = [n for n in range(number) if n == own or seeing.has(n, within).mean() >= _LEAST_SHOWN]
+        if (
+            len(kept) > 1
+            and min(height / reference.lens.height, width / reference.lens.width) >= _LEAST_PART
+            and min(height, width) >= MIN_SIZE
+        ):
+            principal = seeing.principal[0] - box[2], seeing.principal[1] - box[0]
+            return Frame(seeing.focal, principal, seeing.offset, (height, width)), kept
+    raise SepiError(
+        f"{seeing.model.path}: the cameras share hardly anything of the picture of {reference.name}; they look in too "
+        "different directions, or stand too far apart"
+    )
+
+
+def largest_rectangle(inside: npt.NDArray[np.bool_]) -> tuple[int, int, int, int] | None:
+    """First and last row, first and last column of the largest rectangle of true values; None without any."""
+    best, area = None, 0
+    heights = np.zeros(inside.shape[1] + 1, int)
+    for row, line in enumerate(inside):
+        heights[:-1] = np.where(line, heights[:-1] + 1, 0)
+        open_at: list[tuple[int, int]] = []
+        for column, height in enumerate(heights.tolist()):
+            begin = column
+            while open_at and open_at[-1][1] >= height:
+                begin, tall = open_at.pop()
+                if tall * (column - begin) > area:
+                    area, best = tall * (column - begin), (row - tall + 1, row, begin, column - 1)
+            open_at.append((begin, height))
+    return best
+
+
+def _grown(seeing: Seeing, box: tuple[float, float, float, float], stride: float) -> tuple[float, float, float, float]:
+    """A box ``(top, bottom, left, right)`` grown or shrunk at its sides to the pixels that the reference view has."""
+
+    def line(side: int, now: list[float]) -> Floats:
+        at = now[side]
+        if side < 2:
+            along = np.arange(now[2], now[3] + 1)
+            return np.column_stack([along, np.full(len(along), at)])
+        along = np.arange(now[0], now[1] + 1)
+        return np.column_stack([np.full(len(along), at), along])
+
+    def seen(side: int, now: list[float]) -> bool:
+        return bool(seeing.has(seeing.plane.reference, line(side, now)).all())
+
+    now, outward = list(box), (-1, 1, -1, 1)
+    # for a side that bulges between the samples
+    for _ in range(int(2 * stride) + 2):
+        short = [side for side in range(4) if not seen(side, now)]
+        if not short:
+            break
+        for side in short:
+            now[side] -= outward[side]
+    growing = set(range(4))
+    for _ in range(int(stride) + 1):
+        for side in sorted(growing):
+            tried = list(now)
+            tried[side] += outward[side]
+            if seen(side, tried):
+                now = tried
+            else:
+                growing.discard(side)
+    return now[0], now[1], now[2], now[3]

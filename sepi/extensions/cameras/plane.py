@@ -1,0 +1,137 @@
+"""The plane through the cameras: their common axes, positions in view steps, and the effect of standing off it.
+
+A camera at ``dz`` in front of the reference camera, with the focal length ``f (1 - dz / Z0)``, sees a point at depth
+``Z`` at ``k = (1 - dz / Z0) / (1 - dz / Z)`` times the distance from the principal point that a camera in the plane
+sees. This factor is 1 at the depth ``Z0`` in the middle of the scene, and close to 1 near it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sepi.camera.rig import Floats
+from sepi.errors import SepiError
+from sepi.extensions.cameras.grid import grid_of
+from sepi.extensions.cameras.model import CameraModel
+
+# extent of the cameras' positions across a row, relative to that along it, from which the plane's slope is known
+_ROW = 0.02
+# least angle between motion and viewing direction, degrees
+_LEAST_ANGLE = 45.0
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Positions of the cameras in the axes of the rectified views.
+
+    Attributes
+    ----------
+    rotation : ndarray, shape (3, 3), float64
+        From the world's axes to those of the views: x and y in the plane, z along the viewing direction.
+    places : ndarray, shape (N, 3), float64
+        Positions from the reference camera, in these axes and the world's units.
+    reference : int
+    step : float
+        Median distance from a camera to the next, in the plane.
+    """
+
+    rotation: Floats
+    places: Floats
+    reference: int
+    step: float
+
+    @property
+    def baselines(self) -> Floats:
+        """``(down, across)`` of each camera from the reference camera, in view steps; (N, 2)."""
+        return self.places[:, 1::-1] / self.step
+
+
+def plane_through(model: CameraModel, reference: int | None) -> Plane:
+    """The plane through the cameras by least squares; the most central camera is the reference unless one is given.
+
+    Raises
+    ------
+    SepiError
+        If the cameras move along their viewing direction instead of sideways.
+    """
+    centres = model.centres
+    middle = centres.mean(axis=0)
+    looking = _unit(model.axes.mean(axis=0))
+    off = centres - middle
+    ahead = off @ looking
+    beside = off - ahead[:, None] * looking
+    # the plane's slope, damped, since cameras in a row do not determine it across the row
+    damping = len(off) * (_ROW * np.linalg.norm(np.ptp(off, axis=0))) ** 2
+    slope = np.linalg.solve(beside.T @ beside + damping * np.eye(3), beside.T @ ahead)
+    # medians, since a single camera off the plane is left out later
+    angle = np.degrees(np.arctan2(np.median(np.linalg.norm(beside, axis=1)), np.median(np.abs(ahead))))
+    if angle < _LEAST_ANGLE:
+        raise SepiError(
+            f"{model.path}: the cameras move along their viewing direction (at {angle:.0f} degrees to it); expected "
+            f"them to move sideways, at {_LEAST_ANGLE:.0f} to 90 degrees"
+        )
+    z = _unit(looking - slope)
+    right = np.mean([shot.rotation[0] for shot in model.shots], axis=0)
+    x = _unit(right - z * (right @ z))
+    rotation = np.stack([x, np.cross(z, x), z])
+    flat = (centres - middle) @ rotation.T
+    if reference is None:
+        centre = (flat[:, :2].max(axis=0) + flat[:, :2].min(axis=0)) / 2
+        # the first of equally central ones, up to rounding
+        distance = np.linalg.norm(flat[:, :2] - centre, axis=1)
+        reference = int(np.flatnonzero(distance <= distance.min() + 1e-6 * float(np.ptp(flat[:, :2])))[0])
+    step = _median_step(flat[:, :2])
+    if step <= 0:
+        raise SepiError(f"{model.path}: the cameras stand one behind the other; expected them side by side")
+    return Plane(rotation, flat - flat[reference], reference, step)
+
+
+def _median_step(places: Floats) -> float:
+    """Median distance of cameras along x in a row, along y without rows; to the nearest without a grid."""
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+    np.fill_diagonal(apart, np.inf)
+    step = float(np.median(apart.min(axis=1)))
+    if step <= 0:
+        return step
+    at = grid_of(places[:, ::-1] / step)
+    for axis in (1, 0):
+        ahead = at[None] - at[:, None]
+        here, there = np.nonzero((ahead[..., axis] == 1) & (ahead[..., 1 - axis] == 0))
+        if len(here) and np.ptp(at[:, axis]):
+            along = places[there, 1 - axis] - places[here, 1 - axis]
+            if np.median(along) > 0:
+                return float(np.median(along))
+    return step
+
+
+def _unit(vector: Floats) -> Floats:
+    return np.asarray(vector / np.linalg.norm(vector), np.float64)
+
+
+def zooms(plane: Plane, inverse_depths: tuple[float, float]) -> Floats:
+    """Focal length of each view as a multiple of the reference's, (N,)."""
+    return 1 - plane.places[:, 2] * sum(inverse_depths) / 2
+
+
+def disparity_errors(plane: Plane, inverse_depths: tuple[float, float], corners: Floats, focal: float) -> Floats:
+    """Greatest disparity error from a camera's distance to the reference camera's plane, (N,), pixels per view step.
+
+    Parameters
+    ----------
+    plane : Plane
+    inverse_depths : (float, float)
+        Of the farthest and the nearest surface.
+    corners : ndarray, shape (4, 2), float64
+        Corners ``(y, x)`` of the reference view from its principal point, pixels.
+    focal : float
+        Pixels.
+    """
+    zoom, worst = zooms(plane, inverse_depths), np.zeros(len(plane.places))
+    for inverse in inverse_depths:
+        scaled = zoom / np.maximum(1 - plane.places[:, 2] * inverse, 1e-9)
+        moved = focal * plane.step * inverse * plane.baselines
+        off = np.abs(scaled - 1) * np.linalg.norm(corners[:, None] - moved, axis=2).max(axis=0)
+        worst = np.maximum(worst, off)
+    return np.asarray(worst / np.maximum(1, np.abs(plane.baselines).max(axis=1)), np.float64)

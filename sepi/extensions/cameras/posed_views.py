@@ -1,0 +1,310 @@
+"""Views with camera poses, depth and points, for COLMAP and nerfstudio."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.camera import Camera
+from sepi.camera.rig import Rig
+from sepi.errors import SepiError
+from sepi.extensions.cameras.camera_poses import CameraPoses, Points, camera_poses, nominal_camera
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
+from sepi.matching.carried_map import carried_map, carried_values
+
+Colours = npt.NDArray[np.uint8]
+
+Surfaces = Callable[[tuple[int, int]], FloatMap]
+"""Function from a grid position to that view's disparity, (H, W) float32, NaN where unknown."""
+
+MAX_POINTS = 10000
+"""Default of the most points; each has a track through all views that see it."""
+
+# largest difference of one surface's positions in a view, pixels
+_APART = 1.0
+
+
+@dataclass(frozen=True)
+class PosedViews:
+    """A light field as single pictures with cameras, and the known geometry of the scene.
+
+    Attributes
+    ----------
+    light_field : LightField
+    camera : Camera
+        The given camera, the light field's own, or a nominal one.
+    metric : bool
+        Whether positions and depth are in metres; False with a nominal camera.
+    poses : CameraPoses
+    disparity : ndarray, shape (H, W), float32
+        Of the reference view, pixels per view step.
+    known : ndarray, shape (H, W), bool
+        Pixels of the reference view that have a depth.
+    chosen : ndarray, shape (H, W), bool
+        Pixels of the reference view that have a point.
+    surfaces : callable or None
+        Disparity of the other views; None: the reference view's, warped to them.
+    rig : Rig or None
+        Poses in the world of the calibrated cameras; None: poses in the reference view's axes.
+    sigma : ndarray, shape (H, W), float32, or None
+        Standard deviation of the reference view's disparity, pixels per view step; None without error bars.
+    sigmas : callable or None
+        Standard deviation of the other views, if ``surfaces`` gives their disparity.
+    """
+
+    light_field: LightField
+    camera: Camera
+    metric: bool
+    poses: CameraPoses
+    disparity: FloatMap
+    known: BoolMap
+    chosen: BoolMap
+    surfaces: Surfaces | None = None
+    rig: Rig | None = None
+    sigma: FloatMap | None = None
+    sigmas: Surfaces | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each view by its row and column, such as ``view_04_04``."""
+        digits = max(2, *(len(str(size - 1)) for size in self.light_field.grid))
+        return tuple(f"view_{t:0{digits}d}_{s:0{digits}d}" for t, s in self.poses.positions.tolist())
+
+    @property
+    def units(self) -> str:
+        """Units of positions and depth, in a few words."""
+        if self.rig is not None:
+            return self.rig.units
+        return "metres" if self.metric else "nominal units, not to scale, since the camera is unknown"
+
+    @property
+    def rotation(self) -> Points:
+        """Rotation from the world's axes to those of all cameras, (3, 3)."""
+        return np.eye(3) if self.rig is None else self.rig.rotation
+
+    def in_world(self, points: Points) -> Points:
+        """World coordinates of points (P, 3) in the reference view's axes."""
+        return points if self.rig is None else self.rig.to_world(points)
+
+    @property
+    def points(self) -> Points:
+        """The points (P, 3): x right, y down, z forward, from the reference view's camera."""
+        depth = self.camera.scale / (self.disparity[self.chosen].astype(np.float64) + self.camera.offset)
+        return self.poses.points_at(np.argwhere(self.chosen).astype(np.float64), depth)
+
+    @property
+    def colours(self) -> Colours:
+        """Colours of the points, (P, 3) RGB."""
+        return self.picture(self.poses.reference)[self.chosen]
+
+    def picture(self, view: int) -> Colours:
+        """A view as RGB of 8 bits, which all programs read; shape (H, W, 3)."""
+        t, s = self.poses.positions[view]
+        pixels = self.light_field.rgb_views[t, s]
+        if pixels.dtype == np.uint8:
+            return np.asarray(pixels, np.uint8)
+        return np.rint(255 * np.clip(as_unit_float(pixels), 0, 1)).astype(np.uint8)
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether a view has missing pixels."""
+        return self.light_field.missing is not None
+
+    def shown(self, view: int) -> BoolMap:
+        """Mask of the pixels that a view shows, (H, W)."""
+        missing = self.light_field.missing
+        if missing is None:
+            return np.ones(self.light_field.shape, bool)
+        t, s = self.poses.positions[view]
+        return np.asarray(~missing[t, s])
+
+    def carried(self, view: int) -> FloatMap:
+        """Disparity of a view, (H, W) float32; NaN at unknown and missing pixels."""
+        carried = self._carried(view)
+        return np.where(self.shown(view), carried, np.float32(np.nan)) if self.incomplete else carried
+
+    def _carried(self, view: int) -> FloatMap:
+        if view == self.poses.reference:
+            return np.where(self.known, self.disparity, np.float32(np.nan))
+        if self.surfaces is None:
+            down, across = self.poses.baselines[view].tolist()
+            return carried_map(self.disparity, (down, across), self.known)
+        t, s = self.poses.positions[view].tolist()
+        return self.surfaces((t, s))
+
+    def depth(self, carried: FloatMap) -> FloatMap:
+        """Depth of a view, (H, W) float32, from its :meth:`carried` disparity; 0 where unknown."""
+        depth = self.camera.depth(carried)
+        return np.where(np.isfinite(depth) & ~np.isnan(carried), depth, np.float32(0))
+
+    @property
+    def sure(self) -> bool:
+        """Whether all views have a :meth:`depth_sigma`."""
+        return self.sigma is not None and (self.surfaces is None or self.sigmas is not None)
+
+    def depth_sigma(self, view: int, carried: FloatMap) -> FloatMap:
+        """Standard deviation of the depth of a view, (H, W) float32, given its :meth:`carried` disparity; 0 without
+        depth. For views that are :attr:`sure`.
+        """
+        sigma = self._carried_sigma(view)
+        return np.where(self.depth(carried) > 0, self.camera.depth_sigma(carried, sigma), np.float32(0))
+
+    def _carried_sigma(self, view: int) -> FloatMap:
+        assert self.sigma is not None
+        if view == self.poses.reference:
+            return self.sigma
+        if self.sigmas is None:
+            down, across = self.poses.baselines[view].tolist()
+            return carried_values(self.disparity, self.sigma, (down, across), self.known)
+        t, s = self.poses.positions[view].tolist()
+        return self.sigmas((t, s))
+
+    def pixel_errors(self, sees: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
+        """Expected reprojection error of the points, mean over views, (P,), pixels; 0 where unknown.
+
+        Parameters
+        ----------
+        sees : ndarray, shape (N, P), bool
+            Whether a view sees a point.
+        """
+        if self.sigma is None:
+            return np.zeros(sees.shape[1])
+        # an error of sigma per view step grows with the view's distance
+        steps = np.linalg.norm(self.poses.baselines, axis=1)
+        mean = (sees * steps[:, None]).sum(axis=0) / np.maximum(sees.sum(axis=0), 1)
+        return np.asarray(self.sigma[self.chosen].astype(np.float64) * mean)
+
+    def normals(self, view: int, carried: FloatMap) -> FloatMap:
+        """Unit normals of a view's surfaces in its camera's axes, towards it, (3, H, W) float32; 0 without depth.
+
+        Inverse depth, and so disparity, is linear on a plane, so its slopes give the normal exactly.
+        """
+        down, across = (_slopes(carried, axis) for axis in (0, 1))
+        x, y = self.poses.principal_points[view]
+        row, column = np.indices(carried.shape)
+        ahead = carried + self.camera.offset - across * (column - x) - down * (row - y)
+        facing = -np.stack([self.poses.focal_px * across, self.poses.focal_px * down, ahead])
+        known = (self.depth(carried) > 0) & np.isfinite(facing).all(axis=0)
+        length = np.linalg.norm(facing, axis=0)
+        return np.where(known, facing / np.where(known, length, 1), 0).astype(np.float32)
+
+    def sees(self, view: int, carried: FloatMap) -> npt.NDArray[np.bool_]:
+        """Points that a view sees, (P,), given its :meth:`carried` disparity: those inside it that nothing nearer
+        occludes.
+        """
+        baseline, disparity = self.poses.baselines[view], self.disparity[self.chosen].astype(np.float64)
+        there = np.argwhere(self.chosen) - disparity[:, None] * baseline
+        inside = ((there > -0.5) & (there < np.array(carried.shape) - 0.5)).all(axis=1)
+        # positions outside may exceed integers
+        rows, columns = np.rint(np.where(inside[:, None], there, 0)).astype(np.int64).T
+        # comparison with NaN is false, so unknown pixels see no points
+        nearer = (carried[rows, columns] - disparity) * float(np.abs(baseline).max())
+        return np.asarray(inside & (nearer <= _APART), bool)
+
+
+def posed_views(
+    light_field: LightField,
+    disparity: FloatMap,
+    confidence: FloatMap | None = None,
+    *,
+    unknown: BoolMap | None = None,
+    camera: Camera | None = None,
+    min_confidence: float | None = None,
+    max_points: int = MAX_POINTS,
+    surfaces: Surfaces | None = None,
+    sigma: FloatMap | None = None,
+    sigmas: Surfaces | None = None,
+) -> PosedViews:
+    """The posed views of a light field with the disparity map of its reference view.
+
+    Parameters
+    ----------
+    light_field : LightField
+    disparity : ndarray, shape (H, W), float32
+        Disparity of its reference view, pixels per view step.
+    confidence : ndarray, shape (H, W), float32, optional
+        0..1; default: 1.
+    unknown : ndarray, shape (H, W), bool, optional
+        Pixels without depth.
+    camera : Camera, optional
+        Default: the light field's own, or a nominal one.
+    min_confidence : float, optional
+        Least confidence of points. Default: points at the surer half of all pixels with a depth, by ``sigma`` if given,
+        else by the confidence.
+    max_points : int
+        Most points, on every n-th row and column.
+    surfaces : callable, optional
+        Disparity of the other views; default: the map, warped to them.
+    sigma : ndarray, shape (H, W), float32, optional
+        Standard deviation of the disparity, pixels per view step.
+    sigmas : callable, optional
+        Standard deviation of the other views; needed with ``surfaces`` for the error of their depth.
+
+    Raises
+    ------
+    SepiError
+        If a map has another shape than the views, or a number is out of bounds.
+    """
+    given = {"disparity": disparity, "confidence": confidence, "unknown": unknown, "sigma": sigma}
+    for name, values in given.items():
+        if values is not None and values.shape != light_field.shape:
+            raise SepiError(f"{light_field.name}: {name} is {values.shape}, the views {light_field.shape}")
+    if min_confidence is not None and not 0 <= min_confidence <= 1:
+        raise SepiError(f"{light_field.name}: expected a least confidence within 0..1, got {min_confidence:g}")
+    if max_points < 0:
+        raise SepiError(f"{light_field.name}: expected 0 points or more, got {max_points}")
+    known = np.isfinite(disparity)
+    if unknown is not None:
+        known &= ~unknown
+    own = camera or light_field.camera
+    used = own or nominal_camera(disparity, known)
+    depth = used.depth(disparity)
+    known &= np.isfinite(depth) & (depth > 0)
+    return PosedViews(
+        light_field=light_field,
+        camera=used,
+        metric=own is not None,
+        poses=camera_poses(light_field, used),
+        disparity=disparity,
+        known=known,
+        chosen=_thinned(_surer(known, confidence, min_confidence, sigma), max_points),
+        surfaces=surfaces,
+        rig=light_field.reference_rig if camera is None else None,
+        sigma=sigma,
+        sigmas=sigmas,
+    )
+
+
+def _slopes(disparity: FloatMap, axis: int) -> npt.NDArray[np.float64]:
+    """Change of disparity from pixel to pixel along an axis, to the neighbour that differs less; 0 without any."""
+    steps = np.diff(disparity.astype(np.float64), axis=axis)
+    ends = np.full((1, steps.shape[1]) if axis == 0 else (steps.shape[0], 1), np.nan)
+    before, after = np.concatenate([ends, steps], axis), np.concatenate([steps, ends], axis)
+    # differences from unknown pixels are infinite
+    size_before, size_after = (np.nan_to_num(np.abs(slope), nan=np.inf) for slope in (before, after))
+    return np.nan_to_num(np.where(size_before <= size_after, before, after))
+
+
+def _surer(known: BoolMap, confidence: FloatMap | None, least: float | None, sigma: FloatMap | None) -> BoolMap:
+    """The known pixels with enough confidence for a point."""
+    if sigma is not None and least is None and known.any():
+        # by sigma, since many pixels share the largest confidence
+        return known & (sigma <= np.median(sigma[known]))
+    if confidence is None or not known.any():
+        return known
+    # unknown confidence counts as 0
+    sureness = np.nan_to_num(confidence, nan=-1.0)
+    return known & (sureness >= (np.median(sureness[known]) if least is None else least))
+
+
+def _thinned(sure: BoolMap, most: int) -> BoolMap:
+    """At most this number of the pixels: those on every n-th row and column, with the smallest possible n."""
+    step = 1
+    while sure[step // 2 :: step, step // 2 :: step].sum() > most:
+        step += 1
+    chosen = np.zeros_like(sure)
+    chosen[step // 2 :: step, step // 2 :: step] = sure[step // 2 :: step, step // 2 :: step]
+    return chosen

@@ -1,0 +1,189 @@
+"""Rectifies calibrated cameras to a light field: views of parallel cameras in one plane.
+
+The steps: the plane through the cameras (``plane``), the picture of the reference view
+(``frame``), the views themselves (``resampling``), and a grid for them
+(``grid``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sepi.camera import Camera
+from sepi.camera.rig import Floats, Rectified, Rig
+from sepi.errors import SepiError
+from sepi.exposure import equally_bright
+from sepi.extensions.cameras.frame import Frame, Seeing, frame_of
+from sepi.extensions.cameras.grid import grid_of
+from sepi.extensions.cameras.model import CameraModel
+from sepi.extensions.cameras.plane import Plane, disparity_errors, plane_through, zooms
+from sepi.extensions.cameras.resampling import completed, rectified_view
+from sepi.io.files import name_of
+from sepi.lightfield import DisparityRange, LightField
+
+# disparity errors from which a note mentions them, and from which a view is left out, pixels per view step
+_TOLD, _TOO_MUCH = 0.1, 0.5
+# least number of views that may remain
+_FEWEST = 3
+# share of the points beyond each end of the range, margin relative to the range, and least margin, pixels
+_BEYOND, _MARGIN, _LEAST_MARGIN = 0.005, 0.06, 0.1
+# least parallax between the farthest and the nearest point for depth, pixels in the farthest view
+_NOTHING = 0.05
+
+
+@dataclass(frozen=True)
+class Rectification:
+    """Result of rectifying the cameras, before any picture is read."""
+
+    model: CameraModel
+    plane: Plane
+    frame: Frame
+    seeing: Seeing
+    inverse_depths: tuple[float, float] | None
+    errors: Floats
+    notes: tuple[str, ...]
+
+
+def rectification_of(
+    model: CameraModel, reference: str | None = None, inverse_depths: tuple[float, float] | None = None
+) -> Rectification:
+    """Find plane, orientation, pinhole and frame of calibrated cameras.
+
+    Parameters
+    ----------
+    model : CameraModel
+    reference : str, optional
+        Name of the picture whose depth is estimated; default: the most central one.
+    inverse_depths : (float, float), optional
+        Inverse depth of the farthest and the nearest surface from the reference camera; default: by the model's points.
+
+    Raises
+    ------
+    SepiError
+        If the cameras do not suit a light field.
+    """
+    model.require_sound()
+    notes = list(model.notes)
+    while True:
+        chosen = None if reference is None else model.named(reference)[0]
+        plane = plane_through(model, chosen)
+        known = inverse_depths or _of_points(model, plane)
+        seeing = Seeing(model, plane, zooms(plane, known or (0.0, 0.0)))
+        # the error of a camera off the plane depends on the frame, and the frame on the remaining cameras
+        frame, kept = frame_of(seeing)
+        errors = (
+            np.zeros(len(model.shots)) if known is None else disparity_errors(plane, known, frame.corners, frame.focal)
+        )
+        worst = int(errors.argmax())
+        if len(kept) < len(model.shots):
+            left = [shot.name for n, shot in enumerate(model.shots) if n not in kept]
+            notes.append(f"left out, since they look elsewhere: {', '.join(left)}")
+            reference = model.shots[plane.reference].name
+            model = model.of(kept)
+        elif errors[worst] > _TOO_MUCH:
+            name = model.shots[worst].name
+            if len(model.shots) <= _FEWEST:
+                raise SepiError(
+                    f"{model.path}: the cameras do not stand in a plane: {name} is so far off that the disparity error "
+                    f"is {errors[worst]:.2g} pixels; expected at most {_TOO_MUCH:g}"
+                )
+            notes.append(
+                f"left out, since it stands {_off(plane, worst)}: {name} (disparity error {errors[worst]:.2g} pixels)"
+            )
+            model = model.of([n for n in range(len(model.shots)) if n != worst])
+        else:
+            break
+        if len(model.shots) < 2:
+            raise SepiError(f"{model.path}: expected at least two cameras, too few are left: {'; '.join(notes)}")
+    return Rectification(model, plane, frame, seeing, known, errors, (*notes, *_told(plane, errors, known)))
+
+
+def _off(plane: Plane, view: int) -> str:
+    ahead = plane.places[view, 2] / plane.step
+    return f"{abs(ahead):.2g} steps {'before' if ahead > 0 else 'behind'} the others"
+
+
+def _told(plane: Plane, errors: Floats, known: tuple[float, float] | None) -> tuple[str, ...]:
+    places = plane.places[:, 2] - plane.places[:, 2].mean()
+    flat = f"the cameras stand within {float(np.abs(places).max()) / plane.step:.2g} view steps of a plane"
+    if known is None:
+        return (flat,)
+    off = "; mind this if hundredths of a pixel matter" if errors.max() > _TOLD else ""
+    return (f"{flat}, so disparity errors over the scene's depth are at most {errors.max():.2g} pixels{off}",)
+
+
+def _of_points(model: CameraModel, plane: Plane) -> tuple[float, float] | None:
+    """Inverse depths of the farthest and the nearest point (of nearly all) in front of the reference camera."""
+    if not len(model.points):
+        return None
+    shot = model.shots[plane.reference]
+    seen = (model.points - shot.centre) @ plane.rotation.T
+    shown = np.isfinite(shot.lens.project((model.points - shot.centre) @ shot.rotation.T)[:, 0])
+    depth = seen[shown & (seen[:, 2] > 0), 2]
+    if not len(depth):
+        return None
+    low, high = (float(value) for value in np.quantile(1 / depth, (_BEYOND, 1 - _BEYOND)))
+    moved = (high - low) * float(np.abs(plane.baselines).max()) * plane.step * max(shot.lens.focal)
+    if len(depth) > 1 and moved < _NOTHING:
+        raise SepiError(
+            f"{model.path}: the cameras stand too close together for the scene: its points move by {moved:.2g} pixels "
+            "at most; expected a longer baseline (are positions and points in the same unit?)"
+        )
+    return low, high
+
+
+def light_field_of(found: Rectification) -> LightField:
+    """The rectified views as a light field of equal brightness, with the pictures read and resampled."""
+    model, plane, frame = found.model, found.plane, found.frame
+    pictures, absent = zip(*(rectified_view(found.seeing, frame, n) for n in range(len(model.shots))), strict=True)
+    channels = {picture.shape[2] for picture in pictures}
+    views = np.stack([np.broadcast_to(p, (*p.shape[:2], max(channels))) if len(channels) > 1 else p for p in pictures])
+    at = grid_of(plane.baselines)
+    rows, columns = (at.max(axis=0) + 1).tolist()
+    grid = np.zeros((rows, columns, *views.shape[1:]), np.float32)
+    present, positions = np.zeros((rows, columns), bool), np.zeros((rows, columns, 2))
+    missing = np.zeros(grid.shape[:4], bool)
+    for (t, s), view, lacking, baseline in zip(at.tolist(), views, absent, plane.baselines, strict=True):
+        grid[t, s], missing[t, s] = completed(view, lacking), lacking
+        # a mask may leave no pixels
+        present[t, s], positions[t, s] = not lacking.all(), baseline
+    view = tuple(at[plane.reference].tolist())
+    scale = plane.step * frame.focal
+    light_field = LightField(
+        grid,
+        name_of(model.path).name,
+        source=str(model.path),
+        present=present,
+        view=None if view == (rows // 2, columns // 2) else (view[0], view[1]),
+        positions=positions,
+        disparity_range=_range(found, scale),
+        settled=True,
+        notes=found.notes,
+        missing=missing if missing.any() else None,
+        rig=Rig(
+            plane.rotation,
+            model.shots[plane.reference].centre,
+            plane.step,
+            model.units,
+            {
+                (int(t), int(s)): Rectified(shot, float(zoom))
+                for (t, s), shot, zoom in zip(at.tolist(), model.shots, found.seeing.zoom, strict=True)
+            },
+        ),
+    )
+    down, across = light_field.from_centre
+    (x, y), (height, width) = frame.principal, frame.shape
+    # the camera's principal point is that of the grid's centre view
+    right = float(x - (width - 1) / 2 - across * frame.offset)
+    below = float(y - (height - 1) / 2 - down * frame.offset)
+    return equally_bright(replace(light_field, camera=Camera(scale, frame.offset, frame.focal, right, below)))
+
+
+def _range(found: Rectification, scale: float) -> DisparityRange | None:
+    if found.inverse_depths is None:
+        return None
+    low, high = (scale * inverse - found.frame.offset for inverse in found.inverse_depths)
+    margin = max(_MARGIN * (high - low), _LEAST_MARGIN)
+    return DisparityRange(round(low - margin, 3), round(high + margin, 3), "parameters")

@@ -1,0 +1,358 @@
+"""Consistent disparity maps of all views of a light field.
+
+A few source maps cover what nearly all views see: that of the reference view, and those of the views farthest from it
+in each diagonal direction, which see what is occluded in it. Each source map is warped to a view as a surface
+(:mod:`sepi.matching.carried_map`). Where source maps differ, they vote: maps that show a surface vote for it, maps
+that see through it to what is behind vote against it, as in the fusion of [1]_. Pixels that no map shows take the
+disparity of the farther adjacent surface. Last, each view decides which side its pixels at depth steps belong to
+(:mod:`sepi.boundaries.decision`), since a warped outline is only accurate to a pixel.
+
+References
+----------
+.. [1] Merrell et al.: Real-Time Visibility-Based Fusion of Depth Maps. ICCV 2007. doi:10.1109/ICCV.2007.4408984
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import NoneType
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sepi.built_in_variants import DEFAULT_VARIANT
+from sepi.errors import SepiError
+from sepi.kernels import all_views as kernels
+from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
+from sepi.matching.carried_map import TOLERANCE, corner_disparities
+from sepi.pipeline import estimate_depth
+from sepi.stage import ERROR_BARS, Progress, StageMaps, no_progress
+from sepi.validation import require_type
+from sepi.variants import Variant
+
+EDGE_VIEWS = 25
+"""Least number of views with which each view is compared at its depth steps."""
+
+_AT_ONCE = 8  # views made at a time; their maps are held beside the sources
+_CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
+
+
+class Sources(NamedTuple):
+    """The source maps.
+
+    Attributes
+    ----------
+    disparity, confidence : ndarray, shape (N, H, W), float32
+        Pixels per view step; 0..1.
+    bars : ndarray, shape (N, H, W, 3), float32
+        Standard deviation of the disparity, and distances of its interval's bounds below and above it; N is 0 without
+        error bars.
+    corners : ndarray, shape (N, H, W, 4), float32
+        Disparity at the corners of each pixel, from :func:`sepi.matching.carried_map.corner_disparities`.
+    baselines : ndarray, shape (N, 2), float64
+        Baselines of the maps' views, down and across, in view steps.
+    """
+
+    disparity: FloatMap
+    confidence: FloatMap
+    bars: FloatMap
+    corners: FloatMap
+    baselines: npt.NDArray[np.float64]
+
+
+class ViewMaps(NamedTuple):
+    """The maps of one view.
+
+    Attributes
+    ----------
+    position : tuple of int
+        Row and column of the view in the grid.
+    disparity, confidence : ndarray, shape (H, W), float32
+        Pixels per view step; 0..1.
+    extended : ndarray, shape (H, W), bool
+        Pixels that no source map shows, filled with the background beside them, with confidence 0.
+    sigma : ndarray, shape (H, W), float32, or None
+        Standard deviation of the disparity, pixels per view step; None if the variant has no error bars.
+    low, high : ndarray, shape (H, W), float32, or None
+        Bounds of the interval of 90 %; the whole range at extended pixels.
+    """
+
+    position: tuple[int, int]
+    disparity: FloatMap
+    confidence: FloatMap
+    extended: BoolMap
+    sigma: FloatMap | None = None
+    low: FloatMap | None = None
+    high: FloatMap | None = None
+
+    @property
+    def maps(self) -> dict[str, npt.NDArray[Any]]:
+        """Every map by name."""
+        return {name: values for name, values in self._asdict().items() if isinstance(values, np.ndarray)}
+
+
+@dataclass(frozen=True)
+class AllViews:
+    """Maps of all views.
+
+    Attributes
+    ----------
+    disparity : ndarray, shape (T, S, H, W), float32
+        Pixels per view step, positive nearer, like that of the reference view; NaN in missing views.
+    confidence : ndarray, shape (T, S, H, W), float32
+        0..1; 0 in missing views.
+    extended : ndarray, shape (T, S, H, W), bool
+        Pixels that no source map shows; see :class:`ViewMaps`.
+    sigma, low, high : ndarray, shape (T, S, H, W), float32, or None
+        Error bars, pixels per view step; NaN in missing views, None if the variant has no error bars.
+
+    Examples
+    --------
+    A point has the same disparity in all views:
+
+    >>> import sepi
+    >>> from sepi.scenes import render
+    >>> every = sepi.estimate_all_views(render("fronto_parallel", size=64, views=3))
+    >>> isinstance(every, sepi.AllViews), bool(abs(every.disparity - 1).mean() < 0.01)
+    (True, True)
+    >>> bool(((every.low <= every.disparity) & (every.disparity <= every.high)).all())
+    True
+    """
+
+    disparity: FloatMap
+    confidence: FloatMap
+    extended: BoolMap
+    sigma: FloatMap | None = None
+    low: FloatMap | None = None
+    high: FloatMap | None = None
+
+
+def estimate_all_views(
+    light_field: LightField,
+    maps: StageMaps | None = None,
+    variant: str | Variant = DEFAULT_VARIANT,
+    parameters: Mapping[str, Mapping[str, Any]] | None = None,
+    progress: Progress = no_progress,
+    memory: int | None = None,
+    edge_views: int = EDGE_VIEWS,
+) -> AllViews:
+    """Maps of all views: disparity, confidence and error bars.
+
+    Parameters
+    ----------
+    light_field : LightField
+        If its disparity range is unknown, the range is estimated from the views.
+    maps : StageMaps, optional
+        Maps of the reference view, which stay unchanged; default: computed.
+    variant : str or Variant
+        As for :func:`sepi.estimate_depth`, which computes the maps of up to five views.
+    parameters : mapping, optional
+        As there.
+    progress : callable
+        Called with the fraction done.
+    memory : int, optional
+        Bytes, as there, without the returned maps.
+    edge_views : int
+        Least number of views with which each view is compared at its depth steps. With 0, outlines stay as warped,
+        which takes a fraction of the time.
+
+    Returns
+    -------
+    AllViews
+        The maps of every view.
+
+    Raises
+    ------
+    SepiError
+        If ``maps`` have another shape than the views, or as for :func:`sepi.pipeline.estimate_depth`.
+    MemoryError
+        If a limit on the process's address space is too small.
+
+    Examples
+    --------
+    >>> import sepi
+    >>> from sepi.scenes import render, true_disparity
+    >>> light_field = render("slanted_plane", size=64, views=3)
+    >>> maps = sepi.estimate_depth(light_field)
+    >>> every = sepi.estimate_all_views(light_field, maps)
+    >>> every.disparity.shape, bool((every.disparity[1, 1] == maps.disparity).all())
+    ((3, 3, 64, 64), True)
+    >>> corner = true_disparity("slanted_plane", size=64, baseline=(-1, -1))
+    >>> bool(abs(every.disparity[0, 0] - corner).mean() < 0.02)
+    True
+    """
+    require_light_field(light_field)
+    require_type(f"{light_field.name}: maps", maps, (StageMaps, NoneType), "StageMaps")
+    shape = (*light_field.grid, *light_field.shape)
+    result: dict[str, npt.NDArray[Any]] = {}
+    for view in maps_of_all_views(light_field, maps, variant, parameters, progress, memory, edge_views):
+        for name, values in view.maps.items():
+            if name not in result:
+                missing = 0 if name in ("confidence", "extended") else np.nan
+                result[name] = np.full(shape, missing, values.dtype)
+            result[name][view.position] = values
+    return AllViews(**result)
+
+
+def maps_of_all_views(
+    light_field: LightField,
+    maps: StageMaps | None = None,
+    variant: str | Variant = DEFAULT_VARIANT,
+    parameters: Mapping[str, Mapping[str, Any]] | None = None,
+    progress: Progress = no_progress,
+    memory: int | None = None,
+    edge_views: int = EDGE_VIEWS,
+) -> Iterator[ViewMaps]:
+    """The maps of one view after the other, row by row of the grid, without missing views.
+
+    Arguments and errors are those of :func:`estimate_all_views`. Only a few views' maps are in memory at a time.
+
+    Yields
+    ------
+    ViewMaps
+    """
+    if maps is not None and maps.disparity.shape != light_field.shape:
+        raise SepiError(
+            f"{light_field.name}: maps must have the views' shape {light_field.shape}, got {maps.disparity.shape}"
+        )
+    if light_field.disparity_range is None:
+        from sepi.inspection.disparity_range import estimate_range
+
+        # once, so that all maps have the same range
+        light_field = light_field.with_range(estimate_range(light_field))
+    anchors = anchor_views(light_field)
+    places = np.argwhere(light_field.present)
+    # a view's share takes about a tenth of an estimate
+    total = len(anchors) + 0.1 * len(places)
+    found = []
+    for number, position in enumerate(anchors):
+
+        def of_all(fraction: float, number: int = number) -> None:
+            progress((number + fraction) / total)
+
+        known = maps if number == 0 else None
+        found.append(known or estimate_depth(light_field.seen_from(position), variant, parameters, of_all, memory))
+        of_all(1.0)
+    sources = _sources(found, np.array([light_field.baselines[position] for position in anchors]))
+    # frees the other views' maps
+    reference = found[0]
+    del found
+    for begin in range(0, len(places), _AT_ONCE):
+        for number, view in enumerate(_fused(light_field, sources, places[begin : begin + _AT_ONCE])):
+            if view.position == light_field.reference_position:
+                own = {name: getattr(reference, name) for name in ERROR_BARS if view.sigma is not None}
+                yield view._replace(disparity=reference.disparity, confidence=reference.confidence, **own)
+            else:
+                decided = _with_own_edges(light_field, view, edge_views)
+                yield _with_doubt(light_field, view, decided)
+            progress((len(anchors) + 0.1 * (begin + number + 1)) / total)
+
+
+def anchor_views(light_field: LightField) -> list[tuple[int, int]]:
+    """The views of the source maps: the reference view, and the farthest in each diagonal direction.
+
+    Parameters
+    ----------
+    light_field : LightField
+
+    Returns
+    -------
+    list of (int, int)
+        Rows and columns in the grid, the reference view first; five of a whole grid, three of one row of views.
+    """
+    places, baselines = np.argwhere(light_field.present), light_field.baselines[light_field.present]
+    farthest = [places[np.argmax(baselines @ corner)] for corner in _CORNERS]
+    found = [light_field.reference_position, *((int(t), int(s)) for t, s in farthest)]
+    return list(dict.fromkeys(found))
+
+
+def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sources:
+    """The source maps, with the surfaces of their pixels."""
+    bars = [offsets for offsets in map(_offsets, found) if offsets is not None]
+    return Sources(
+        _stacked([maps.disparity for maps in found]),
+        _stacked([maps.confidence for maps in found]),
+        # error bars of all maps, or of none
+        _stacked(bars) if len(bars) == len(found) else np.empty((0, *found[0].disparity.shape, 3), np.float32),
+        _stacked([corner_disparities(maps.disparity) for maps in found]),
+        baselines,
+    )
+
+
+def _stacked(maps: list[FloatMap]) -> FloatMap:
+    return np.ascontiguousarray(np.stack(maps), np.float32)
+
+
+def _offsets(maps: StageMaps) -> FloatMap | None:
+    """Sigma, and distances of the bounds below and above the disparity, which hold in other views, too; (H, W, 3)."""
+    if maps.sigma is None or maps.low is None or maps.high is None:
+        return None
+    below, above = maps.disparity - maps.low, maps.high - maps.disparity
+    # an unknown disparity may lie beyond both bounds
+    return np.stack([maps.sigma, np.maximum(below, 0), np.maximum(above, 0)], axis=2).astype(np.float32, copy=False)
+
+
+def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int64]) -> list[ViewMaps]:
+    """Maps of some views, fused from the source maps."""
+    shape = (len(places), *light_field.shape)
+    disparity, confidence, extended = np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, bool)
+    baselines = np.ascontiguousarray(light_field.baselines[tuple(places.T)])
+    told = len(sources.bars) > 0
+    bars = np.empty((*shape, 3) if told else (len(places), 0, 0, 3), np.float32)
+    kernels.maps_of_views(sources, baselines, disparity, confidence, bars, extended)
+    positions = [(int(t), int(s)) for t, s in places]
+    views = [ViewMaps(*of_view) for of_view in zip(positions, disparity, confidence, extended, strict=True)]
+    if not told:
+        return views
+    return [
+        view._replace(sigma=own[..., 0], low=view.disparity - own[..., 1], high=view.disparity + own[..., 2])
+        for view, own in zip(views, bars, strict=True)
+    ]
+
+
+def _with_doubt(light_field: LightField, view: ViewMaps, decided: FloatMap) -> ViewMaps:
+    """A view's maps with the decided disparity, and error bars that allow for changes and extended background."""
+    if view.sigma is None or view.low is None or view.high is None:
+        return view._replace(disparity=decided)
+    # a pixel that changed sides may belong to either surface
+    moved = decided - view.disparity
+    low, high = view.low + np.minimum(moved, 0), view.high + np.maximum(moved, 0)
+    sigma = np.hypot(view.sigma, moved / 2)
+    # extended and unknown pixels may have any disparity
+    lowest, highest = light_field.require_disparity_range().candidates(2)
+    low = np.where(view.extended, np.minimum(lowest, decided), low)
+    high = np.where(view.extended, np.maximum(highest, decided), high)
+    sigma = np.where(view.extended, np.float32((highest - lowest) / 12**0.5), sigma)
+    return view._replace(disparity=decided, sigma=sigma, low=low, high=high)
+
+
+def _with_own_edges(light_field: LightField, view: ViewMaps, edge_views: int) -> FloatMap:
+    """A view's disparity, with pixels at its depth steps on the surface that fills most of them."""
+    if edge_views == 0:
+        return view.disparity
+    from sepi.boundaries.decision import assigned_to_surfaces
+    from sepi.boundaries.parameters import BoundaryParameters
+
+    own, parameters = light_field.seen_from(view.position), BoundaryParameters(share_views=edge_views)
+    decided = assigned_to_surfaces(own, view.disparity, parameters)
+    # a steep slope is not a step, and its pixels stay on their surface
+    beside = np.ones((2 * parameters.share_radius + 1,) * 2, np.uint8)
+    return np.where(cv2.dilate(torn_pixels(view.disparity).astype(np.uint8), beside) > 0, decided, view.disparity)
+
+
+def torn_pixels(disparity: FloatMap) -> BoolMap:
+    """Pixels beside a depth step that slopes do not explain; shape (H, W), bool."""
+    top_left, top_right, bottom_right, bottom_left = np.moveaxis(corner_disparities(disparity), 2, 0)
+    torn = np.zeros(disparity.shape, bool)
+    for first, second in ((top_right, top_left), (bottom_right, bottom_left)):
+        apart = np.abs(first[:, :-1] - second[:, 1:]) > TOLERANCE
+        torn[:, :-1] |= apart
+        torn[:, 1:] |= apart
+    for first, second in ((bottom_left, top_left), (bottom_right, top_right)):
+        apart = np.abs(first[:-1] - second[1:]) > TOLERANCE
+        torn[:-1] |= apart
+        torn[1:] |= apart
+    return torn

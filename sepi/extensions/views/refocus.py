@@ -1,0 +1,237 @@
+"""The command ``sepi refocus``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
+from sepi.cli.scene_argument import read_light_field_of
+from sepi.command import SepiCommand, progress_bar
+from sepi.errors import SepiError
+
+if TYPE_CHECKING:
+    from sepi.camera import Camera
+    from sepi.extensions.views.refocused_folder import Focus
+    from sepi.lightfield import BoolMap, FloatMap, LightField
+    from sepi.stage import Progress
+
+_PATH = click.Path(path_type=Path)
+_STEPS = 9
+
+
+@dataclass(frozen=True)
+class _Result:
+    """A map: path, disparity (H, W), unknown pixels, and camera if known."""
+
+    path: Path
+    disparity: FloatMap
+    unknown: BoolMap | None
+    camera: Camera | None
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """Flags of where to focus."""
+
+    steps: int | None
+    disparities: tuple[float, ...]
+    pixels: tuple[tuple[int, int], ...]
+
+
+@click.command(cls=SepiCommand)
+@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@click.argument("result_path", metavar="[RESULT]", type=_PATH, required=False)
+@click.option("-o", "--output", type=_PATH, help="Folder to write; default: NAME-refocused for an INPUT called NAME.")
+@click.option(
+    "--steps",
+    type=click.IntRange(1, 999),
+    metavar="N",
+    help=f"Pictures from the nearest to the farthest surface; default: {_STEPS} without --disparity and --at.",
+)
+@click.option(
+    "--disparity",
+    "disparities",
+    type=float,
+    multiple=True,
+    metavar="D",
+    help="Focus at this disparity, pixels per view step; repeatable.",
+)
+@click.option(
+    "--at",
+    "pixels",
+    type=click.IntRange(min=0),
+    nargs=2,
+    multiple=True,
+    metavar="X Y",
+    help="Focus on the surface at pixel X, Y, from 0 at the top left; repeatable; needs RESULT.",
+)
+@click.option(
+    "--aperture",
+    type=float,
+    metavar="R",
+    help="Radius of the aperture in view steps; a smaller one has more in focus. Default: all views.",
+)
+@click.option("--animation", is_flag=True, help="Also write the stack as an animation, focus.webp.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
+@camera_flags
+@reading_flags
+def refocus(
+    light_field_path: Path,
+    result_path: Path | None,
+    output: Path | None,
+    steps: int | None,
+    disparities: tuple[float, ...],
+    pixels: tuple[tuple[int, int], ...],
+    aperture: float | None,
+    animation: bool,
+    threads: int | None,
+    geometry: Geometry | None,
+    reading: Reading,
+) -> None:
+    """Refocus the light field INPUT.
+
+    RESULT is the map of INPUT: a folder that 'sepi depth' wrote, or a disparity map of another program (PFM, HDF5,
+    .npy, 'disparity_16bit.png'). The folder records how INPUT was read. The command writes
+
+    \b
+    all_in_focus.png   mean of all views that see a pixel: as sharp as the view, less noise
+    focus_01.png ...   focal stack: pictures of a large lens, focused from near to far
+    focus.csv          disparity of each picture, and its depth in metres if the camera is known
+
+    Without RESULT, the stack covers INPUT's own or estimated disparity range; the gaps between the views show where it
+    is out of focus, and there is no all_in_focus.png.
+
+    \b
+    Examples:
+      sepi refocus cotton cotton-depth
+      sepi refocus cotton cotton-depth --at 250 310 --aperture 3
+      sepi refocus cotton --disparity -0.5 --disparity 1
+    """
+    from sepi.extensions.views.refocused_folder import write_refocused
+    from sepi.extensions.views.refocusing import all_in_focus, views_within
+    from sepi.io.result_files import require_target
+    from sepi.threads import available_cores, use_threads
+
+    use_threads(threads or available_cores())
+    folder = output or default_folder(light_field_path, "refocused")
+    require_target(folder)
+    if light_field_path.resolve() == folder.resolve():
+        raise SepiError(f"{folder}: is the light field itself; choose another folder for the pictures")
+    if pixels and result_path is None:
+        raise SepiError("--at: needs RESULT for the disparity of the pixel; 'sepi depth INPUT' makes it")
+    light_field = read_light_field_of(light_field_path, result_path, reading)
+    result = None if result_path is None else _read_result(result_path, light_field_path, light_field, reading)
+    camera = light_field.camera or (result.camera if result else None)
+    if geometry is not None:
+        camera = geometry(shape=light_field.shape)
+    foci = _foci(light_field, result, camera, _Wanted(steps, disparities, pixels))
+    # fails early if the folder cannot be used
+    views_within(light_field, aperture)
+    with progress_bar(light_field.name) as progress:
+        share = 0.0 if result is None else 1 / (1 + len(foci))
+        sharp = None
+        if result is not None:
+            sharp = all_in_focus(light_field, result.disparity, progress=lambda fraction: progress(share * fraction))
+        surfaces = None if result is None else result.disparity
+        pictures = _stack(
+            light_field, foci, surfaces, aperture, lambda fraction: progress(share + (1 - share) * fraction)
+        )
+        files = write_refocused(folder, foci, pictures, sharp, light_field.views.dtype, animated=animation)
+    click.echo(f"focused at: {_listed(foci)}")
+    if result is None:
+        click.echo("no all_in_focus.png: it needs RESULT, which 'sepi depth' makes")
+    click.echo(f"written to {folder}/: {' '.join(files)}")
+
+
+def _read_result(path: Path, light_field_path: Path, light_field: LightField, reading: Reading) -> _Result:
+    """The map to focus by, checked to have the views' size."""
+    from sepi.io.all_views import read_disparity_at, read_origin_at, read_result_at
+
+    view = reading.options.view
+    disparity = read_disparity_at(path, view)
+    if disparity.shape != light_field.shape:
+        raise SepiError(
+            f"{path}: is {disparity.shape}, but the views of {light_field_path} are {light_field.shape} (height, width)"
+        )
+    if read_origin_at(path, view) is None:
+        return _Result(path, disparity, None, None)
+    stored = read_result_at(path, view)
+    return _Result(path, disparity, stored.unknown if stored.unknown.shape == disparity.shape else None, stored.camera)
+
+
+def _foci(light_field: LightField, result: _Result | None, camera: Camera | None, wanted: _Wanted) -> list[Focus]:
+    """Disparities to focus at, from near to far."""
+    from sepi.extensions.views.refocused_folder import Focus
+
+    for value in wanted.disparities:
+        if not math.isfinite(value):
+            raise SepiError(f"--disparity {value}: expected a finite number of pixels per view step")
+    found = [Focus(value) for value in wanted.disparities]
+    if result is not None:
+        found += [Focus(_disparity_at(result, x, y), at=(x, y)) for x, y in wanted.pixels]
+    if wanted.steps or not found:
+        found += [Focus(value) for value in _through(light_field, result, wanted.steps or _STEPS)]
+    if camera is not None:
+        found = [replace(focus, depth=_depth(camera, focus.disparity)) for focus in found]
+    return sorted(found, key=lambda focus: -focus.disparity)
+
+
+def _through(light_field: LightField, result: _Result | None, count: int) -> list[float]:
+    """Disparities from the nearest to the farthest surface of the map, else over the light field's range."""
+    from sepi.extensions.views.refocusing import evenly_spaced, focal_stack
+    from sepi.inspection.disparity_range import settle_range
+
+    if result is not None:
+        try:
+            return focal_stack(result.disparity, count, result.unknown)
+        except SepiError as error:
+            raise SepiError(f"{result.path}: {error}") from error
+    limits = settle_range(light_field).require_disparity_range()
+    return evenly_spaced(limits.minimum, limits.maximum, count)
+
+
+def _disparity_at(result: _Result, x: int, y: int) -> float:
+    height, width = result.disparity.shape
+    if not (x < width and y < height):
+        raise SepiError(f"--at {x} {y}: outside the picture; X goes from 0 to {width - 1}, Y from 0 to {height - 1}")
+    value = float(result.disparity[y, x])
+    if not math.isfinite(value) or (result.unknown is not None and result.unknown[y, x]):
+        raise SepiError(f"--at {x} {y}: {result.path} has no disparity for this pixel; choose one beside it")
+    return value
+
+
+def _depth(camera: Camera, disparity: float) -> float:
+    import numpy as np
+
+    return float(camera.depth(np.array([disparity], np.float32))[0])
+
+
+def _stack(
+    light_field: LightField,
+    foci: Sequence[Focus],
+    surfaces: FloatMap | None,
+    aperture: float | None,
+    progress: Progress,
+) -> Iterator[FloatMap]:
+    """Picture of each focus, computed one at a time."""
+    from sepi.extensions.views import refocusing
+
+    for number, focus in enumerate(foci):
+
+        def part(fraction: float, done: int = number) -> None:
+            progress((done + fraction) / len(foci))
+
+        yield refocusing.refocus(light_field, focus.disparity, surfaces, aperture=aperture, progress=part)
+
+
+def _listed(foci: Sequence[Focus]) -> str:
+    """Text of the disparities, and depths if known."""
+    values = ", ".join(f"{focus.disparity:.3g}" for focus in foci)
+    depths = ", ".join(f"{focus.depth:.3g}" for focus in foci if focus.depth is not None)
+    return f"{values} pixels per view step" + (f" ({depths} m)" if depths else "")

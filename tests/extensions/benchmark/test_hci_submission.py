@@ -1,0 +1,366 @@
+"""Submissions to the benchmark: packed is what it reads, and what it would refuse is found before."""
+
+import os
+import stat
+import struct
+import tracemalloc
+import warnings
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from error_lines import error_of
+
+from sepi.errors import SepiError
+from sepi.extensions.benchmark.commands import check_submission, submission
+from sepi.extensions.benchmark.hci_submission import SCENES, problems_of
+from sepi.io.result_folder import write_result
+from sepi.lightfield import LightField
+from sepi.stage import StageMaps
+
+Files = dict[str, bytes]
+
+
+def pfm(height: int = 512, width: int = 512, *, magic: str = "Pf", value: float = 0.5) -> bytes:
+    """A map of one value by NumPy alone."""
+    channels = 3 if magic == "PF" else 1
+    return f"{magic}\n{width} {height}\n-1.0\n".encode() + np.full(channels * height * width, value, "<f4").tobytes()
+
+
+GOOD_MAP = pfm()
+
+
+def good() -> Files:
+    """Name to content of a submission that is right."""
+    maps = {f"disp_maps/{scene}.pfm": GOOD_MAP for scene in SCENES}
+    return maps | {f"runtimes/{scene}.txt": f"{12.5 + at}\n".encode() for at, scene in enumerate(SCENES)}
+
+
+def zipped(path: Path, files: Files) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, data in files.items():
+            archive.writestr(name, data)
+    return path
+
+
+def laid_out(path: Path, files: Files) -> Path:
+    for name, data in files.items():
+        (path / name).parent.mkdir(parents=True, exist_ok=True)
+        (path / name).write_bytes(data)
+    return path
+
+
+@pytest.fixture(params=[zipped, laid_out], ids=["zip", "folder"])
+def made(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[Files], Path]:
+    """Function that makes a submission of some files, as an archive and as a folder."""
+    return lambda files: request.param(tmp_path / "mine.zip", files)
+
+
+def call(command: object, *words: object) -> Result:
+    return CliRunner().invoke(command, [str(word) for word in words])
+
+
+# --- check
+
+
+def test_a_right_submission_has_no_problems(made: Callable[[Files], Path]) -> None:
+    path = made(good())
+    assert problems_of(path) == []
+    called = call(check_submission, path)
+    assert (called.exit_code, called.stdout) == (0, f"{path}: no problems\n")
+
+
+def without(*names: str) -> Callable[[Files], Files]:
+    return lambda files: {name: data for name, data in files.items() if not name.startswith(names)}
+
+
+def having(name: str, data: bytes) -> Callable[[Files], Files]:
+    return lambda files: files | {name: data}
+
+
+def spotted(count: int, value: float) -> bytes:
+    """A map with some values that are not finite."""
+    values = np.full(512 * 512, 0.5, "<f4")
+    values[:count] = value
+    return b"Pf\n512 512\n-1.0\n" + values.tobytes()
+
+
+MAP, TIME = "disp_maps/cotton.pfm", "runtimes/cotton.txt"
+
+WRONG = {
+    "no map": (without(MAP), MAP, "missing"),
+    "no run time": (without(TIME), TIME, "missing"),
+    "no maps": (without("disp_maps"), "disp_maps/", "no such folder"),
+    "no run times": (without("runtimes"), "runtimes/", "no such folder"),
+    "small map": (having(MAP, pfm(64, 64)), MAP, "64x64 pixels; expected 512x512"),
+    "map of another shape": (having(MAP, pfm(256, 1024)), MAP, "1024x256 pixels; expected 512x512"),
+    "large map": (having(MAP, pfm(1024, 1024)), MAP, "too many for a map of 512x512 pixels"),
+    "colour map": (having(MAP, pfm(16, 16, magic="PF")), MAP, "not a one-channel PFM"),
+    "not a PFM": (having(MAP, b"\x89PNG\r\n\x1a\n"), MAP, "not a one-channel PFM"),
+    "empty map": (having(MAP, b""), MAP, "not a one-channel PFM"),
+    "truncated map": (having(MAP, GOOD_MAP[:-1]), MAP, "expected 1048576 bytes"),
+    "NaN": (having(MAP, spotted(3, np.nan)), MAP, "3 of 262144 values are not finite"),
+    "infinite": (having(MAP, spotted(1, -np.inf)), MAP, "1 of 262144 values are not finite"),
+    "no number": (having(TIME, b"fast\n"), TIME, "as a number, got 'fast'"),
+    "number and unit": (having(TIME, b"12.5 s\n"), TIME, "as a number, got '12.5 s'"),
+    "two numbers": (having(TIME, b"12.5\n13\n"), TIME, "as a number"),
+    "decimal comma": (having(TIME, b"12,5\n"), TIME, "as a number"),
+    "empty run time": (having(TIME, b""), TIME, "as a number, got ''"),
+    "bytes": (having(TIME, b"\xff\x00\x1b[2J"), TIME, "as a number"),
+    "zero": (having(TIME, b"0\n"), TIME, "positive"),
+    "negative": (having(TIME, b"-3.5\n"), TIME, "positive"),
+    "NaN seconds": (having(TIME, b"nan\n"), TIME, "positive"),
+    "infinite seconds": (having(TIME, b"1e999\n"), TIME, "positive"),
+    "long text": (having(TIME, b"1" * 1000), TIME, "1000 bytes are too many for one number"),
+    "stray file": (having("readme.md", b"hi"), "readme.md", "does not belong"),
+    "scene of another set": (having("disp_maps/antinous.pfm", GOOD_MAP), "disp_maps/antinous.pfm", "does not belong"),
+    "file below": (having("disp_maps/old/cotton.pfm", GOOD_MAP), "disp_maps/old", "does not belong"),
+    "system's file": (having("disp_maps/.DS_Store", b""), "disp_maps/.DS_Store", "does not belong"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_each_problem_is_one_line_that_begins_with_the_file(made: Callable[[Files], Path], case: str) -> None:
+    spoil, name, word = WRONG[case]
+    path = made(spoil({name: data for name, data in good().items() if "boxes" in name or "cotton" in name}))
+    called = call(check_submission, path, "--partial")
+    assert called.exit_code == 1
+    (line,) = called.stdout.splitlines()
+    assert called.stdout == line + "\n"
+    assert line.startswith(name)
+    assert word in line
+    assert line.isprintable()
+
+
+def test_a_name_in_capitals_is_another_name(made: Callable[[Files], Path]) -> None:
+    files = good()
+    files["disp_maps/Cotton.pfm"] = files.pop(MAP)
+    first, second = sorted(problems_of(made(files)))
+    assert first == "disp_maps/Cotton.pfm: does not belong to a submission; leave it out"
+    assert second == f"{MAP}: missing"
+
+
+def test_all_in_a_folder_of_its_own_is_said_in_few_words(made: Callable[[Files], Path]) -> None:
+    """What most programs make of 'compress this folder'."""
+    lines = problems_of(made({f"mine/{name}": data for name, data in good().items()}))
+    assert lines[0].startswith("mine/: ")
+    assert "disp_maps/ and runtimes/ at the root" in lines[0]
+    assert [line.partition(":")[0] for line in lines[1:]] == ["disp_maps/", "runtimes/"]
+
+
+def test_many_strange_files_do_not_bury_the_other_problems(made: Callable[[Files], Path]) -> None:
+    lines = problems_of(made(without(TIME)(good()) | {f"extra{at}": b"" for at in range(50)}))
+    assert len(lines) == 12
+    assert "40 more" in lines[10]
+    assert lines[11] == f"{TIME}: missing"
+
+
+def test_part_of_the_scenes_must_be_asked_for(made: Callable[[Files], Path]) -> None:
+    path = made({MAP: GOOD_MAP, TIME: b"3\n"})
+    assert len(problems_of(path)) == 22
+    assert problems_of(path, partial=True) == []
+    assert call(check_submission, path, "--partial").exit_code == 0
+
+
+def test_part_of_a_scene_is_not_enough(tmp_path: Path) -> None:
+    lines = problems_of(zipped(tmp_path / "a.zip", {MAP: GOOD_MAP, "runtimes/boxes.txt": b"3\n"}), partial=True)
+    assert sorted(lines) == ["disp_maps/boxes.pfm: missing", f"{TIME}: missing"]
+    assert len(problems_of(zipped(tmp_path / "b.zip", {}), partial=True)) == 2
+
+
+def test_system_folders_of_an_archive_are_named(tmp_path: Path) -> None:
+    files = good() | {f"__MACOSX/disp_maps/._{scene}.pfm": b"" for scene in SCENES[:2]}
+    lines = problems_of(zipped(tmp_path / "a.zip", files))
+    assert len(lines) == 2
+    assert all(line.startswith("__MACOSX/disp_maps/._") and "does not belong" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "/disp_maps/a.pfm",
+        "../a.pfm",
+        "disp_maps/../../a",
+        "disp_maps\\cotton.pfm",
+        "C:/a",
+        "a\n\x1b[2Jb",
+        "./a",
+        "a//b",
+    ],
+)
+def test_unsafe_names_are_named_and_nothing_is_written_there(tmp_path: Path, name: str) -> None:
+    (tmp_path / "in").mkdir()
+    (line,) = problems_of(zipped(tmp_path / "in/a.zip", good() | {name: b"boo"}))
+    assert "does not belong" in line
+    assert line.isprintable()
+    assert os.listdir(tmp_path) == ["in"]
+    assert os.listdir(tmp_path / "in") == ["a.zip"]
+
+
+def test_a_name_given_twice_is_a_problem(tmp_path: Path) -> None:
+    """Which of the two counts depends on who unpacks."""
+    path = zipped(tmp_path / "a.zip", good())
+    with warnings.catch_warnings(), zipfile.ZipFile(path, "a") as archive:
+        warnings.simplefilter("ignore", UserWarning)
+        archive.writestr(MAP, pfm(value=0.7))
+    assert problems_of(path) == [f"{MAP}: 2 files of this name"]
+    with warnings.catch_warnings(), zipfile.ZipFile(path, "a") as archive:
+        warnings.simplefilter("ignore", UserWarning)
+        archive.writestr(MAP, b"nonsense")
+    first, second = problems_of(path)
+    assert first == f"{MAP}: 3 files of this name"
+    assert second.startswith(f"{MAP}: not a one-channel PFM")
+
+
+def test_entries_for_folders_do_no_harm(tmp_path: Path) -> None:
+    assert problems_of(zipped(tmp_path / "a.zip", {"disp_maps/": b"", "runtimes/": b""} | good())) == []
+
+
+def test_a_link_in_an_archive_is_not_a_map(tmp_path: Path) -> None:
+    path = zipped(tmp_path / "a.zip", without(MAP)(good()))
+    with zipfile.ZipFile(path, "a") as archive:
+        info = zipfile.ZipInfo(MAP)
+        info.create_system, info.external_attr = 3, (stat.S_IFLNK | 0o777) << 16
+        archive.writestr(info, "/etc/passwd")
+    (line,) = problems_of(path)
+    assert line.startswith(f"{MAP}: not a one-channel PFM")
+
+
+def test_a_bomb_is_not_unpacked(tmp_path: Path) -> None:
+    """Neither many zeros in few bytes nor a header that claims the right size cost memory."""
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in without(MAP)(good()).items():
+            archive.writestr(name, data)
+        with archive.open(MAP, "w") as file:
+            for _ in range(64):
+                file.write(bytes(2**20))
+    tracemalloc.start()
+    lines = problems_of(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert lines == [f"{MAP}: {2**26} bytes are too many for a map of 512x512 pixels"]
+    assert peak < 2**25
+    data = path.read_bytes()
+    assert data.count(struct.pack("<I", 2**26)) == 2
+    path.write_bytes(data.replace(struct.pack("<I", 2**26), struct.pack("<I", len(GOOD_MAP))))
+    (line,) = problems_of(path)
+    assert line.startswith(f"{MAP}: cannot be unpacked")
+
+
+def test_packing_that_the_benchmark_may_not_know(tmp_path: Path) -> None:
+    path = zipped(tmp_path / "a.zip", without(TIME)(good()))
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(TIME, b"12.5\n", zipfile.ZIP_LZMA)
+    (line,) = problems_of(path)
+    assert line.startswith(f"{TIME}: compressed by method 14")
+
+
+def test_a_changed_byte_is_found(tmp_path: Path) -> None:
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in good().items():
+            archive.writestr(name, data)
+        at = archive.getinfo(MAP).header_offset + 5000
+    data = bytearray(path.read_bytes())
+    data[at] ^= 1
+    path.write_bytes(data)
+    (line,) = problems_of(path)
+    assert line.startswith(f"{MAP}: cannot be unpacked")
+    assert "CRC" in line
+
+
+def test_an_archive_cut_anywhere_is_one_line(tmp_path: Path) -> None:
+    whole = zipped(tmp_path / "a.zip", good()).read_bytes()
+    for length in (0, 1, 100, len(whole) // 2, len(whole) - 100, len(whole) - 1):
+        (tmp_path / "a.zip").write_bytes(whole[:length])
+        (line,) = problems_of(tmp_path / "a.zip")
+        assert line.startswith(f"{tmp_path / 'a.zip'}: not a readable zip archive")
+
+
+def test_nothing_there_is_an_error(tmp_path: Path) -> None:
+    assert "gone.zip: no such file" in error_of(call(check_submission, tmp_path / "gone.zip"))
+
+
+# --- pack
+
+
+def result(folder: Path, scene: str, *, seconds: str | None = "12.5\n", shape: tuple[int, int] = (512, 512)) -> Path:
+    """The parts of a result that a submission is made of."""
+    (folder / scene).mkdir(parents=True)
+    light_field = LightField(views=np.zeros((3, 3, 4, 4, 1), np.uint8), name=scene)
+    zeros = np.zeros((4, 4), np.float32)
+    write_result(folder / scene, light_field, StageMaps(zeros, zeros), {"scene": scene})
+    (folder / scene / "disparity.pfm").write_bytes(pfm(*shape, value=SCENES.index(scene) if scene in SCENES else 0))
+    if seconds is not None:
+        (folder / scene / "runtime.txt").write_text(seconds)
+    return folder / scene
+
+
+def test_packed_are_all_maps_and_run_times(tmp_path: Path) -> None:
+    folders = [result(tmp_path, scene) for scene in SCENES]
+    output = tmp_path / "new/mine.zip"
+    called = call(submission, *folders, "-o", output, "--runtime", "dots=0.0625")
+    assert called.exit_code == 0, called.output
+    assert called.stdout == f"written: {output} (12 scenes)\n"
+    with zipfile.ZipFile(output) as archive:
+        assert archive.testzip() is None
+        assert sorted(archive.namelist()) == sorted(good())
+        assert {info.date_time for info in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        for at, scene in enumerate(SCENES):
+            assert archive.read(f"disp_maps/{scene}.pfm") == pfm(value=at)
+            assert float(archive.read(f"runtimes/{scene}.txt")) == (0.0625 if scene == "dots" else 12.5)
+    assert problems_of(output) == []
+    again = tmp_path / "again.zip"
+    assert call(submission, *reversed(folders), "-o", again, "--runtime", "dots=0.0625").exit_code == 0
+    assert again.read_bytes() == output.read_bytes()
+
+
+def test_fewer_scenes_are_packed_if_asked_for(tmp_path: Path) -> None:
+    folder = result(tmp_path, "cotton")
+    line = error_of(call(submission, folder, "-o", tmp_path / "a.zip"))
+    assert "a.zip: not written: disp_maps/backgammon.pfm: missing (and 21 more)" in line
+    assert not (tmp_path / "a.zip").exists()
+    assert call(submission, folder, "-o", tmp_path / "a.zip", "--partial").exit_code == 0
+    with zipfile.ZipFile(tmp_path / "a.zip") as archive:
+        assert archive.namelist() == [MAP, TIME]
+
+
+def test_what_the_benchmark_would_refuse_is_not_packed(tmp_path: Path) -> None:
+    good_one = result(tmp_path, "cotton")
+    (tmp_path / "a.zip").write_text("before")
+    small = result(tmp_path / "small", "cotton", shape=(64, 64))
+    untimed = result(tmp_path / "untimed", "cotton", seconds=None)
+    slow = result(tmp_path / "slow", "cotton", seconds="slow")
+    strange = result(tmp_path, "coton")
+    side = tmp_path / "side"
+    views = LightField(views=np.zeros((3, 3, 4, 4, 1), np.uint8), name="cotton", view=(0, 0))
+    zeros = np.zeros((4, 4), np.float32)
+    write_result(side, views, StageMaps(zeros, zeros), {"scene": "cotton"})
+    cases = {
+        (small,): "disp_maps/cotton.pfm: 64x64 pixels",
+        (untimed,): "runtime.txt: no such file; run 'sepi depth --timing', or give --runtime cotton=SECONDS",
+        (slow,): "runtime.txt: expected the run time in seconds as a number",
+        (strange,): "did you mean 'cotton'?",
+        (side,): "side: depth of another view",
+        (good_one, small): "small/cotton: scene cotton is given twice",
+        (good_one, "--runtime", "dots=3"): "--runtime dots: no result of this scene",
+        (good_one, "--runtime", "cotton"): "--runtime cotton: expected SCENE=SECONDS",
+        (good_one, "--runtime", "cotton=nan"): "--runtime cotton=nan: expected SCENE=SECONDS",
+        (good_one, "--runtime", "cotton=-1"): "--runtime cotton=-1: expected SCENE=SECONDS",
+        (tmp_path / "gone",): "gone: no such folder",
+        (tmp_path,): "result.h5: no such file",
+    }
+    for words, expected in cases.items():
+        assert expected in error_of(call(submission, *words, "--partial", "-o", tmp_path / "a.zip")), words
+        assert (tmp_path / "a.zip").read_text() == "before"
+    os.mkfifo(tmp_path / "pipe")
+    assert "pipe: cannot be written" in error_of(call(submission, good_one, "--partial", "-o", tmp_path / "pipe"))
+    assert (tmp_path / "pipe").is_fifo()
+    (good_one / "disparity.pfm").unlink()
+    assert "cotton/disparity.pfm: no such file" in error_of(call(submission, good_one, "--partial"))
+    with pytest.raises(SepiError, match="gone"):
+        problems_of(tmp_path / "gone")

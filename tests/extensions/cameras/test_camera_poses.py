@@ -1,0 +1,196 @@
+"""Cameras of the views, and maps seen by them: they must see what the light field shows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from geometries import GEOMETRIES, standing
+
+from sepi.camera import Camera, camera_from
+from sepi.errors import SepiError
+from sepi.extensions.cameras.camera_poses import CameraPoses, camera_poses, nominal_camera
+from sepi.extensions.cameras.posed_views import posed_views
+from sepi.lightfield import LightField
+from sepi.matching.carried_map import carried_map
+from sepi.scenes import render
+
+GRID = (3, 4)
+SHAPE = (11, 14)
+AHEAD = camera_from(focal_length_mm=35, baseline_mm=2, focus_distance_m=np.inf, sensor_size_mm=24, shape=SHAPE)
+SHEARED = Camera(scale=36.0, offset=8.0, focal_px=1500.0)
+
+
+def light_field(**known: object) -> LightField:
+    views = np.random.default_rng(0).integers(0, 256, (*GRID, *SHAPE, 3), np.uint8)
+    return LightField(views=views, name="noise", **known)
+
+
+def pixels_and_points(poses: CameraPoses, camera: Camera, disparity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All pixels of the reference view, (P, 2), and their points, at depths by the formula of the documentation."""
+    pixels = np.argwhere(np.ones(disparity.shape, bool)).astype(np.float64)
+    depth = camera.scale / (disparity.astype(np.float64).ravel() + camera.offset)
+    return pixels, poses.points_at(pixels, depth)
+
+
+def error_of_projection(scene: LightField, camera: Camera, disparity: np.ndarray) -> float:
+    """Largest distance, in pixels, of projected points from where the conventions of disparity have them."""
+    poses = camera_poses(scene, camera)
+    pixels, points = pixels_and_points(poses, camera, disparity)
+    assert (points[:, 2] > 0).all()
+    errors = []
+    for view, (t, s) in enumerate(np.argwhere(scene.present)):
+        expected = pixels - disparity.astype(np.float64).reshape(-1, 1) * scene.baselines[t, s]
+        errors.append(np.abs(poses.project(points, view) - expected).max())
+    assert len(errors) == len(poses)
+    return max(errors)
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+@pytest.mark.parametrize("view", [None, (0, 3)])
+@pytest.mark.parametrize("camera", [SHEARED, AHEAD])
+def test_cameras_fit_wherever_views_stand(geometry: str, view: tuple[int, int] | None, camera: Camera) -> None:
+    """Rows closer together, views off the grid, missing views, and another reference view than the centre."""
+    present = np.ones(GRID, bool)
+    present[0, 0] = present[2, 1] = False
+    scene = light_field(present=present, view=view, camera=camera, **standing(geometry, GRID))
+    disparity = np.random.default_rng(1).uniform(0.5, 3, SHAPE).astype(np.float32)
+    assert error_of_projection(scene, camera, disparity) < 1e-9
+    poses = camera_poses(scene, camera)
+    assert poses.positions.tolist() == np.argwhere(present).tolist()
+    assert tuple(poses.positions[poses.reference]) == scene.reference_position
+    assert poses.centres[poses.reference].tolist() == [0, 0, 0]
+
+
+def test_the_centre_view_looks_through_the_middle() -> None:
+    """Programs that take the middle of the picture for granted are right about one view at least."""
+    poses = camera_poses(light_field(view=(0, 0)), SHEARED)
+    (centre,) = np.flatnonzero((poses.positions == (1, 2)).all(axis=1))
+    np.testing.assert_allclose(poses.from_corner[centre], [SHAPE[1] / 2, SHAPE[0] / 2], atol=1e-12)
+    # one view step to the right, a baseline of b = scale / f, and b f / F pixels
+    np.testing.assert_allclose(poses.centres[centre + 1] - poses.centres[centre], [36 / 1500, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(poses.from_corner[centre + 1] - poses.from_corner[centre], [8, 0], atol=1e-12)
+
+
+def test_a_nominal_camera_sees_the_scene_before_it() -> None:
+    """Where no camera is known, depth must be positive and of a sensible size, wherever zero disparity lies."""
+    rng = np.random.default_rng(2)
+    for disparity in (rng.uniform(-7, -4, SHAPE), rng.uniform(0, 0.01, SHAPE), np.full(SHAPE, -3.0), np.zeros(SHAPE)):
+        values = disparity.astype(np.float32)
+        depth = nominal_camera(values, np.ones(SHAPE, bool)).depth(values)
+        assert depth.min() > 0.9
+        assert depth.max() < 2.2
+    nothing = np.full(SHAPE, np.nan, np.float32)
+    assert nominal_camera(nothing, np.zeros(SHAPE, bool)).focal_px == 1.2 * SHAPE[1]
+
+
+def test_a_few_wrong_pixels_do_not_move_the_nominal_camera() -> None:
+    disparity = np.random.default_rng(3).uniform(-1, 1, (40, 50)).astype(np.float32)
+    known = np.ones(disparity.shape, bool)
+    before = nominal_camera(disparity, known)
+    disparity[3, :4] = -90, 90, np.nan, np.inf
+    known[5, 5], disparity[5, 5] = False, 400
+    assert nominal_camera(disparity, known).offset == pytest.approx(before.offset, rel=0.05)
+
+
+# --- carried maps
+
+
+def test_carried_map_has_the_nearer_surface_in_front_and_nothing_where_nothing_was_seen() -> None:
+    """A square two pixels nearer moves two to the left in the view on the right; what it uncovers is not known."""
+    disparity = np.zeros((5, 9), np.float32)
+    disparity[1:4, 4:7] = 2
+    views = np.zeros((1, 3, 5, 9, 3), np.uint8)
+    posed = posed_views(LightField(views=views, name="square"), disparity)
+    expected = np.zeros((5, 9), np.float32)
+    expected[1:4, 2:5] = 2
+    expected[1:4, 5:7] = np.nan
+    carried = posed.carried(2)
+    np.testing.assert_array_equal(carried, expected)
+    # and of the background at columns 2 and 3 this view sees nothing
+    hidden = np.zeros(disparity.shape, bool)
+    hidden[1:4, 2:4] = True
+    np.testing.assert_array_equal(posed.sees(2, carried).reshape(disparity.shape), ~hidden)
+
+
+def test_what_is_unknown_is_carried_nowhere_and_spoils_nothing_beside_it() -> None:
+    """NaN in a user's map would be drawn as depth, or tear its neighbours; a guess would hide what is behind."""
+    disparity = np.zeros((9, 12), np.float32)
+    known = np.ones(disparity.shape, bool)
+    known[3:6, 4:7] = False
+    for guess in (np.nan, np.inf, -np.inf, 3.0):
+        there = np.where(known, disparity, np.float32(guess))
+        np.testing.assert_array_equal(carried_map(there, (0, 1), known), np.where(known, 0, np.nan))
+    assert np.isnan(carried_map(there, (0, 1), np.zeros(known.shape, bool))).all()
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_carried_pixels_have_the_colours_of_the_reference_view(geometry: str) -> None:
+    """Depth of the other views must lie where their pictures show the thing: not mirrored, nor a row too far."""
+    scene = render("curved_occluders", size=64, views=3, **standing(geometry, (3, 3)))
+    posed = posed_views(scene, np.asarray(scene.ground_truth))
+    here = posed.picture(posed.poses.reference).astype(np.float64)
+    for view in range(len(posed.poses)):
+        carried = posed.carried(view)
+        y, x = np.nonzero(~np.isnan(carried))
+        assert len(y) > 0.7 * carried.size
+        back = np.column_stack([y, x]) + carried[y, x][:, None] * posed.poses.baselines[view]
+        rows, columns = np.clip(np.rint(back).astype(int), 0, 63).T
+        right = np.abs(posed.picture(view)[y, x] - here[rows, columns]).mean()
+        wrong = np.abs(posed.picture(view)[y, x] - here[y, x]).mean()
+        assert right < 0.5 * wrong or view == posed.poses.reference
+
+
+# --- what is asked for
+
+
+def test_points_are_the_surer_pixels_and_no_more_than_asked() -> None:
+    disparity = np.ones(SHAPE, np.float32)
+    confidence = np.linspace(0, 1, disparity.size, dtype=np.float32).reshape(SHAPE)
+    confidence[0, 0] = np.nan
+    scene = light_field()
+    half = posed_views(scene, disparity, confidence).chosen
+    np.testing.assert_array_equal(half, confidence >= np.median(np.nan_to_num(confidence, nan=-1)))
+    assert (posed_views(scene, disparity, confidence, min_confidence=0.9).chosen == (confidence >= 0.9)).all()
+    for most in (0, 1, 7, 40, 10**6):
+        posed = posed_views(scene, disparity, max_points=most)
+        assert posed.chosen.sum() <= most
+        assert len(posed.points) == len(posed.colours) == posed.chosen.sum()
+    unknown = np.zeros(SHAPE, bool)
+    unknown[4:] = True
+    assert posed_views(scene, disparity, unknown=unknown).known.sum() == 4 * SHAPE[1]
+
+
+def test_what_lies_at_infinity_has_no_depth() -> None:
+    """Beyond infinity, too: it would come out behind the cameras."""
+    disparity = np.ones(SHAPE, np.float32)
+    disparity[2, :3] = -8, -9, np.nan
+    posed = posed_views(light_field(camera=SHEARED), disparity)
+    depth = posed.depth(posed.carried(posed.poses.reference))
+    assert depth[2, :3].tolist() == [0, 0, 0]
+    assert posed.known.sum() == disparity.size - 3
+    np.testing.assert_array_equal(depth[posed.known], SHEARED.depth(disparity)[posed.known])
+    assert (posed.points[:, 2] > 0).all()
+
+
+def test_bad_numbers_are_refused() -> None:
+    scene, disparity = light_field(), np.ones(SHAPE, np.float32)
+    for bad, word in (
+        ({"disparity": disparity[1:]}, "disparity is"),
+        ({"confidence": disparity[1:]}, "confidence is"),
+        ({"unknown": np.zeros((2, 2), bool)}, "unknown is"),
+        ({"min_confidence": 1.5}, "within 0..1"),
+        ({"max_points": -1}, "0 points or more"),
+    ):
+        with pytest.raises(SepiError, match=word):
+            posed_views(scene, **{"disparity": disparity, **bad})
+
+
+@pytest.mark.parametrize("kind", [np.uint16, np.float32])
+def test_pictures_are_8_bit_colour_whatever_the_views_are(kind: type) -> None:
+    """What these programs read; a grey picture, or one of 16 bit, breaks some of them."""
+    levels = np.random.default_rng(6).integers(0, 256, (*GRID, *SHAPE, 1), np.uint8)
+    views = levels * kind(257) if kind is np.uint16 else (levels / 255).astype(kind)
+    posed = posed_views(replace(light_field(), views=views), np.ones(SHAPE, np.float32))
+    picture = posed.picture(posed.poses.reference)
+    assert picture.dtype == np.uint8
+    np.testing.assert_array_equal(picture, np.repeat(levels[1, 2], 3, axis=2))
