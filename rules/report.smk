@@ -167,7 +167,7 @@ rule maps:
         plan=plan_of_scene,
         pixels=pixels_of,
         page=page_flags,
-        code=lambda wildcards: code_digest("sepi.report.figures"),
+        code=lambda wildcards: code_digest("sepi.report.figures", *added("scenes").values()),
     message:
         "{wildcards.dataset}/{wildcards.scene}: images"
     shell:
@@ -217,35 +217,4 @@ rule graph:
         command(
             "sepi.report.graph --snakefile {input.snakefile:q} {params.flags} --output {output:q} "
             "{input.rules:q} 2> {log:q}"
-        )
-
-
-# Page of a report: all numbers, tables and scenes in one file
-rule page:
-    input:
-        numbers=lambda wildcards: f"reports/report{report_of(wildcards).ending()}.json",
-        parts=lambda wildcards: [] if wildcards.report else PARTS,
-        graph="reports/page/rules.svg",
-        scenes=pages_of_scenes,
-        templates=TEMPLATES,
-    output:
-        report("reports/{report}index.html", caption="captions/page.rst", category="Page"),
-    log:
-        "logs/{report}page.log",
-    benchmark:
-        "benchmarks/{report}page.tsv"
-    localrule: True
-    threads: 1
-    resources:
-        mem_mb=1000,
-    params:
-        parts=lambda wildcards, input: ["--parts", input.parts] if input.parts else [],
-        scenes=folder_of_scenes,
-        code=code_digest("sepi.report.page"),
-    message:
-        "page of the report"
-    shell:
-        command(
-            "sepi.report.page --numbers {input.numbers:q} {params.parts:q} --graph {input.graph:q} "
-            "--scenes {params.scenes:q} --output {output:q} 2> {log:q}"
         )

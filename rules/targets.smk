@@ -1,6 +1,6 @@
 # Files of pages, tables and images, and the inputs that they are made from.
 
-from sepi.report.plan import COMPARISON, PARTS_TABLES, TEMPLATES
+from sepi.report.plan import COMPARISON, PARTS_TABLES
 from sepi.report.published import FOLDER as PUBLISHED
 
 PARTS = "reports/report_parts.json" if SETTINGS.report.parts_of_best else []

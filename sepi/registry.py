@@ -44,6 +44,9 @@ class Extension(NamedTuple):
         ``COMMAND --FLAG`` to a module, whose ``extended`` takes the core's click command and returns one with the flag.
     datasets : mapping of str to str
         Key of ``config.yaml`` to a module, whose ``Dataset`` is the :class:`sepi.workflow.datasets.Dataset`.
+    scenes : mapping of str to str
+        Name to a module, whose ``write_scene`` adds to the pictures of each scene of a report, and may write its part
+        of a page, as :func:`sepi.report.figures.command` calls it.
     names : mapping of str to str
         Name in ``sepi`` to the module that has it.
     rules : collection of str
@@ -57,6 +60,7 @@ class Extension(NamedTuple):
     commands: Mapping[str, tuple[str, str]] = {}
     flags: Mapping[str, str] = {}
     datasets: Mapping[str, str] = {}
+    scenes: Mapping[str, str] = {}
     names: Mapping[str, str] = {}
     rules: Collection[str] = ()
 

@@ -13,6 +13,10 @@ import numpy as np
 from sepi.camera import Camera
 from sepi.errors import SepiWarning
 from sepi.evaluate import evaluations_of
+from sepi.extensions.page.page import page_of
+from sepi.extensions.page.probes.pixels import InterestingPixel
+from sepi.extensions.page.probes.scene_probes import scene_probes
+from sepi.extensions.page.scene import page_json
 from sepi.external import ExternalSource, external_maps
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.pfm import write_pfm
@@ -22,13 +26,10 @@ from sepi.io.truth import write_truth
 from sepi.lightfield import FloatMap, LightField
 from sepi.machine import this_machine
 from sepi.report import numbers
-from sepi.report.figures import page_json, read_results
+from sepi.report.figures import read_results
 from sepi.report.graph import drawn
-from sepi.report.page import page_of
 from sepi.report.panels import panels_of
 from sepi.report.plan import MAIN_VARIANT, Plan
-from sepi.report.probes.pixels import InterestingPixel
-from sepi.report.probes.scene_probes import scene_probes
 from sepi.scenes import render
 from sepi.stage import StageMaps, entry, no_progress
 from sepi.variants import STAGES, VARIANTS, stage_parameters

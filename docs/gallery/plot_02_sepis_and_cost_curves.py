@@ -11,9 +11,9 @@ that gives the method its name, to the curve whose minimum is the disparity.
 import matplotlib.pyplot as plt
 import numpy as np
 
+from sepi.extensions.page.probes.curves import cost_curves
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.stitched_epi import stitched_epi
-from sepi.report.probes.curves import cost_curves
 from sepi.scenes import render
 
 light_field = render("curved_occluders", size=128, views=9)

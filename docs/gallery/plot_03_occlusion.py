@@ -14,9 +14,9 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 
 import sepi
+from sepi.extensions.page.probes.curves import cost_curves
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.stitched_epi import stitched_epi
-from sepi.report.probes.curves import cost_curves
 from sepi.scenes import render
 from sepi.scoring.scores import score
 

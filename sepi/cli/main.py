@@ -18,7 +18,6 @@ for _name, _value in {"OPENBLAS_NUM_THREADS": "1", "NUMPY_MADVISE_HUGEPAGE": "0"
 
 _MODULES = {
     "check": ("info", "Check the order of the views of the light field INPUT."),
-    "compare": ("compare", "Show two disparity maps side by side on a page."),
     "convert": ("convert", "Write a map of a result as OpenEXR, TIFF or PFM."),
     "depth": ("depth", "Compute the disparity map of the light field INPUT."),
     "evaluate": ("evaluate", "Score a disparity map against ground truth."),

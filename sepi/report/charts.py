@@ -10,18 +10,18 @@ import numpy as np
 from matplotlib.patches import Patch
 
 from sepi.command import SepiCommand
+from sepi.report.page_data import BarGroup, StageTimes, ablation_bars, part_bars, stage_times
 from sepi.report.plots.error_bars import VariantBars, write_error_bars
 from sepi.report.plots.saving import new_figure, save
 from sepi.report.runs import Runs, read_numbers
 from sepi.report.tabular.error_bars import pooled_reliability, variants_with_bars, whole
-from sepi.report.web.page_data import BarGroup, StageTimes, ablation_bars, part_bars, stage_times
 
 _OURS, _PUBLISHED = "#4a7fae", "#b9bfc5"
 _STAGES = ("#3b5b92", "#2a8c8c", "#7ab648", "#d9b430", "#b25d2c", "#7d4f9e")
 
 
 def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
-    """Write bars for each group of :func:`sepi.report.web.page_data.ablation_bars`; without groups, a sentence."""
+    """Write bars for each group of :func:`sepi.report.page_data.ablation_bars`; without groups, a sentence."""
     if not groups:
         figure = new_figure(4.2, 1)
         figure.text(0.5, 0.5, "no scene with ground truth", ha="center", va="center", fontsize=8)

@@ -53,11 +53,6 @@ COMPARISON_TABLES = ("methods", "table1_mse", "table2_q25", "table3_regions", "e
 RENDERED_TABLES = ("properties_mse", "properties_q25", "properties_badpix", "scenes_mse", "scenes_badpix", "error_bars")
 """Tables of the rendered scenes, in the order of their page."""
 
-TEMPLATES = sorted(
-    path for path in (Path(__file__).parent / "web" / "templates").iterdir() if path.suffix in (".j2", ".js", ".css")
-)
-"""Files that make up the page."""
-
 PARTS_TABLES = ("ablation_best",)
 """Tables of the ablation of the best variant, made from a file of numbers of their own."""
 

@@ -32,7 +32,7 @@ import re
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
-from importlib.util import resolve_name
+from importlib.util import find_spec, resolve_name
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from sepi.stage import Choice
 
 ROOT = Path(__file__).parents[2]
+_PACKAGE = __name__.partition(".")[0]
 
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 # blocks of a module that do not run when it is imported
@@ -80,7 +81,7 @@ def ingest_modules(reader: str) -> tuple[str, ...]:
 
 @cache
 def code_digest(*modules: str, root: Path = ROOT) -> str:
-    """Digest of modules and of all modules that they import from their own package.
+    """Digest of modules and of all modules that they import from their own package and from this one.
 
     Parameters
     ----------
@@ -124,9 +125,18 @@ def _is_alternative(module: str) -> bool:
 
 
 @cache
+def _root_of(package: str, root: Path) -> Path:
+    """Folder that holds a package: ``root``, or where an extension is installed."""
+    spec = None if (root / package).is_dir() else find_spec(package)
+    if spec is None or spec.origin is None:
+        return root
+    return Path(spec.origin).parents[0 if spec.submodule_search_locations is None else 1]
+
+
+@cache
 def _file_of(module: str, root: Path) -> Path | None:
     *above, name = module.removesuffix(_HEADER).split(".")
-    folder = root.joinpath(*above)
+    folder = _root_of(module.partition(".")[0], root).joinpath(*above)
     if module.endswith(_HEADER):
         return folder / f"{name}{_HEADER}"
     # kernels lie beside their callers, and are imported from one package
@@ -151,7 +161,7 @@ def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
         return code, frozenset(_header(name, file, root) for _, name, _ in named)
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
     imports = {name for level, base, names in named for name in _imported(level, base, names, package, root)}
-    return code, frozenset(name for name in imports if name.split(".")[0] == module.split(".")[0])
+    return code, frozenset(imports)
 
 
 def _kernel_code(source: bytes) -> _Code:
@@ -196,6 +206,8 @@ def _dumped(node: Any, named: list[tuple[int, str, list[str]]]) -> str:
 def _imported(level: int, base: str, names: list[str], package: str, root: Path) -> Iterator[str]:
     """Modules that a statement imports; for ``from pkg import name``: ``pkg.name`` if it is a module, else ``pkg``."""
     base = resolve_name("." * level + base, package)
+    if base.partition(".")[0] not in (package.partition(".")[0], _PACKAGE):
+        return
     if not names:
         yield base
     for name in names:

@@ -14,6 +14,7 @@ from sepi.errors import SepiError
 from sepi.io.readers.options import Index
 from sepi.io.scores import ExternalSource
 from sepi.models import CheckedModel
+from sepi.registry import added
 from sepi.stage import Parameters
 from sepi.validation import require_known
 from sepi.variants import VARIANTS, Variant
@@ -139,6 +140,8 @@ class Settings:
     @property
     def has_page(self) -> bool:
         """Whether the report's page is made."""
+        if not added("scenes"):
+            return False
         return len(self.scenes) <= MOST_ON_PAGE if self.report.page is None else self.report.page
 
     def parameters_json(self, stage: str, label: str) -> str:

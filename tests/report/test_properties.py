@@ -12,8 +12,7 @@ from sepi import variants as built_in
 from sepi.evaluate import evaluations_of
 from sepi.io.scores import write_scores
 from sepi.lightfield import LightField
-from sepi.report import numbers, page
-from sepi.report.page import page_of
+from sepi.report import numbers
 from sepi.report.plan import RENDERED_TABLES, Plan
 from sepi.report.pooled import pooled_q25
 
@@ -108,7 +107,8 @@ def test_the_page_averages_nothing_over_scenes_and_levels(
     found: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One figure of all would hide what each property does; and of further seeds it has no scene to read."""
-    text = page_of(found, [], "<svg></svg>")
+    page = pytest.importorskip("sepi.extensions.page.page")
+    text = page.page_of(found, [], "<svg></svg>")
     assert "<h1>Light field depth: scenes rendered like photographs</h1>" in text
     assert "rendered, average of" not in text
     assert "whole map, average of" not in text

@@ -13,7 +13,6 @@ from snakemake.iocontainers import Wildcards
 from workflow_copy import REPOSITORY, TINY, Workflow
 
 from sepi.errors import SepiError
-from sepi.report.plan import TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
 from sepi.variants import HANDED_ON, STAGES
 from sepi.workflow.code_digest import code_digest, ingest_modules, stage_modules
@@ -118,7 +117,9 @@ def test_every_file_that_a_job_reads_is_an_input(read: Any) -> None:
         os.utime(file, ns=(0, 1))
         assert len({before, older, rules[rule].params.dates(of)}) == 3
     assert {Path(file) for file in rules["numbers"].input.published} == set(PUBLISHED.glob("*.csv"))
-    assert {Path(file) for file in rules["page"].input.templates} == set(TEMPLATES)
+    assert {Path(file) for file in rules["page"].input.templates} == set(
+        (REPOSITORY / "sepi/extensions/page/templates").iterdir()
+    )
 
 
 def test_the_page_can_be_left_out_and_is_by_itself_where_there_are_too_many_scenes(tmp_path: Path) -> None:

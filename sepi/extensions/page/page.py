@@ -16,10 +16,9 @@ from matplotlib.colors import Colormap
 
 from sepi.command import SepiCommand
 from sepi.io.files import atomic_path
-from sepi.report import published
+from sepi.report import page_data, published
 from sepi.report.plots.pictures import error_scale, scale_colours
 from sepi.report.runs import Runs, read_json, read_numbers
-from sepi.report.web import page_data
 from sepi.workflow.rendered_scenes import DATASET
 
 SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "tables.js", "page.js")
@@ -29,7 +28,7 @@ SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "table
 def environment() -> Environment:
     """Jinja2's environment for the page's templates; an undefined name is an error."""
     made = Environment(
-        loader=PackageLoader("sepi.report.web"),
+        loader=PackageLoader("sepi.extensions.page"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -144,7 +143,7 @@ def read_scene(path: Path) -> dict[str, Any]:
 _FILE = click.Path(path_type=Path)
 
 
-@click.command(name="python -m sepi.report.page", cls=SepiCommand)
+@click.command(name="python -m sepi.extensions.page.page", cls=SepiCommand)
 @click.option("--numbers", "numbers_path", type=_FILE, required=True, help="Numbers of the report (JSON).")
 @click.option("--parts", "parts_path", type=_FILE, help="Numbers of the best variant's parts (JSON).")
 @click.option("--graph", "graph_path", type=_FILE, required=True, help="Rule graph (SVG).")

@@ -13,6 +13,11 @@ from geometries import GEOMETRIES, standing
 from bench.noisy import with_noise
 from sepi.errors import SepiError
 from sepi.exposure import equally_bright
+from sepi.extensions.page.probes import scene_probes
+from sepi.extensions.page.probes.curves import cost_curves
+from sepi.extensions.page.probes.figure import write_probes
+from sepi.extensions.page.probes.pixels import APART, BORDER, InterestingPixel, interesting_pixels
+from sepi.extensions.page.probes.probe import GREY, HALF_WIDTH, probe, sepi_picture, to_json
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.denoising import sure_noise
 from sepi.matching.plane_sweep import SweepParameters, sweep
@@ -22,11 +27,6 @@ from sepi.pipeline import estimate_depth
 from sepi.report.panels import SceneResults
 from sepi.report.plan import MAIN_VARIANT
 from sepi.report.plots.pictures import reference_picture
-from sepi.report.probes import scene_probes
-from sepi.report.probes.curves import cost_curves
-from sepi.report.probes.figure import write_probes
-from sepi.report.probes.pixels import APART, BORDER, InterestingPixel, interesting_pixels
-from sepi.report.probes.probe import GREY, HALF_WIDTH, probe, sepi_picture, to_json
 from sepi.scenes import render
 from sepi.stage import StageMaps
 

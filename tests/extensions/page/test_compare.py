@@ -11,10 +11,10 @@ from browser import canvas_pixels, choose, map_pixels, opened, part, place_of, p
 from click.testing import CliRunner, Result
 
 from sepi.cli.main import main
+from sepi.extensions.page.comparison_page import Comparison, comparison_page
 from sepi.io.hdf5 import write_stage
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import FloatMap
-from sepi.report.web.comparison_page import Comparison, comparison_page
 from sepi.scenes import render, write_hci
 from sepi.scoring.scores import score
 from sepi.stage import StageMaps

@@ -40,9 +40,9 @@ def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, own: Trut
       sepi compare before.pfm after.pfm gt_disp_lowres.pfm -o page.html
     """
     from sepi.cli.evaluate import score_table
+    from sepi.extensions.page.comparison_page import Comparison, comparison_page
     from sepi.io.all_views import read_disparity_at, read_error_bars_at
     from sepi.io.files import atomic_path
-    from sepi.report.web.comparison_page import Comparison, comparison_page
 
     view = reading.options.view
     maps = read_disparity_at(a, view), read_disparity_at(b, view)

@@ -10,8 +10,8 @@ import pytest
 from browser import CLOUD, WIPE, canvas_pixels, choose, complains, opened, part, place_of, point_at, settled, show_scene
 from page_example import COTTON_TITLE, DOTS_TITLE, EDGES, PICTURE_TITLE, Example
 
+from sepi.extensions.page.page import page_of
 from sepi.report.graph import drawn
-from sepi.report.page import page_of
 
 
 def test_the_page_opens_from_disk_and_asks_for_nothing(page: Any) -> None:

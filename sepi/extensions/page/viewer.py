@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from sepi.extensions.page.packing import packed
 from sepi.lightfield import LightField
 from sepi.report.panels import Panel
 from sepi.report.plots.pictures import ERROR_LIMIT, SIGMA_LIMITS, logarithms, outlines, picture_uri, reference_picture
-from sepi.report.web.packing import packed
 
 STEPS = (
     (0.001, 0.01, 0.002),

@@ -9,12 +9,12 @@ import numpy as np
 
 from sepi.exposure import equally_bright
 from sepi.inspection.coded_views import without_blocks
+from sepi.extensions.page.probes.pixels import InterestingPixel, interesting_pixels
+from sepi.extensions.page.probes.probe import Probe, probe
 from sepi.io.provenance import history_of
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.report.panels import SceneResults
 from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
-from sepi.report.probes.pixels import InterestingPixel, interesting_pixels
-from sepi.report.probes.probe import Probe, probe
 
 
 def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[InterestingPixel]) -> list[Probe]:

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from sepi.extensions.page.page import SCRIPTS, colour_scales, embedded_scenes, environment
+from sepi.extensions.page.viewer import viewer_json
 from sepi.io.scores import AllScores
 from sepi.lightfield import FloatMap, LightField
-from sepi.report.page import SCRIPTS, colour_scales, embedded_scenes, environment
 from sepi.report.panels import Panel
 from sepi.report.tabular.layout import BEST, Column, Entry, Kind, Line, Section, entry
-from sepi.report.web.viewer import viewer_json
 from sepi.scoring.error_bars import ERROR_BAR_SCORES, ErrorBars
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, SCORES, region_masks, score_regions
 from sepi.stage import StageMaps

@@ -1,0 +1,33 @@
+# What makes up the page
+TEMPLATES = sorted(Path(find_spec("sepi.extensions.page").origin).with_name("templates").iterdir())
+
+
+# Page of a report: all numbers, tables and scenes in one file
+rule page:
+    input:
+        numbers=lambda wildcards: f"reports/report{report_of(wildcards).ending()}.json",
+        parts=lambda wildcards: [] if wildcards.report else PARTS,
+        graph="reports/page/rules.svg",
+        scenes=pages_of_scenes,
+        templates=TEMPLATES,
+    output:
+        report("reports/{report}index.html", caption="caption.rst", category="Page"),
+    log:
+        "logs/{report}page.log",
+    benchmark:
+        "benchmarks/{report}page.tsv"
+    localrule: True
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        parts=lambda wildcards, input: ["--parts", input.parts] if input.parts else [],
+        scenes=folder_of_scenes,
+        code=code_digest("sepi.extensions.page.page"),
+    message:
+        "page of the report"
+    shell:
+        command(
+            "sepi.extensions.page.page --numbers {input.numbers:q} {params.parts:q} --graph {input.graph:q} "
+            "--scenes {params.scenes:q} --output {output:q} 2> {log:q}"
+        )
