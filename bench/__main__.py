@@ -15,15 +15,15 @@ from bench.cases import GROUPS
 from bench.measure import Case, Measurement, Result, measured, read_result
 from bench.noisy import DIGITS
 from bench.scene import Scene
-from sepi.command import SepiGroup
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
-from sepi.machine import this_machine
+from sepi.process.command import SepiGroup
+from sepi.process.machine import this_machine
+from sepi.process.threads import available_cores, use_threads
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
 from sepi.scoring.scores import SCORES
-from sepi.threads import available_cores, use_threads
 from sepi.variants import VARIANTS, needing_files, variant_named
 from sepi.workflow.rendered_scenes import NOISE_LEVELS
 

@@ -15,15 +15,15 @@ import numpy.typing as npt
 from tqdm import tqdm
 
 from bench import tables
-from sepi.built_in_variants import DEFAULT_VARIANT
-from sepi.command import SepiCommand
 from sepi.extensions.views.all_views import EDGE_VIEWS, estimate_all_views
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.carried_map import carried_map
 from sepi.pipeline import estimate_depth
+from sepi.process.command import SepiCommand
+from sepi.process.threads import use_threads
 from sepi.scenes import SCENES, render, true_disparity
-from sepi.threads import use_threads
 from sepi.variants import VARIANTS
+from sepi.variants.built_in import DEFAULT_VARIANT
 
 BAD = 0.07
 """Error above which a pixel is bad, pixels per view step."""

@@ -13,10 +13,10 @@ from typing import Any
 import click
 from tabulate import tabulate
 
-from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.inspection.disparity_range import settle_range
 from sepi.lightfield import LightField
+from sepi.process.command import SepiCommand
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
 from sepi.scoring.scores import score

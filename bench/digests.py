@@ -54,7 +54,7 @@ def _digests(threads: int, variants: tuple[str, ...], scene: str, size: int, vie
     from sepi.pipeline import estimate_depth
     from sepi.scenes import render
 
-    # not by sepi.threads, which is limited to the number of cores
+    # not by sepi.process.threads, which is limited to the number of cores
     kernels.set_thread_count(threads)
     cv2.setNumThreads(threads)
     light_field = render(scene, size=size, views=views)

@@ -16,9 +16,9 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from sepi.command import peak_memory_mb, use_memory_again
 from sepi.errors import SepiError
-from sepi.threads import use_threads
+from sepi.process.command import peak_memory_mb, use_memory_again
+from sepi.process.threads import use_threads
 
 Figures = dict[str, float]
 
@@ -189,7 +189,7 @@ def _measure(case: Case, repeats: int, threads: int) -> Measurement:
 # runs the named module like `python -m`, and prints its peak memory at the end
 _MODULE = """
 import atexit, runpy, sys
-from sepi.command import peak_memory_mb
+from sepi.process.command import peak_memory_mb
 atexit.register(lambda: print(peak_memory_mb(), file=sys.stderr))
 del sys.argv[0]
 runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

@@ -12,11 +12,11 @@ from typing import Any
 from tabulate import tabulate
 
 from sepi.errors import SepiError
-from sepi.exposure import equally_bright
 from sepi.extensions.rendered.catalogue import RENDERED
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import has_dataset
 from sepi.lightfield import LightField
+from sepi.matching.exposure import equally_bright
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
 from sepi.scoring.scores import score

@@ -37,7 +37,15 @@ extensions = [
     "extensions.links",
     "extensions.figures_in_tables",
 ]
-exclude_patterns = ["_made", "_templates", "gallery", "extensions", "pictures", "**/GALLERY_HEADER.*"]
+exclude_patterns = [
+    "_made",
+    "_templates",
+    "gallery",
+    "extensions",
+    "example_extension",
+    "pictures",
+    "**/GALLERY_HEADER.*",
+]
 templates_path = ["_templates"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 

@@ -9,8 +9,8 @@ import click
 from pictures import failures, geometry, stages, stitching
 from pictures.style import Draw, write_drawing
 
-from sepi.command import progress_bar
 from sepi.io.files import atomic_path
+from sepi.process.command import progress_bar
 
 SIZE = 128
 """Height and width in pixels of the built-in scenes on them."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
-from sepi.command import WORKFLOW_PROCESS
+from sepi.process.command import WORKFLOW_PROCESS
 from sepi.errors import SepiError
 from sepi.io.result_files import RESULT_FILES
 from sepi.registry import added, extensions

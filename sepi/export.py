@@ -7,12 +7,12 @@ from pathlib import Path
 
 import click
 
-from sepi.command import SepiCommand
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.provenance import history_of
 from sepi.io.result_files import remove_result
 from sepi.io.result_folder import write_result
 from sepi.matching.unknown import with_unknown
+from sepi.process.command import SepiCommand
 from sepi.stage import MadeBy
 
 _PATH = click.Path(path_type=Path)

@@ -13,10 +13,10 @@ from pathlib import Path
 import click
 
 from sepi.cli.input_options import Reading, range_to_search, reading_flags, scene_flags
-from sepi.command import SepiCommand, write_timing
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import write_light_field
-from sepi.threads import use_threads
+from sepi.process.command import SepiCommand, write_timing
+from sepi.process.threads import use_threads
 from sepi.validation import settings_of
 
 _PATH = click.Path(path_type=Path)

@@ -135,6 +135,6 @@ CHOICES = {
 }
 
 if __name__ == "__main__":
-    from sepi.command import stage_command
+    from sepi.process.command import stage_command
 
     stage_command("initial", CHOICES)()

@@ -27,7 +27,7 @@ from sepi.errors import SepiError, one_line
 from sepi.validation import described, is_finite, require_known, require_type, whole_pair
 
 if TYPE_CHECKING:
-    from sepi.workspace import Workspace
+    from sepi.process.workspace import Workspace
 
 FloatMap = npt.NDArray[np.float32]
 BoolMap = npt.NDArray[np.bool_]
@@ -156,7 +156,7 @@ class LightField:
         1 or -1 if file names tell that the coordinates of cameras grow or fall from row to row, and from column to
         column; 0: unknown.
     workspace : Workspace or None
-        Intermediate results that stages share (:mod:`sepi.workspace`); not part of the light field.
+        Intermediate results that stages share (:mod:`sepi.process.workspace`); not part of the light field.
 
     Raises
     ------

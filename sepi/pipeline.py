@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from sepi.built_in_variants import DEFAULT_VARIANT
-from sepi.exposure import equally_bright
 from sepi.inspection.coded_views import without_blocks
 from sepi.lightfield import LightField, require_light_field
+from sepi.matching.exposure import equally_bright
 from sepi.matching.memory_limit import bytes_of_bands, bytes_of_volumes, require_memory_of
 from sepi.matching.unknown import with_unknown
-from sepi.memory import give_back_memory
+from sepi.process.memory import give_back_memory
+from sepi.process.workspace import Workspace
 from sepi.stage import MadeBy, Parameters, Progress, StageMaps, entry, no_progress
 from sepi.validation import require_type
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, Variant, stage_parameters, variant_named
-from sepi.workspace import Workspace
+from sepi.variants.built_in import DEFAULT_VARIANT
 
 
 def estimate_depth(

@@ -18,7 +18,7 @@ from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ReadOptions, in_grid, unarranged
 from sepi.lightfield import DisparityRange, LightField
-from sepi.memory import give_back_memory
+from sepi.process.memory import give_back_memory
 from sepi.validation import described, require_type
 
 # 16-bit views darker than this, a sixteenth of the full scale, have fewer bits or hardly any light

@@ -51,6 +51,13 @@ class Extension(NamedTuple):
         Name in ``sepi`` to the module that has it.
     rules : collection of str
         Modules, each of a ``rules.smk`` beside its ``__init__.py``, which the workflow includes.
+
+    Examples
+    --------
+    >>> from sepi.registry import Extension
+    >>> extension = Extension(choices={"optimize.median": "mine.method"}, variants={"median": {"base": "fast"}})
+    >>> list(extension.variants), extension.commands
+    (['median'], {})
     """
 
     choices: Mapping[str, str] = {}

@@ -8,11 +8,11 @@ from pathlib import Path
 import click
 
 from sepi.cli.input_options import Reading, reading_flags, scene_flags, truth_flags
-from sepi.command import SepiCommand
 from sepi.io.disparity_maps import TruthFile
 from sepi.io.hdf5 import read_light_field
 from sepi.io.truth import write_truth
 from sepi.lightfield import Truth
+from sepi.process.command import SepiCommand
 
 _PATH = click.Path(path_type=Path)
 

@@ -12,7 +12,7 @@ from remembered_scenes import FOLDER, remembered
 
 import sepi.scenes
 from sepi import kernels
-from sepi.threads import available_cores
+from sepi.process.threads import available_cores
 
 if TYPE_CHECKING:
     from page_example import Example

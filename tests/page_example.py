@@ -24,7 +24,7 @@ from sepi.io.provenance import scene_attributes, stage_attributes
 from sepi.io.scores import ExternalMap, map_name, write_external, write_scores
 from sepi.io.truth import write_truth
 from sepi.lightfield import FloatMap, LightField
-from sepi.machine import this_machine
+from sepi.process.machine import this_machine
 from sepi.report import numbers
 from sepi.report.figures import read_results
 from sepi.report.graph import drawn

@@ -11,7 +11,6 @@ import pytest
 import sepi
 from sepi.camera import camera_from
 from sepi.evaluate import evaluation_of, evaluations_of
-from sepi.extensions.benchmark.hci_submission import problems_of, write_submission
 from sepi.inspection.disparity_range import estimate_range
 from sepi.inspection.view_order import check_order
 from sepi.io.disparity_maps import read_disparity
@@ -23,12 +22,12 @@ from sepi.io.point_cloud import point_cloud
 from sepi.matching.sheared_views import ShearedViews
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.unknown import unknown_pixels
+from sepi.process.threads import use_threads
 from sepi.scenes import render, write_hci
 from sepi.scoring.confidence import oracle, sparsification
 from sepi.scoring.edges import edges_of
 from sepi.scoring.regions import occluded, textureless
 from sepi.scoring.scores import region_masks, score, score_regions
-from sepi.threads import use_threads
 from sepi.variants import VARIANTS, stage_parameters
 
 VIEWS = np.zeros((3, 3, 64, 64, 3), np.uint8)
@@ -112,8 +111,6 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "parameters as number": (depth(SCENE, "paper", {"initial": 3}), "parameters: initial: expected parameters"),
     "parameters as list": (depth(SCENE, "paper", [1]), "parameters: expected stages"),
     "memory as text": (depth(SCENE, memory="1"), "memory: expected a number of bytes, got '1'"),
-    "views of an array": (lambda: sepi.estimate_all_views(VIEWS), "light field: expected a LightField"),  # type: ignore[arg-type]
-    "focus on text": (lambda: sepi.refocus(SCENE, "a"), "dots: disparity to focus at .* got 'a'"),  # type: ignore[arg-type]
     "result of an array": (written("unwritten", VIEWS, None), "light field: expected a LightField"),
     "result of a map": (written("unwritten", SCENE, ONES), "dots: maps: expected StageMaps"),
     "result nowhere": (written(None, SCENE, sepi.StageMaps(ONES, ONES)), "folder of the result: expected a path"),
@@ -126,10 +123,6 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "confidence without numbers": (write(ONES, ONES * np.nan), "dots: confidence must lie within 0..1, got NaN"),
     "numbers of unknown": (write(unknown=ONES.astype(np.uint8)), "dots: map 'unknown': expected bool, got uint8"),
     "text as seconds": (written("unwritten", SCENE, sepi.StageMaps(ONES, ONES), seconds="a"), "unwritten: seconds: "),
-    "focus everywhere on an array": (call(sepi.all_in_focus, VIEWS, ONES), "light field: expected a LightField"),
-    "focus everywhere by text": (call(sepi.all_in_focus, SCENE, "a"), "dots: map: expected an array of numbers"),
-    "focus everywhere by complex": (call(sepi.all_in_focus, SCENE, ONES.astype(complex)), "dots: map: .* complex128"),
-    "aperture of text": (call(sepi.refocus, SCENE, 0, aperture="a"), "dots: aperture: expected a radius"),
     "size of text": (call(render, "dots", size="a"), "size must be a whole number"),
     "scene of an array": (call(write_hci, VIEWS, "unwritten"), "light field: expected a LightField"),
     "scene to nowhere": (call(write_hci, SCENE, None), "folder of the light field: expected a path, got None"),
@@ -171,8 +164,6 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "texture of text": (call(textureless, "a"), "reference view: expected an array"),
     "confidence of text": (call(sparsification, "a", ONES), "confidence: expected an array"),
     "best confidence of text": (call(oracle, "a"), "error: expected an array"),
-    "submission of numbers": (call(write_submission, "unwritten", 3), "unwritten: entries: expected scenes"),
-    "submission from nowhere": (call(problems_of, None), "submission: expected a path"),
     "parameters of no variant": (call(stage_parameters, None), "variant: expected a Variant, got None"),
     "number as reading": (field(reading=3), "mine: reading: expected text, got 3"),
     "options: grid": (lambda: sepi.ReadOptions(grid="5x5"), "options: grid: expected two whole"),  # type: ignore[arg-type]

@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 import pytest
 
-from sepi.built_in_variants import PARTS_OF_BEST
 from sepi.lightfield import DisparityRange, LightField
 from sepi.pipeline import estimate_depth
 from sepi.regularization.border_planes import BorderPlaneParameters, ransac_plane
@@ -15,6 +14,7 @@ from sepi.scenes import render
 from sepi.scoring.confidence import oracle, sparsification
 from sepi.scoring.scores import score
 from sepi.variants import VARIANTS
+from sepi.variants.built_in import PARTS_OF_BEST
 
 pytestmark = pytest.mark.slow
 

@@ -17,11 +17,11 @@ from click.testing import CliRunner, Result
 from error_lines import error_of
 from pydantic import Field
 
-from sepi.command import SepiCommand, progress_bar, stage_command
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
 from sepi.io.provenance import history_of
 from sepi.lightfield import DisparityRange, LightField
+from sepi.process.command import SepiCommand, progress_bar, stage_command
 from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps
 
 
@@ -152,7 +152,7 @@ class TestErrors:
 SLOW = """
 import sys, time
 from pathlib import Path
-from sepi.command import stage_command
+from sepi.process.command import stage_command
 from sepi.stage import Choice, NoParameters, StageMaps
 import numpy as np
 from sepi.io import hdf5

@@ -8,12 +8,12 @@ import numpy.typing as npt
 import pytest
 from click.testing import CliRunner
 
-from sepi.command import stage_command
-from sepi.exposure import brightness_factors, equally_bright
 from sepi.initial import CHOICES
 from sepi.io.hdf5 import read_stage, write_light_field
 from sepi.lightfield import LightField
+from sepi.matching.exposure import brightness_factors, equally_bright
 from sepi.pipeline import estimate_depth
+from sepi.process.command import stage_command
 from sepi.scenes import SCENES, render
 from sepi.variants import Variant
 

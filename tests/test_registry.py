@@ -17,6 +17,7 @@ from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.io.pfm import read_pfm
 from sepi.scenes import render
+from sepi.variants import STAGES
 
 EXAMPLE = REPOSITORY / "docs/example_extension"
 

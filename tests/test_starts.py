@@ -131,7 +131,8 @@ def run_without_limits(program: str, **environment: str) -> None:
 def test_no_more_threads_than_were_given() -> None:
     """A scheduler gives a job one core of many: with more threads than that, its neighbours wait."""
     run_without_limits(
-        f"{NARROW}from sepi.threads import threads_used, use_threads\nassert threads_used() == 1, threads_used()\n"
+        f"{NARROW}from sepi.process.threads import threads_used, use_threads\n"
+        "assert threads_used() == 1, threads_used()\n"
         "use_threads(64)\nassert threads_used() == 1, threads_used()"
     )
 
@@ -140,7 +141,7 @@ def test_no_more_threads_than_were_given() -> None:
 def test_threads_are_kept_to_whether_or_not_libraries_are_there(before: str) -> None:
     """Asked for one thread, a job must not take the cores of the jobs beside it."""
     run_without_limits(
-        f"{before}from sepi.threads import threads_used, use_threads\nuse_threads(1)\nimport cv2\n"
+        f"{before}from sepi.process.threads import threads_used, use_threads\nuse_threads(1)\nimport cv2\n"
         "assert (threads_used(), cv2.getNumThreads()) == (1, 1)"
     )
 
@@ -153,8 +154,8 @@ def test_the_api_can_be_imported_where_a_system_lacks_signals_and_limits() -> No
         "sys.modules['resource'] = None\n"
         "del signal.SIGHUP, os.sched_getaffinity\n"
         "import numpy, sepi, sepi.cli.main\n"
-        "from sepi.command import peak_memory_mb, shown_errors\n"
-        "from sepi.threads import available_cores\n"
+        "from sepi.process.command import peak_memory_mb, shown_errors\n"
+        "from sepi.process.threads import available_cores\n"
         "field = sepi.LightField(numpy.zeros((3, 3, 8, 8, 3), numpy.uint8), 'a', "
         "disparity_range=sepi.DisparityRange(-1, 1, 'given'))\n"
         "with shown_errors():\n"
@@ -177,7 +178,7 @@ def test_commands_take_the_cores_that_they_were_given(tmp_path: Path) -> None:
         f"for words in ['info', {scene!r}], ['check', {scene!r}], ['depth', {scene!r}, '-o', {out!r}]:\n"
         "    main(words, standalone_mode=False)\n"
         f"    assert {{name for name in {SLOW!r} if name in sys.modules}} == {{'PIL'}}, words\n"
-        "    import cv2\n    from sepi.threads import threads_used\n"
+        "    import cv2\n    from sepi.process.threads import threads_used\n"
         "    assert (threads_used(), cv2.getNumThreads()) == (1, 1), words"
     )
     run_without_limits(program)

@@ -6,7 +6,7 @@ import click
 from sphinx.application import Sphinx
 
 from sepi.cli import main as cli
-from sepi.command import SepiCommand
+from sepi.process.command import SepiCommand
 
 _FOUND = {name: cli.main.commands[name] for name in sorted(cli.main.commands)}
 

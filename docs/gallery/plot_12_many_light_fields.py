@@ -15,9 +15,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import sepi
+from sepi.process.threads import use_threads
 from sepi.scenes import render, write_hci
 from sepi.scoring.scores import score
-from sepi.threads import use_threads
 
 # %%
 # Something to work on

@@ -9,8 +9,8 @@ import click
 
 from sepi.cli.input_options import Geometry, camera_flags, view_of_result
 from sepi.cli.scene_argument import camera_of
-from sepi.command import SepiCommand
 from sepi.errors import SepiError
+from sepi.process.command import SepiCommand
 
 if TYPE_CHECKING:
     from sepi.lightfield import FloatMap

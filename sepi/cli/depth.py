@@ -13,8 +13,8 @@ import click
 
 from sepi.cli.info import range_text, size_text
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, range_to_search, reading_flags
-from sepi.command import SepiCommand, progress_bar
 from sepi.errors import SepiError
+from sepi.process.command import SepiCommand, progress_bar
 
 # other imports stand in the functions, since `sepi depth --help` does not need them
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def depth(
       sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
       sepi depth cotton --variant paper --set initial.sepi.num_disparities=91
     """
-    from sepi.threads import available_cores, use_threads
+    from sepi.process.threads import available_cores, use_threads
 
     started = time.perf_counter()
     use_threads(threads or available_cores())

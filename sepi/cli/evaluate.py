@@ -13,8 +13,8 @@ import click
 
 from sepi.cli.input_options import Pair, Reading, reading_flags, truth_flags
 from sepi.cli.scene_argument import read_ground_truth
-from sepi.command import SepiCommand, bad_thresholds
 from sepi.errors import SepiError, SepiWarning
+from sepi.process.command import SepiCommand, bad_thresholds
 
 if TYPE_CHECKING:
     from sepi.io.disparity_maps import TruthFile

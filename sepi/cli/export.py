@@ -10,8 +10,8 @@ import click
 
 from sepi.cli.info import range_text, size_text
 from sepi.cli.input_options import Geometry, Reading, camera_flags, range_to_search, reading_flags, truth_flags
-from sepi.command import SepiCommand
 from sepi.errors import SepiError
+from sepi.process.command import SepiCommand
 
 if TYPE_CHECKING:
     from sepi.io.disparity_maps import TruthFile

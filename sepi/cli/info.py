@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
-from sepi.command import SepiCommand
 from sepi.errors import SepiError
+from sepi.process.command import SepiCommand
 
 # other imports stand in the functions, since `sepi --help` does not need them
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from sepi.command import SepiGroup, shown_errors
+from sepi.process.command import SepiGroup, shown_errors
 from sepi.registry import Known
 
 # NumPy reads these when imported. Products are small here, so threads of OpenBLAS would only wait. Pages of 2 MB take

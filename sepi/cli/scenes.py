@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from sepi.command import SepiCommand
 from sepi.errors import SepiError
+from sepi.process.command import SepiCommand
 
 _PATH = click.Path(path_type=Path)
 

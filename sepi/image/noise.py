@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.workspace import OfViews, kept_of
+from sepi.process.workspace import OfViews, kept_of
 
 BLACK, SATURATED = 0.01, 254 / 255
 """Values beyond which a pixel counts as black or overexposed: the limits of the range cut its noise off."""

@@ -21,7 +21,7 @@ from sepi.image.noise import noise_level
 from sepi.io.readers.options import ORDERS
 from sepi.kernels import view_order as kernels
 from sepi.lightfield import FloatMap, LightField, as_unit_float
-from sepi.threads import threads_used
+from sepi.process.threads import threads_used
 
 REACH = 8
 """Views up to this many rows or columns away are looked at."""

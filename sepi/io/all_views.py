@@ -12,13 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.interrupts import interruptibly
 from sepi.io import hdf5
 from sepi.io.disparity_maps import read_disparity, read_error_bars
 from sepi.io.provenance import Origin, read_origin
 from sepi.io.result_files import ALL_VIEWS
 from sepi.io.result_folder import Result, read_result
 from sepi.lightfield import FloatMap, LightField
+from sepi.process.interrupts import interruptibly
 from sepi.stage import ERROR_BARS, StageMaps
 
 View = tuple[int, int]

@@ -26,9 +26,9 @@ import numpy.typing as npt
 from sepi.camera import Camera, numbers_of
 from sepi.camera.rig import Rig
 from sepi.errors import SepiError, printable
-from sepi.interrupts import no_interrupt_lost
 from sepi.io.files import DEFLATE_RATIO, PatientFile, atomic_path, reading
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
+from sepi.process.interrupts import no_interrupt_lost
 from sepi.stage import ERROR_BARS, CostVolume, StageMaps
 from sepi.validation import require_known, require_path
 

@@ -23,7 +23,7 @@ from sepi.io.files import atomic_path, reading
 from sepi.io.picture_headers import Header, pillow_class, pnm_pixels, read_header
 from sepi.io.tiff import open_tiff, page_pixels
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
-from sepi.threads import available_cores
+from sepi.process.threads import available_cores
 
 Pixels = npt.NDArray[np.integer[Any] | np.floating[Any]]
 

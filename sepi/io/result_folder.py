@@ -27,8 +27,8 @@ from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import DIGEST, RESULT, result_attributes
 from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, UNKNOWN, names_as_taken, require_own, sound_maps
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
+from sepi.process.threads import available_cores
 from sepi.stage import StageMaps
-from sepi.threads import available_cores
 from sepi.validation import described, is_finite, require_path, require_type
 
 _Attributes = Mapping[str, hdf5.Attribute]

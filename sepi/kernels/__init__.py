@@ -1,8 +1,8 @@
 """Compiled loops: a submodule for each file ``kernels/NAME.cpp`` of a folder, built for the kind of processor this is.
 
 Kernels look at arrays where they are: a wrong type, number of axes or memory order is a ``TypeError``, sizes are the
-caller's care. They run outside Python's lock, on as many threads as :func:`sepi.threads.use_threads` says, to the same
-bytes on any number of threads and on any processor.
+caller's care. They run outside Python's lock, on as many threads as :func:`sepi.process.threads.use_threads` says, to
+the same bytes on any number of threads and on any processor.
 """
 
 from __future__ import annotations

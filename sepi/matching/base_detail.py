@@ -26,7 +26,7 @@ from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.denoising import LEFT, DenoisedLightField
 from sepi.matching.row_bands import Rows
 from sepi.matching.softening import SofteningParameters
-from sepi.workspace import OfViews, kept_of
+from sepi.process.workspace import OfViews, kept_of
 
 DETAIL_UNIT = 1 / 32000
 """Unit of the detail, which is stored as int16: colours differ by at most 1."""

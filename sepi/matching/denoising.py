@@ -29,8 +29,8 @@ from sepi.image.noise import noise_level
 from sepi.kernels import denoising as kernels
 from sepi.lightfield import FloatMap, LightField, full_scale
 from sepi.matching.view_noise import PARTS, ViewNoise, part_of_picture, view_noise
+from sepi.process.workspace import OfViews, kept_of
 from sepi.stage import Parameters
-from sepi.workspace import OfViews, kept_of
 
 LEAST_NOISE = 1.25 / 255
 """Noise that is worth it: less may be that of rounding, and what is left where texture does not fit at whole pixels."""

@@ -17,9 +17,9 @@ from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.row_bands import least_band_bytes
 from sepi.matching.softening import SofteningParameters, compared_views, softened
 from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, VisibilitySweepParameters
-from sepi.memory import require_memory
+from sepi.process.memory import require_memory
+from sepi.process.threads import threads_used
 from sepi.stage import OcclusionMarginParameters, Parameters
-from sepi.threads import threads_used
 
 _LIBRARIES = 300 * 2**20
 """Python with what it imports, and what is allocated for the moment."""

@@ -33,8 +33,8 @@ from sepi.matching.nearest_surfaces import shown_columns
 from sepi.matching.softening import Softening, softened
 from sepi.matching.sweep_arrays import ViewStack, Window, sampled_candidates
 from sepi.matching.view_noise import ViewNoise
+from sepi.process.threads import threads_used
 from sepi.stage import Progress, no_progress
-from sepi.threads import threads_used
 
 CANDIDATES = CandidateRule(usual=181, finest=0.02, coarsest=0.5)
 """The paper's number, for light fields like the paper's."""

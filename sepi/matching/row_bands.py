@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from sepi.lightfield import BoolMap, LightField
-from sepi.workspace import band_bytes_of
+from sepi.process.workspace import band_bytes_of
 
 FEWEST_ROWS = 16
 """Of a band, however little memory there is."""

@@ -21,8 +21,8 @@ from pydantic import Field
 from sepi.lightfield import FloatMap, LightField, as_unit_float, full_scale
 from sepi.matching.denoising import DenoisingParameters, denoised, measured_noise
 from sepi.matching.view_noise import ViewNoise, expected_variance
-from sepi.threads import threads_used
-from sepi.workspace import OfViews, kept_of
+from sepi.process.threads import threads_used
+from sepi.process.workspace import OfViews, kept_of
 
 SHARP, SHARPEST = 0.295, 0.32
 """Sharpness at which the blur begins, and at which it is complete. Dots averaged over each pixel have 0.33; most

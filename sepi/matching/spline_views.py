@@ -12,7 +12,7 @@ from sepi.kernels import splines as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail
 from sepi.matching.row_bands import Rows
-from sepi.workspace import OfViews, kept_of
+from sepi.process.workspace import OfViews, kept_of
 
 SPLINE_UNIT = np.float32(1 / 3400)
 """Unit of the spline coefficients, stored as int16; a checkerboard of -0.5 and 1.5 has some of +-9.5."""

@@ -19,7 +19,7 @@ from scipy.sparse.linalg import spsolve
 from sepi.image.superpixels import Adjacency, FloatArray, Superpixels
 from sepi.kernels import planes as kernels
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.memory import take_blas_buffer
+from sepi.process.memory import take_blas_buffer
 
 UNIT = 15.0
 """Length over which gradients are measured, pixels: about a superpixel, so that the unknowns have similar scales."""

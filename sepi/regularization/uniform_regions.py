@@ -27,7 +27,7 @@ from sepi.matching.denoising import DenoisedLightField
 from sepi.matching.softening import SofteningParameters, compared_views
 from sepi.matching.view_noise import variance_map
 from sepi.matching.view_subsets import spread_views
-from sepi.memory import take_blas_buffer
+from sepi.process.memory import take_blas_buffer
 from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
 from sepi.regularization.contradiction import contradicted
 from sepi.regularization.lit_planes import LitPlane, lit_planes

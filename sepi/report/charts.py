@@ -9,7 +9,7 @@ import click
 import numpy as np
 from matplotlib.patches import Patch
 
-from sepi.command import SepiCommand
+from sepi.process.command import SepiCommand
 from sepi.report.page_data import BarGroup, StageTimes, ablation_bars, part_bars, stage_times
 from sepi.report.plots.error_bars import VariantBars, write_error_bars
 from sepi.report.plots.saving import new_figure, save

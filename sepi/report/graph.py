@@ -19,9 +19,9 @@ from pathlib import Path
 import click
 import networkx as nx
 
-from sepi.command import SepiCommand
 from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import atomic_path
+from sepi.process.command import SepiCommand
 
 Edges = Iterable[tuple[str, str]]
 """Pairs of rules: the one that makes a file, and the one that needs it."""

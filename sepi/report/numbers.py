@@ -18,9 +18,9 @@ import click
 import numpy as np
 import numpy.typing as npt
 
-from sepi.command import SepiCommand
 from sepi.io.scores import Scores, read_external, read_reliability, read_scores, without_nan
 from sepi.io.truth import read_with_truth
+from sepi.process.command import SepiCommand
 from sepi.report.plan import Plan
 from sepi.report.pooled import pooled_q25
 from sepi.report.runs import Runs, read_json

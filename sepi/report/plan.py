@@ -15,10 +15,10 @@ from typing import Annotated
 from pydantic import AfterValidator
 from pydantic.dataclasses import dataclass
 
-from sepi.built_in_variants import PARTS_OF_BEST, UNCORRECTED
 from sepi.errors import SepiError
 from sepi.registry import added
 from sepi.variants import HANDED_ON, VARIANTS, compared_methods
+from sepi.variants.built_in import PARTS_OF_BEST, UNCORRECTED
 from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 from sepi.workflow.result_paths import PARTS_ENDING, SceneFiles, key_of, scene_files
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from sepi.command import SepiCommand
+from sepi.process.command import SepiCommand
 from sepi.report import published
 from sepi.report.runs import Runs, read_numbers
 from sepi.report.tabular.ablation import ablation_table, parts_table

@@ -20,10 +20,10 @@ from sepi.io.readers.formats import FORMATS
 from sepi.io.readers.options import AS_GIVEN, ORDERS, Positive, ReadOptions
 from sepi.io.scores import ExternalSource
 from sepi.lightfield import DisparityRange
-from sepi.models import CheckedModel, validated
 from sepi.registry import added
 from sepi.scenes import SCENES
 from sepi.validation import require_known
+from sepi.validation.models import CheckedModel, validated
 from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.workflow.datasets import LONGEST_NAME, Dataset, Scene, own_scene, require_plain_path, scenes_in
 from sepi.workflow.parameters import stage_settings

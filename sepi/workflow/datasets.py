@@ -22,7 +22,7 @@ from sepi.io.readers import exported, hci, hci_2013
 from sepi.io.readers.formats import Format, format_of, size_of
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import view_files
-from sepi.models import CheckedModel
+from sepi.validation.models import CheckedModel
 from sepi.workflow.result_paths import RESULTS
 
 if TYPE_CHECKING:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from sepi.models import validated
 from sepi.stage import Parameters
 from sepi.validation import require_known
+from sepi.validation.models import validated
 from sepi.variants import STAGES, Variant
 
 Values = Mapping[str, Mapping[str, Mapping[str, Any] | None] | None]

@@ -21,8 +21,8 @@ from sepi.kernels import surface_shares as kernels
 from sepi.lightfield import LightField
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Rows
+from sepi.process.workspace import Workspace
 from sepi.scenes import render
-from sepi.workspace import Workspace
 
 USUAL = BoundaryParameters(use_mixture=False)
 AROUND = np.ones((3, 3), np.uint8)

@@ -22,16 +22,16 @@ from several_threads import SEVERAL, threads
 import sepi
 from sepi import ingest, initial
 from sepi.cli.main import main
-from sepi.command import stage_command
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
 from sepi.io.images import write_png
 from sepi.io.pfm import read_pfm, write_pfm
 from sepi.io.result_files import RESULT_FILES
 from sepi.lightfield import LightField
+from sepi.process.command import stage_command
+from sepi.process.threads import threads_used
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render, write_hci
 from sepi.stage import StageMaps
-from sepi.threads import threads_used
 
 # few candidates: these tests are about the commands, not about depth
 FAST = ("--threads", "2", "--set", "initial.semi_global.num_disparities=21")

@@ -30,10 +30,10 @@ from snakemake.cli import get_argument_parser, parse_config
 from workflow_copy import Workflow
 
 from sepi.cli.main import main
-from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import DisparityRange, LightField
+from sepi.process.command import SepiCommand
 from sepi.scenes import render, write_hci
 from sepi.variants import STAGES
 from sepi.workflow.config import load_settings

@@ -26,7 +26,7 @@ AS_A_USER = ("setpriv", "--bounding-set=-dac_override") if sys.platform == "linu
 # kilobytes of address space that the stages take before any of them has done anything
 IMPORTS = """
 import sepi.ingest, sepi.initial, sepi.occlusion, sepi.textureless, sepi.optimize
-from sepi.command import stage_command
+from sepi.process.command import stage_command
 stage_command("initial", sepi.initial.CHOICES)
 print(next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmPeak")))
 """

@@ -13,7 +13,6 @@ from click.testing import CliRunner
 
 from sepi.cli.depth import _parameters
 from sepi.cli.main import main
-from sepi.command import _json_object
 from sepi.errors import SepiError
 from sepi.extensions.benchmark.commands import _runtime
 from sepi.extensions.benchmark.hci_submission import _read_seconds
@@ -22,6 +21,7 @@ from sepi.io.images import write_png
 from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_names import parse_view_numbers
+from sepi.process.command import _json_object
 from sepi.report.plan import Plan
 from sepi.variants import stage_parameters, variant_named
 from sepi.workflow.config import load_settings

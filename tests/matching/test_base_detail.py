@@ -9,8 +9,8 @@ from sepi.image.noise import noise_level
 from sepi.lightfield import LightField, as_unit_float
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.row_bands import Rows
+from sepi.process.workspace import Workspace
 from sepi.scenes import render
-from sepi.workspace import Workspace
 
 
 def detail_twin(view: np.ndarray, radius: int, edge: float, width: float) -> np.ndarray:

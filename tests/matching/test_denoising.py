@@ -13,8 +13,8 @@ from sepi.matching import denoising as module
 from sepi.matching.denoising import DenoisedLightField, denoised
 from sepi.matching.view_noise import variance_map, view_noise
 from sepi.pipeline import estimate_depth
+from sepi.process.workspace import Workspace
 from sepi.scenes import render
-from sepi.workspace import Workspace
 
 
 def with_noise(light_field: LightField, sigma: FloatMap | float, seed: int = 0) -> LightField:

@@ -9,7 +9,6 @@ import pytest
 import sepi
 from sepi.boundaries.decision import assigned_to_surfaces
 from sepi.boundaries.parameters import BoundaryParameters
-from sepi.extensions.cameras.resampling import completed
 from sepi.io.hdf5 import read_light_field, write_light_field
 from sepi.io.readers.exported import write_exported
 from sepi.io.readers.options import ReadOptions
@@ -135,6 +134,7 @@ def test_nothing_is_compared_with_what_stands_at_missing_pixels(found_in) -> Non
 
 @pytest.mark.parametrize("variant", ["best", "fast", "paper"])
 def test_depth_near_the_border_of_turned_views_is_nearly_as_good(variant: str) -> None:
+    completed = pytest.importorskip("sepi.extensions.cameras.resampling").completed
     whole = render("pyramids", size=SIZE, views=VIEWS)
     light_field = turned(whole, 16)
     views = light_field.views.copy()

@@ -17,10 +17,10 @@ from sepi.matching.memory_limit import bytes_of_bands
 from sepi.matching.row_bands import FEWEST_ROWS, row_bands
 from sepi.optimize import SecondOrderParameters, second_order
 from sepi.pipeline import estimate_depth
+from sepi.process.workspace import Workspace
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 from sepi.variants import stage_parameters, variant_named
-from sepi.workspace import Workspace
 
 
 def test_bands_cover_the_picture_and_what_it_is_seen_in() -> None:
@@ -125,7 +125,7 @@ def test_an_estimate_stays_within_its_memory(limit: int) -> None:
     """What somebody says that the machine has is what the process takes, libraries and light field included."""
     code = """
 import sys
-from sepi.command import peak_memory_mb
+from sepi.process.command import peak_memory_mb
 from sepi.optimize import SecondOrderParameters, second_order
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render

@@ -168,7 +168,7 @@ COVERED = {
 NEVER = {
     "pipeline",
     "variants",
-    "command",
+    "process.command",
     "evaluate",
     "reading",
     "workflow.config",
@@ -177,7 +177,7 @@ NEVER = {
     "scenes",
 }
 NEVER |= {
-    "applications.refocusing",
+    "extensions",
     "io.readers.arrays",
     "io.readers.formats",
     "inspection.disparity_range",
@@ -192,9 +192,9 @@ def test_a_stage_is_run_again_for_what_can_change_its_maps_alone(stage: str) -> 
     choice = next(iter(STAGES[stage].values()))
     found = {name.removeprefix("sepi.") for name in imported_modules(*stage_modules(stage, choice))}
     needed, needless = COVERED[stage]
-    assert needed | {stage, "exposure", "io.hdf5", "lightfield"} <= found
+    assert needed | {stage, "matching.exposure", "io.hdf5", "lightfield"} <= found
     assert not found & (needless | NEVER | (set(STAGES) - {stage}))
-    assert not any(name.startswith("compared") for name in found)
+    assert not any(name.startswith("extensions") for name in found)
 
 
 @pytest.mark.parametrize("method", compared_methods())

@@ -13,6 +13,7 @@ from snakemake.iocontainers import Wildcards
 from workflow_copy import REPOSITORY, TINY, Workflow
 
 from sepi.errors import SepiError
+from sepi.registry import added
 from sepi.report.published import FOLDER as PUBLISHED
 from sepi.variants import HANDED_ON, STAGES
 from sepi.workflow.code_digest import code_digest, ingest_modules, stage_modules
@@ -70,6 +71,8 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
             if name == HANDED_ON:
                 continue
             modules = (command[1],) if chosen is None else stage_modules(rule.name, chosen)
+            if rule.name == "maps":
+                modules = (command[1], *added("scenes").values())
             if rule.name == "ingest":
                 modules = ingest_modules("sepi.scenes")
             if rule.name == "render":

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from sepi.cli.input_options import Reading, reading_flags
-from sepi.command import SepiCommand
+from sepi.process.command import SepiCommand
 
 
 @click.command(cls=SepiCommand)

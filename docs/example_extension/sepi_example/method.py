@@ -1,6 +1,7 @@
 """A choice of the last stage: a median filter."""
 
 import cv2
+import numpy as np
 from pydantic import Field
 
 from sepi.lightfield import LightField
@@ -18,7 +19,8 @@ def median(
 ) -> StageMaps:
     """The map of the stage before, filtered."""
     before = require_previous(previous)
-    return before.updated(cv2.medianBlur(before.disparity, parameters.size), before.confidence)
+    filtered = np.asarray(cv2.medianBlur(before.disparity, parameters.size), np.float32)
+    return before.updated(filtered, before.confidence)
 
 
 CHOICES = {"optimize": {"median": Choice(MedianParameters, median, own_steps=True)}}

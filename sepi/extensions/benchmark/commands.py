@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 
-from sepi.command import SepiCommand
 from sepi.errors import SepiError
+from sepi.process.command import SepiCommand
 
 _PATH = click.Path(path_type=Path)
 _PARTIAL = click.option("--partial", is_flag=True, help="Accept fewer than the benchmark's 12 scenes.")

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from sepi.cli.input_options import default_folder
-from sepi.command import SepiCommand, progress_bar
 from sepi.errors import SepiError
+from sepi.process.command import SepiCommand, progress_bar
 
 _PATH = click.Path(path_type=Path)
 
@@ -48,7 +48,7 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
     """
     from sepi.extensions.cameras.calibration import calibrate as calibrated
     from sepi.io.files import name_of
-    from sepi.threads import available_cores, use_threads
+    from sepi.process.threads import available_cores, use_threads
 
     threads = threads or available_cores()
     use_threads(threads)

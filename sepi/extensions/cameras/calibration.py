@@ -28,8 +28,8 @@ from sepi.extensions.cameras.pictures import PROJECT
 from sepi.extensions.cameras.rectification import rectification_of
 from sepi.io.files import atomic_folder
 from sepi.io.images import SUFFIXES
+from sepi.process.threads import available_cores
 from sepi.stage import Progress, no_progress
-from sepi.threads import available_cores
 from sepi.validation import require_known
 
 CAMERAS = ("one", "each")

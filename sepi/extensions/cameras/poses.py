@@ -8,7 +8,7 @@ import click
 
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
 from sepi.cli.scene_argument import camera_of, read_light_field_of
-from sepi.command import SepiCommand, progress_bar
+from sepi.process.command import SepiCommand, progress_bar
 
 _PATH = click.Path(path_type=Path)
 

@@ -14,7 +14,6 @@ import numpy as np
 from sepi.camera import Camera
 from sepi.camera.rig import Floats, Rectified, Rig
 from sepi.errors import SepiError
-from sepi.exposure import equally_bright
 from sepi.extensions.cameras.frame import Frame, Seeing, frame_of
 from sepi.extensions.cameras.grid import grid_of
 from sepi.extensions.cameras.model import CameraModel
@@ -22,6 +21,7 @@ from sepi.extensions.cameras.plane import Plane, disparity_errors, plane_through
 from sepi.extensions.cameras.resampling import completed, rectified_view
 from sepi.io.files import name_of
 from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.exposure import equally_bright
 
 # disparity errors from which a note mentions them, and from which a view is left out, pixels per view step
 _TOLD, _TOO_MUCH = 0.1, 0.5

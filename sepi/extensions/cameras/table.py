@@ -23,8 +23,8 @@ from sepi.errors import SepiError
 from sepi.extensions.cameras.model import UNITS_OF_MODEL, CameraModel
 from sepi.extensions.cameras.pictures import Pictures
 from sepi.io.files import naming, reading
-from sepi.models import AS_PAIR, CheckedModel, validated
 from sepi.validation import require_known
+from sepi.validation.models import AS_PAIR, CheckedModel, validated
 
 # largest size of a table in bytes
 _MOST_BYTES = 16 * 2**20

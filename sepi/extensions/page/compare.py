@@ -9,8 +9,8 @@ import click
 
 from sepi.cli.input_options import Reading, reading_flags, truth_flags
 from sepi.cli.scene_argument import read_ground_truth, require_one_view
-from sepi.command import SepiCommand
 from sepi.errors import SepiError
+from sepi.process.command import SepiCommand
 
 if TYPE_CHECKING:
     from sepi.io.disparity_maps import TruthFile

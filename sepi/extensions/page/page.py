@@ -14,8 +14,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from matplotlib.colors import Colormap
 
-from sepi.command import SepiCommand
 from sepi.io.files import atomic_path
+from sepi.process.command import SepiCommand
 from sepi.report import page_data, published
 from sepi.report.plots.pictures import error_scale, scale_colours
 from sepi.report.runs import Runs, read_json, read_numbers

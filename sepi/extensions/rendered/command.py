@@ -7,14 +7,14 @@ from pathlib import Path
 
 import click
 
-from sepi.command import SepiCommand, progress_bar, write_timing
 from sepi.extensions.rendered.catalogue import world_of
 from sepi.extensions.rendered.options import RenderOptions
 from sepi.extensions.rendered.rendering import render_world
 from sepi.extensions.rendered.tracing import require_mitsuba
-from sepi.models import validated
-from sepi.threads import use_threads
+from sepi.process.command import SepiCommand, progress_bar, write_timing
+from sepi.process.threads import use_threads
 from sepi.validation import settings_of
+from sepi.validation.models import validated
 
 _PATH = click.Path(path_type=Path)
 

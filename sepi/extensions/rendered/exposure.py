@@ -15,7 +15,7 @@ from sepi.extensions.rendered.render_file import Render, read_render
 from sepi.extensions.rendered.render_file import read_truth as read_truth
 from sepi.extensions.rendered.srgb import srgb_encoded
 from sepi.lightfield import DisparityRange, LightField
-from sepi.models import validated
+from sepi.validation.models import validated
 from sepi.workflow.rendered_scenes import exposed_name
 
 

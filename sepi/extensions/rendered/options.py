@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from sepi.models import CheckedModel
+from sepi.validation.models import CheckedModel
 from sepi.workflow.rendered_scenes import NoiseLevel
 
 _Share = Annotated[float, Field(ge=0, allow_inf_nan=False)]

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy import fft
 
 from sepi.extensions.rendered.world import FloatArray, Pattern, Vector
-from sepi.threads import threads_used
+from sepi.process.threads import threads_used
 
 TEXELS = 1024
 Field = npt.NDArray[np.float64]

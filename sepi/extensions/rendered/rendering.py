@@ -26,8 +26,8 @@ from sepi.extensions.rendered.tracing import Position, Tracer
 from sepi.extensions.rendered.world import FloatArray, World
 from sepi.io.files import atomic_path
 from sepi.io.provenance import package_version
+from sepi.process.threads import threads_used, use_threads
 from sepi.stage import no_progress
-from sepi.threads import threads_used, use_threads
 
 # arrays of a view that are kept until all views are finished
 _TYPES = {

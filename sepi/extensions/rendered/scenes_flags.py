@@ -14,7 +14,6 @@ from click.core import ParameterSource
 
 from sepi.camera import camera_from
 from sepi.cli.scenes import list_scenes, require_new
-from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.extensions.rendered.catalogue import RENDERED
 from sepi.extensions.rendered.exposure import exposed
@@ -23,9 +22,10 @@ from sepi.extensions.rendered.render_file import Render, read_render
 from sepi.extensions.rendered.rendering import made_by
 from sepi.extensions.rendered.side_by_side import render_scenes
 from sepi.extensions.rendered.tracing import require_mitsuba
-from sepi.models import validated
+from sepi.process.command import SepiCommand
 from sepi.scenes.folder import write_hci
 from sepi.validation import require_known, settings_of
+from sepi.validation.models import validated
 from sepi.workflow.rendered_scenes import NOISE_LEVELS, WITHOUT_NOISE, exposed_name
 
 _TEXT = """

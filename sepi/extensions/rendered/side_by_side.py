@@ -13,11 +13,11 @@ from pathlib import Path
 
 import click
 
-from sepi.command import WORKFLOW_PROCESS, progress_bar
 from sepi.errors import SepiError
 from sepi.extensions.rendered.options import RenderOptions
 from sepi.extensions.rendered.rendering import views_done
-from sepi.threads import available_cores
+from sepi.process.command import WORKFLOW_PROCESS, progress_bar
+from sepi.process.threads import available_cores
 
 # number of scenes at a time; each of full size takes 3 GB
 _MOST = 2

@@ -21,7 +21,7 @@ from sepi.extensions.rendered.shapes import normals
 from sepi.extensions.rendered.srgb import srgb_decoded
 from sepi.extensions.rendered.surfaces import FirstSurface, Surfaces, period
 from sepi.extensions.rendered.world import FloatArray, Lamp, Material, Mesh, Pattern, Vector, World
-from sepi.threads import threads_used
+from sepi.process.threads import threads_used
 
 # metres at which rays begin; much less would lose digits of their directions
 _NEAR = 0.1

@@ -23,7 +23,6 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.built_in_variants import DEFAULT_VARIANT
 from sepi.errors import SepiError
 from sepi.kernels import all_views as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
@@ -32,6 +31,7 @@ from sepi.pipeline import estimate_depth
 from sepi.stage import ERROR_BARS, Progress, StageMaps, no_progress
 from sepi.validation import require_type
 from sepi.variants import Variant
+from sepi.variants.built_in import DEFAULT_VARIANT
 
 EDGE_VIEWS = 25
 """Least number of views with which each view is compared at its depth steps."""

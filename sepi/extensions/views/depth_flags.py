@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sepi.command import SepiCommand, progress_bar
+from sepi.process.command import SepiCommand, progress_bar
 
 if TYPE_CHECKING:
     import numpy.typing as npt

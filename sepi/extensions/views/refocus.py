@@ -12,8 +12,8 @@ import click
 
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
 from sepi.cli.scene_argument import read_light_field_of
-from sepi.command import SepiCommand, progress_bar
 from sepi.errors import SepiError
+from sepi.process.command import SepiCommand, progress_bar
 
 if TYPE_CHECKING:
     from sepi.camera import Camera
@@ -116,7 +116,7 @@ def refocus(
     from sepi.extensions.views.refocused_folder import write_refocused
     from sepi.extensions.views.refocusing import all_in_focus, views_within
     from sepi.io.result_files import require_target
-    from sepi.threads import available_cores, use_threads
+    from sepi.process.threads import available_cores, use_threads
 
     use_threads(threads or available_cores())
     folder = output or default_folder(light_field_path, "refocused")

@@ -27,7 +27,7 @@ from sepi.io.readers.view_files import read_grid
 from sepi.io.result_files import require_target
 from sepi.io.tiff import write_tiff
 from sepi.lightfield import BoolMap, DisparityRange, LightField
-from sepi.models import validated
+from sepi.validation.models import validated
 
 MANIFEST = "light_field.json"
 

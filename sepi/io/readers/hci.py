@@ -32,7 +32,7 @@ from sepi.io.pfm import read_pfm
 from sepi.io.readers.options import ReadOptions, arrange_numbers, cut_like_views, position_of
 from sepi.io.readers.view_files import read_grid
 from sepi.lightfield import DisparityRange, LightField, Truth
-from sepi.models import validated
+from sepi.validation.models import validated
 
 PARAMETERS = "parameters.cfg"
 TRUTH = "gt_disp_lowres.pfm"

@@ -33,8 +33,8 @@ from pydantic import Field
 
 from sepi.camera import Part
 from sepi.errors import SepiError
-from sepi.models import AS_PAIR
 from sepi.validation import described, is_finite, require_known, require_type, whole_pair
+from sepi.validation.models import AS_PAIR
 
 Numbers = npt.NDArray[np.int64]
 Map = npt.NDArray[Any]

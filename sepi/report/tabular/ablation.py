@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from sepi.built_in_variants import PARTS_OF_BEST
 from sepi.report import published
 from sepi.report.plan import BEST_VARIANT
 from sepi.report.runs import Runs
 from sepi.report.tabular import methods
 from sepi.report.tabular.layout import Column, Kind, Record, Report, line, printed, section, short
 from sepi.scoring.scores import REGIONS, WHOLE_MAP, own_bad_pixel, score_heads
+from sepi.variants.built_in import PARTS_OF_BEST
 
 _Means = dict[str, dict[str, methods.Mean]]
 """Region to variant to figure; published figures have no count."""

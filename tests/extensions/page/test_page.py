@@ -17,12 +17,13 @@ from click.testing import CliRunner
 from page_example import COTTON, DOTS, EDGES, PICTURE, SIZE, Example
 
 from sepi.errors import SepiError
+from sepi.extensions.page import page
 from sepi.extensions.page.page import embedded, prose, read_scene
 from sepi.extensions.page.scene import page_json
 from sepi.extensions.page.viewer import CONFIDENCE, OTHER, PRECISE, STEPS, viewer_json
 from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
-from sepi.report import charts, figures, page, page_data, published
+from sepi.report import charts, figures, page_data, published
 from sepi.report.graph import drawn
 from sepi.report.panels import Kind, Panel, SceneResults, note_of, panels_of
 from sepi.report.plots.error_bars import write_error_bars

@@ -12,7 +12,6 @@ from geometries import GEOMETRIES, standing
 
 from bench.noisy import with_noise
 from sepi.errors import SepiError
-from sepi.exposure import equally_bright
 from sepi.extensions.page.probes import scene_probes
 from sepi.extensions.page.probes.curves import cost_curves
 from sepi.extensions.page.probes.figure import write_probes
@@ -20,6 +19,7 @@ from sepi.extensions.page.probes.pixels import APART, BORDER, InterestingPixel, 
 from sepi.extensions.page.probes.probe import GREY, HALF_WIDTH, probe, sepi_picture, to_json
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.denoising import sure_noise
+from sepi.matching.exposure import equally_bright
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.view_subsets import half_planes, halves_and_quarters

@@ -118,7 +118,7 @@ def test_a_scene_is_rendered_again_for_the_renderer_and_itself_alone() -> None:
         "sepi.extensions.rendered.worlds.room",
         "sepi.extensions.rendered.catalogue",
         "sepi.extensions.rendered.exposure",
-        "sepi.command",
+        "sepi.process.command",
     }
     assert not any("rendered" in name for name in imported_modules(*ingest_modules("sepi.scenes")))
 

@@ -27,8 +27,8 @@ from sepi.extensions.rendered.sampling import gloss_samples, pictured, planned
 from sepi.extensions.rendered.side_by_side import _started, render_scenes
 from sepi.extensions.rendered.tracing import Tracer
 from sepi.extensions.rendered.world import Material, Sun, World
+from sepi.process.threads import available_cores, use_threads
 from sepi.scenes.folder import write_hci
-from sepi.threads import available_cores, use_threads
 from sepi.workflow.rendered_scenes import NOISE_LEVELS
 
 

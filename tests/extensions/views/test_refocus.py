@@ -23,9 +23,9 @@ from sepi.io.images import read_picture
 from sepi.io.pfm import write_pfm
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
+from sepi.process.threads import available_cores
 from sepi.scenes import render, write_hci
 from sepi.stage import StageMaps
-from sepi.threads import available_cores
 
 SHAPE = (64, 64)
 

@@ -96,7 +96,7 @@ def test_a_size_that_the_file_cannot_hold_is_not_believed(tmp_path: Path) -> Non
 PEAK = """
 import os
 import sys
-from sepi.command import peak_memory_mb
+from sepi.process.command import peak_memory_mb
 from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions
 from pathlib import Path

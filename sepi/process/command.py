@@ -224,7 +224,7 @@ def megabytes(maxrss: int) -> float:
 def write_timing(path: Path, started: float, threads: int, **more: Any) -> None:
     """Write JSON with the seconds since ``started`` (``time.perf_counter``), peak memory, machine, and ``more``."""
     from sepi.io.files import atomic_path
-    from sepi.machine import this_machine
+    from sepi.process.machine import this_machine
 
     timing = {
         "seconds": round(time.perf_counter() - started, 3),
@@ -243,16 +243,16 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     The command reads a light field and the maps of the stage before, runs one choice, and writes one stage file, whole
     or not at all.
     """
-    from sepi.exposure import equally_bright
     from sepi.inspection.coded_views import without_blocks
     from sepi.io.hdf5 import read_light_field, read_stage, write_stage
     from sepi.io.provenance import history_of, stage_attributes
-    from sepi.models import validated
+    from sepi.matching.exposure import equally_bright
+    from sepi.process.threads import use_threads
+    from sepi.process.workspace import Workspace
     from sepi.registry import stage_choices
     from sepi.stage import entry
-    from sepi.threads import use_threads
     from sepi.validation import require_known
-    from sepi.workspace import Workspace
+    from sepi.validation.models import validated
 
     existing = click.Path(path_type=Path)
     choices = stage_choices(stage, own)

@@ -12,7 +12,7 @@ from typing import Any
 import psutil
 
 from sepi.io.provenance import package_version
-from sepi.threads import available_cores
+from sepi.process.threads import available_cores
 
 LIBRARIES = (
     "numpy",

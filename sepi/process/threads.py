@@ -38,7 +38,7 @@ def use_threads(count: int) -> None:
     --------
     Programs with several processes for many light fields give each process one thread:
 
-    >>> from sepi.threads import use_threads
+    >>> from sepi.process.threads import use_threads
     >>> use_threads(1)
     >>> import cv2
     >>> cv2.getNumThreads()

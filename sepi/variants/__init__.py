@@ -1,6 +1,6 @@
 """The stages in order, their choices, and the variants, which name a choice for each stage.
 
-:mod:`sepi.built_in_variants` lists the built-in variants.
+:mod:`sepi.variants.built_in` lists the built-in variants.
 
 Examples
 --------
@@ -27,12 +27,12 @@ from functools import cache
 from typing import Any
 
 from sepi import initial, occlusion, optimize, textureless
-from sepi.built_in_variants import ENTRIES
 from sepi.errors import SepiError
-from sepi.models import validated
 from sepi.registry import Known, added, extensions, stage_choices
 from sepi.stage import Choice, Parameters
 from sepi.validation import require_known, require_type
+from sepi.validation.models import validated
+from sepi.variants.built_in import ENTRIES
 
 STAGES: dict[str, Known[Choice]] = {
     "initial": stage_choices("initial", initial.CHOICES),
