@@ -6,12 +6,12 @@ name is not the core's own, or where all names are listed; docs/develop/extensio
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, MutableMapping
+from contextlib import suppress
 from functools import cache
-from glob import glob
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from sepi.errors import SepiError
@@ -80,15 +80,22 @@ def _entry_points() -> dict[str, str]:
     found: dict[str, str] = {}
     distributions: set[str] = set()
     for folder in sys.path:
-        for name in sorted(glob("*.dist-info", root_dir=folder or ".")):
-            distribution, file = name.partition("-")[0].lower(), Path(folder, name, "entry_points.txt")
-            if distribution not in distributions and file.is_file():
-                _, _, section = file.read_text(encoding="utf-8").partition(f"[{GROUP}]")
-                lines = section.partition("\n[")[0].splitlines()
-                pairs = (line.partition("=") for line in lines if "=" in line)
-                found |= {key.strip(): value.strip() for key, _, value in pairs}
-            distributions.add(distribution)
+        with suppress(OSError):
+            for name in sorted(name for name in os.listdir(folder or ".") if name.endswith(".dist-info")):
+                distribution = name.partition("-")[0].lower()
+                if distribution not in distributions:
+                    distributions.add(distribution)
+                    found |= _declared(os.path.join(folder, name, "entry_points.txt"))
     return found
+
+
+def _declared(file: str) -> dict[str, str]:
+    """The entry points of a distribution's file, which need not exist."""
+    with suppress(OSError), open(file, encoding="utf-8") as lines:
+        _, _, section = lines.read().partition(f"[{GROUP}]")
+        pairs = (line.partition("=") for line in section.partition("\n[")[0].splitlines() if "=" in line)
+        return {key.strip(): value.strip() for key, _, value in pairs}
+    return {}
 
 
 @cache

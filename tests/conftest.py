@@ -13,6 +13,7 @@ from remembered_scenes import FOLDER, remembered
 import sepi.scenes
 from sepi import kernels
 from sepi.process.threads import available_cores
+from sepi.registry import extensions
 
 if TYPE_CHECKING:
     from page_example import Example
@@ -65,6 +66,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid.partition("[")[0] in long:
             item.add_marker("long")
+        for needed in item.iter_markers("extension"):
+            if needed.args[0] not in extensions():
+                item.add_marker(pytest.mark.skip(f"the extension {needed.args[0]} is not installed"))
         for fixture, mark in _MARKS.items():
             if fixture in getattr(item, "fixturenames", ()):
                 item.add_marker(mark)

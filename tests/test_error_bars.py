@@ -121,6 +121,7 @@ def test_what_no_view_knows_may_be_anywhere() -> None:
     np.testing.assert_allclose(maps.sigma[unknown], (known.maximum - known.minimum) / np.sqrt(12), rtol=1e-5)
 
 
+@pytest.mark.extension("methods")
 def test_a_method_without_a_model_of_its_error_tells_none() -> None:
     maps = estimate_depth(render("dots", size=64, views=3), "mishiba")
     assert maps.sigma is maps.low is maps.high is None

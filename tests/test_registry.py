@@ -42,9 +42,8 @@ def installed(folder: Path, name: str, entry_points: str) -> None:
 
 def run(*words: str, path: Path, cwd: Path) -> subprocess.CompletedProcess[str]:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(path), str(REPOSITORY)])}
-    return subprocess.run(
-        [sys.executable, *words], env=environment, cwd=cwd, capture_output=True, text=True, check=False
-    )
+    words = (sys.executable, *words)
+    return subprocess.run(words, env=environment, cwd=cwd, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.workflow
@@ -109,3 +108,35 @@ def test_two_extensions_with_one_name_are_refused(
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(SepiError, match="extensions one and two: both add 'mine' to variants"):
         registry.added("variants")
+
+
+# not of the core: extensions and what measures or documents them; the checkout around it; other machines
+_ELSEWHERE = ("extensions", "bench", "docs", "fuzz", "cluster", "faults", "test_release.py")
+# what is installed is imported from where it is, even if it is gone here
+_ALONE = """
+import sys
+sys.meta_path[:] = [one for one in sys.meta_path if "editable" not in f"{one!r}"]
+import pytest
+sys.exit(pytest.main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.system
+def test_the_core_passes_its_tests_without_extensions(tmp_path: Path) -> None:
+    """A part of the core that leans on an extension fails where that is not installed, and nowhere else."""
+    copied = ("sepi", "rules", "profiles", "tests", "config", "bench", "tools")
+    for name in copied:
+        shutil.copytree(REPOSITORY / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("Snakefile", "pyproject.toml", ".snakemake-workflow-catalog.yml"):
+        shutil.copy2(REPOSITORY / name, tmp_path)
+    shutil.rmtree(tmp_path / "sepi/extensions")
+    installed(tmp_path, "sepi", "")
+    text = run("-m", "sepi.workflow.config_file", path=tmp_path, cwd=tmp_path).stdout
+    assert "rendered" not in text
+    for name in ("config.yaml", "config/config.yaml"):
+        (tmp_path / name).write_text(text)
+    ignored = [f"--ignore=tests/{name}" for name in _ELSEWHERE]
+    quick = "not real and not workflow and not browser and not slow and not system and not faults and not long"
+    words = ("-c", _ALONE, "-q", "-p", "no:cacheprovider", "-m", quick, *ignored, "tests")
+    done = run(*words, path=tmp_path, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout[-3000:]

@@ -6,7 +6,6 @@ A stage module ends with ``stage_command("initial", CHOICES)()``; the workflow's
 from __future__ import annotations
 
 import functools
-import json
 import os
 import signal
 import sys
@@ -15,7 +14,6 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
@@ -223,6 +221,8 @@ def megabytes(maxrss: int) -> float:
 
 def write_timing(path: Path, started: float, threads: int, **more: Any) -> None:
     """Write JSON with the seconds since ``started`` (``time.perf_counter``), peak memory, machine, and ``more``."""
+    import json
+
     from sepi.io.files import atomic_path
     from sepi.process.machine import this_machine
 
@@ -243,6 +243,8 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     The command reads a light field and the maps of the stage before, runs one choice, and writes one stage file, whole
     or not at all.
     """
+    from dataclasses import replace
+
     from sepi.inspection.coded_views import without_blocks
     from sepi.io.hdf5 import read_light_field, read_stage, write_stage
     from sepi.io.provenance import history_of, stage_attributes
@@ -298,6 +300,8 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
 
 
 def _json_object(text: str) -> dict[str, Any]:
+    import json
+
     with suppress(ValueError, RecursionError):
         value = json.loads(text)
         if isinstance(value, dict):

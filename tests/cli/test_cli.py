@@ -101,6 +101,7 @@ def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
     np.testing.assert_array_equal(read_stage(Path("pyramids-depth/result.h5")).disparity, disparity)
 
 
+@pytest.mark.extension("methods")
 @pytest.mark.usefixtures("flat")
 def test_a_method_without_a_model_of_its_error_says_so(scene: Path) -> None:
     """Silence would be taken for certainty."""

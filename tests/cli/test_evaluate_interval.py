@@ -99,6 +99,7 @@ def test_a_crop_has_the_error_bars_of_its_pixels(files: StageMaps) -> None:
     assert told["paper"]["all"]["coverage"] == pytest.approx(100 * 28 / 50)
 
 
+@pytest.mark.extension("page")
 def test_compared_maps_have_it_where_there_is_one(files: StageMaps) -> None:
     """In the scores, and on the page."""
     shown = call("compare", "map", "bare.pfm", "exact.pfm", "-o", "page.html").stdout

@@ -157,6 +157,7 @@ def test_evaluate_takes_png_maps(result: Path, disparity: np.ndarray, tmp_path: 
     assert "give a scale" in called.stderr
 
 
+@pytest.mark.extension("page")
 def test_text_in_a_map_of_another_program_is_no_matter(tmp_path: Path, disparity: np.ndarray) -> None:
     """It is of variable length, on which HDF5 may hang where a file is damaged, so that it is not read."""
     with h5py.File(tmp_path / "map.h5", "w") as file:

@@ -102,7 +102,8 @@ def _in_focus(light_field):
     return sepi.all_in_focus(light_field, light_field.ground_truth)
 
 
-COMPARING = (_swept, _halves, _first, _seen, _newton, _shares, _occluded, _unknown, _refocused, _in_focus)
+OF_VIEWS = tuple(pytest.param(one, marks=pytest.mark.extension("views")) for one in (_refocused, _in_focus))
+COMPARING = (_swept, _halves, _first, _seen, _newton, _shares, _occluded, _unknown, *OF_VIEWS)
 
 
 @pytest.mark.parametrize("found_in", COMPARING)
@@ -124,7 +125,7 @@ def test_a_view_that_shows_nothing_is_as_one_that_was_not_taken(found_in) -> Non
         assert np.nanmax(np.abs(np.asarray(unmarked, float) - without)) > 1e-3, "the views matter"
 
 
-@pytest.mark.parametrize("found_in", [_swept, _halves, _first, _seen, _refocused])
+@pytest.mark.parametrize("found_in", [_swept, _halves, _first, _seen, OF_VIEWS[0]])
 def test_nothing_is_compared_with_what_stands_at_missing_pixels(found_in) -> None:
     """Strips at the border get the depth of a made-up picture."""
     light_field = turned(render("pyramids", size=SIZE, views=VIEWS), 20)
@@ -132,9 +133,11 @@ def test_nothing_is_compared_with_what_stands_at_missing_pixels(found_in) -> Non
     np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.extension("cameras")
 @pytest.mark.parametrize("variant", ["best", "fast", "paper"])
 def test_depth_near_the_border_of_turned_views_is_nearly_as_good(variant: str) -> None:
-    completed = pytest.importorskip("sepi.extensions.cameras.resampling").completed
+    from sepi.extensions.cameras.resampling import completed
+
     whole = render("pyramids", size=SIZE, views=VIEWS)
     light_field = turned(whole, 16)
     views = light_field.views.copy()

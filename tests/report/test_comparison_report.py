@@ -14,6 +14,8 @@ from sepi.report import numbers, published, tables
 from sepi.report.plan import COMPARISON_TABLES, Plan
 from sepi.variants import compared_methods, needing_files
 
+pytestmark = pytest.mark.extension("methods")
+
 
 def choices(*names: str) -> Mapping[str, Mapping[str, str]]:
     return {name: built_in.VARIANTS[name].labels for name in names}
@@ -103,9 +105,12 @@ def test_tables_are_those_of_the_comparison(compared: dict[str, Any], tmp_path: 
     assert (cells["MSE x100"]["mark"], cells["MSE x100, published"]["kind"]) == ("best", "published")
 
 
+@pytest.mark.extension("page")
 def test_the_page_is_about_the_methods(compared: dict[str, Any]) -> None:
     """Headings of the ablation would promise what is not there."""
-    page = pytest.importorskip("sepi.extensions.page.page").page_of(compared, [], "<svg></svg>")
+    from sepi.extensions.page.page import page_of
+
+    page = page_of(compared, [], "<svg></svg>")
     assert "<h1>Light field depth: the compared methods, computed</h1>" in page
     assert "this code, spo" in page
     assert "<h2>Ablation</h2>" not in page

@@ -103,11 +103,13 @@ def test_pictures_are_of_one_seed_and_variants_those_that_are_asked_for() -> Non
     assert plan.scores_file("rendered", "sticks").name == "scores_rendered.h5"
 
 
+@pytest.mark.extension("page")
 def test_the_page_averages_nothing_over_scenes_and_levels(
     found: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One figure of all would hide what each property does; and of further seeds it has no scene to read."""
-    page = pytest.importorskip("sepi.extensions.page.page")
+    from sepi.extensions.page import page
+
     text = page.page_of(found, [], "<svg></svg>")
     assert "<h1>Light field depth: scenes rendered like photographs</h1>" in text
     assert "rendered, average of" not in text
