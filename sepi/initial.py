@@ -22,11 +22,7 @@ from sepi.lightfield import LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.softening import compared_views
 from sepi.matching.structure_tensor import StructureTensorParameters, structure_tensor_depth
-from sepi.matching.visibility_sweep import (
-    FirstDepthParameters,
-    VisibilitySweepParameters,
-    first_depth,
-)
+from sepi.matching.visibility_sweep import FirstDepthParameters, VisibilitySweepParameters, first_depth
 from sepi.stage import Choice, Progress, StageMaps
 
 

@@ -34,15 +34,7 @@ from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
 from sepi.matching.softening import compared_views
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import WlsParameters, data_weight, rectified_confidence, smoothness_coefficient, solve
-from sepi.stage import (
-    Choice,
-    NoParameters,
-    OcclusionMarginParameters,
-    Progress,
-    StageMaps,
-    none,
-    require_previous,
-)
+from sepi.stage import Choice, NoParameters, OcclusionMarginParameters, Progress, StageMaps, none, require_previous
 
 if TYPE_CHECKING:
     from sepi.matching.gauss_newton import Evidence

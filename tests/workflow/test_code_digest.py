@@ -10,14 +10,7 @@ import pytest
 from sepi.io.readers.formats import FORMATS
 from sepi.variants import STAGES, compared_methods
 from sepi.workflow import code_digest as module
-from sepi.workflow.code_digest import (
-    code_digest,
-    imported_modules,
-    ingest_modules,
-    keep,
-    remember,
-    stage_modules,
-)
+from sepi.workflow.code_digest import code_digest, imported_modules, ingest_modules, keep, remember, stage_modules
 
 FILES = {
     "pkg/__init__.py": "from pkg import extra\n",
