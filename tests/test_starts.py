@@ -97,7 +97,7 @@ from sepi.cli.main import main
 scene, out = sys.argv[1:]
 for variant in ("no_occlusion_no_textureless", "paper"):
     main(["depth", scene, "-o", f"{{out}}/{{variant}}", "--variant", variant], standalone_mode=False)
-    print("loaded", variant, *sorted(name for name in {SLOW!r} if name in sys.modules))
+    print("loaded", variant, *sorted(name for name in {(*SLOW, "sepi.extensions")!r} if name in sys.modules))
 """
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -108,12 +107,13 @@ FORMATS: Known[Format] = Known("readers", _OWN, lambda _, module: import_module(
 
 def matching(path: Path) -> Format | None:
     """The format that a path looks like; those of extensions are asked only if no other but a loose one matches."""
-    asked = itertools.chain(
-        (known for known in _OWN.values() if not known.loose),
-        (FORMATS[word] for word in FORMATS if word not in _OWN),
-        (known for known in _OWN.values() if known.loose),
-    )
-    return next((known for known in asked if known.reader.matches(path)), None)
+    return next((known for known in _as_asked() if known.reader.matches(path)), None)
+
+
+def _as_asked() -> Iterator[Format]:
+    yield from (known for known in _OWN.values() if not known.loose)
+    yield from (FORMATS[word] for word in FORMATS if word not in _OWN)
+    yield from (known for known in _OWN.values() if known.loose)
 
 
 def format_of(path: Path, file_format: str | None = None) -> Format:
