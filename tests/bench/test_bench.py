@@ -21,11 +21,7 @@ from bench.measure import Case, Measurement, Prepared, Result, command, measured
 from bench.plain import WARPS, Warp, by_opencv, plain_sweep
 from sepi.errors import SepiError
 from sepi.matching.plane_sweep import SweepParameters, sweep
-<<<<<<< HEAD
-=======
 from sepi.process.machine import this_machine
-from sepi.regularization.wls import energy_system
->>>>>>> 97576109 (Plumbing at the root goes into folders; extensions are documented with an example)
 from sepi.scenes import render
 
 pytestmark = pytest.mark.slow

@@ -20,13 +20,9 @@ from sepi.matching.surface_windows import Surfaces, windowed_step
 from sepi.matching.view_subsets import spread_views
 from sepi.optimize import SecondOrderParameters, second_order
 from sepi.pipeline import estimate_depth
-<<<<<<< HEAD
+from sepi.process.workspace import Workspace
 from sepi.regularization.multilevel import LEAST_SINGLE_RTOL, multilevel_inverse, solve_smooth
 from sepi.regularization.multilevel import MARGIN as MARGIN_OF_STENCIL
-=======
-from sepi.process.workspace import Workspace
-from sepi.regularization.multilevel import multilevel_inverse
->>>>>>> 97576109 (Plumbing at the root goes into folders; extensions are documented with an example)
 from sepi.regularization.second_order import (
     colour_changes,
     second_difference_stencil,

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sepi.inspection.coded_views import without_blocks
 from sepi.extensions.page.probes.pixels import InterestingPixel, interesting_pixels
 from sepi.extensions.page.probes.probe import Probe, probe
+from sepi.inspection.coded_views import without_blocks
 from sepi.io.provenance import history_of
 from sepi.matching.exposure import equally_bright
 from sepi.matching.plane_sweep import SweepParameters
