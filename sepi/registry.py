@@ -6,10 +6,7 @@ name is not the core's own, or where all names are listed; docs/develop/extensio
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, MutableMapping
-from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -72,32 +69,6 @@ class Extension(NamedTuple):
     rules: Collection[str] = ()
 
 
-def _entry_points() -> dict[str, str]:
-    """Name to object of each entry point, ``MODULE:NAME``; of distributions of one name, the first on the path counts.
-
-    A tenth of the time of :mod:`importlib.metadata`, which is most of ``sepi --help``.
-    """
-    found: dict[str, str] = {}
-    distributions: set[str] = set()
-    for folder in sys.path:
-        with suppress(OSError):
-            for name in sorted(name for name in os.listdir(folder or ".") if name.endswith(".dist-info")):
-                distribution = name.partition("-")[0].lower()
-                if distribution not in distributions:
-                    distributions.add(distribution)
-                    found |= _declared(os.path.join(folder, name, "entry_points.txt"))
-    return found
-
-
-def _declared(file: str) -> dict[str, str]:
-    """The entry points of a distribution's file, which need not exist."""
-    with suppress(OSError), open(file, encoding="utf-8") as lines:
-        _, _, section = lines.read().partition(f"[{GROUP}]")
-        pairs = (line.partition("=") for line in section.partition("\n[")[0].splitlines() if "=" in line)
-        return {key.strip(): value.strip() for key, _, value in pairs}
-    return {}
-
-
 @cache
 def extensions() -> dict[str, Extension]:
     """Name to extension, of all that are installed; one whose module is gone counts as not installed.
@@ -107,15 +78,16 @@ def extensions() -> dict[str, Extension]:
     SepiError
         If the module of one cannot be imported, or has no such extension.
     """
+    from importlib.metadata import entry_points
+
     found: dict[str, Extension] = {}
-    for name, target in _entry_points().items():
-        module, _, attribute = target.partition(":")
+    for point in entry_points(group=GROUP):
         try:
-            found[name] = getattr(import_module(module), attribute)
+            found[point.name] = point.load()
         except Exception as error:
-            if isinstance(error, ModuleNotFoundError) and f"{module}.".startswith(f"{error.name}."):
+            if isinstance(error, ModuleNotFoundError) and f"{point.module}.".startswith(f"{error.name}."):
                 continue
-            raise SepiError(f"extension {name}: cannot be loaded from {target}: {error}") from error
+            raise SepiError(f"extension {point.name}: cannot be loaded from {point.value}: {error}") from error
     return found
 
 
