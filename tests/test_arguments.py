@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,140 +38,119 @@ SCENE = render("dots", size=64, views=3)
 ONES = np.ones((64, 64), np.float32)
 
 
-def camera(**more: Any) -> Callable[[], object]:
-    numbers = {"focal_length_mm": 1, "baseline_mm": 1, "focus_distance_m": 1, "sensor_size_mm": 1, "shape": (64, 64)}
-    return lambda: camera_from(**{**numbers, **more})
+MAPS = sepi.StageMaps(ONES, ONES)
+LENS = {"focal_length_mm": 1, "baseline_mm": 1, "focus_distance_m": 1, "sensor_size_mm": 1, "shape": (64, 64)}
+
+Calls = list[tuple[Callable[..., object], dict[str, Any]]]
+
+# functions with arguments that would do, each of which is exchanged for what none of them takes
+CALLS: Calls = [
+    (
+        partial(sepi.LightField, views=VIEWS, name="mine"),
+        dict.fromkeys(
+            ["positions", "disparity_range", "camera", "view", "row_spacing", "notes", "ground_truth", "reading"]
+        ),
+    ),
+    (partial(sepi.LightField, name="mine"), {"views": VIEWS}),
+    (partial(sepi.LightField, views=VIEWS), {"name": "mine"}),
+    (partial(sepi.DisparityRange, source="given"), {"minimum": 0, "maximum": 1}),
+    (sepi.Camera, {"scale": 1, "offset": 1, "focal_px": 1}),
+    (camera_from, LENS),
+    (sepi.read_light_field, {"path": "anywhere", "options": sepi.ReadOptions(), "disparity_range": (0, 1)}),
+    (sepi.ReadOptions, dict.fromkeys(["grid", "exclude", "central", "pattern", "view", "white", "row_spacing"])),
+    (partial(sepi.estimate_depth, SCENE), {"variant": "fast", "parameters": {}, "memory": None}),
+    (sepi.estimate_depth, {"light_field": SCENE}),
+    (sepi.write_result, {"folder": "unwritten", "light_field": SCENE, "maps": MAPS, "attributes": {}, "seconds": 1}),
+    (sepi.read_result, {"path": "unwritten"}),
+    (partial(render, "dots"), {"size": 64}),
+    (write_hci, {"light_field": SCENE, "folder": "unwritten"}),
+    (write_light_field, {"path": "unwritten", "light_field": SCENE}),
+    (read_disparity, {"path": Path(__file__), "scale": 1.0, "offset": 0.0}),
+    (write_pfm, {"path": "unwritten", "values": ONES}),
+    (read_pfm, {"path": "unwritten"}),
+    (point_cloud, {"picture": VIEWS[0, 0], "disparity": ONES}),
+    (partial(write_ply, "unwritten"), {"cloud": None}),
+    (colour_code, {"values": ONES}),
+    (unknown_pixels, {"light_field": SCENE, "disparity": ONES}),
+    (use_threads, {"count": 1}),
+    (ShearedViews, {"light_field": SCENE}),
+    (stitched_epi, {"light_field": SCENE, "y": 3, "disparity": 0}),
+    (estimate_range, {"light_field": SCENE}),
+    (check_order, {"light_field": SCENE, "read_in": "as-given"}),
+    (score, {"estimate": ONES, "ground_truth": ONES}),
+    (score_regions, {"estimate": ONES, "ground_truth": ONES}),
+    (region_masks, {"light_field": SCENE}),
+    (evaluation_of, {"light_field": SCENE, "maps": ONES}),
+    (evaluations_of, {"light_field": SCENE, "maps": {}}),
+    (edges_of, {"ground_truth": ONES}),
+    (occluded, {"ground_truth": ONES}),
+    (textureless, {"reference_view": ONES}),
+    (sparsification, {"confidence": ONES}),
+    (oracle, {"error": ONES}),
+    (stage_parameters, {"variant": VARIANTS["paper"]}),
+]
 
 
-def read(path: Any = "anywhere", **more: Any) -> Callable[[], object]:
-    return lambda: sepi.read_light_field(path, **more)
+def exchanged(calls: Calls) -> list[Any]:
+    """Each of the calls with one of its arguments to exchange."""
+    return [
+        pytest.param(function, given, name, id=f"{getattr(function, 'func', function).__name__}-{name}")
+        for function, given in calls
+        for name in given
+    ]
 
 
-def depth(*arguments: Any, **more: Any) -> Callable[[], object]:
-    return lambda: sepi.estimate_depth(*arguments, **more)
+def refused(
+    function: Callable[..., object], given: dict[str, Any], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A call with an argument that nothing takes is told in one line, and writes nothing."""
+    monkeypatch.chdir(tmp_path)
+    more = {"baselines": SCENE.baselines} if function is occluded else {}
+    more |= {"error": ONES} if function is sparsification else {}
+    values = {key: value for key, value in given.items() if value is not None} | more
+    with pytest.raises(sepi.SepiError) as caught:
+        function(**values | {name: object()})
+    assert str(caught.value).isprintable()
+    assert not list(tmp_path.iterdir())
 
 
-def write(disparity: Any = ONES, confidence: Any = ONES, **extra: Any) -> Callable[[], object]:
-    return lambda: sepi.write_result("unwritten", SCENE, sepi.StageMaps(disparity, confidence, extra))
+@pytest.mark.parametrize(("function", "given", "name"), exchanged(CALLS))
+def test_an_argument_of_another_type_is_told_in_one_line(
+    function: Callable[..., object], given: dict[str, Any], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused(function, given, name, tmp_path, monkeypatch)
 
 
-def written(*arguments: Any, **more: Any) -> Callable[[], object]:
-    return lambda: sepi.write_result(*arguments, **more)
-
-
-def call(function: Callable[..., object], *arguments: Any, **more: Any) -> Callable[[], object]:
-    return lambda: function(*arguments, **more)
-
-
-def field(**more: Any) -> Callable[[], object]:
-    return lambda: sepi.LightField(**{"views": VIEWS, "name": "mine", **more})
-
-
+# of the right type, and wrong all the same
 WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "pixels before views": (
-        field(views=np.zeros((64, 64, 5, 5, 3), np.uint8)),
+        lambda: sepi.LightField(np.zeros((64, 64, 5, 5, 3), np.uint8), "mine"),
         r"mine: .*64x64 views of 5x5.*transpose",
     ),
-    "equal positions": (field(positions=np.zeros((3, 3, 2))), "mine: positions must differ"),
-    "positions of text": (field(positions=np.full((3, 3, 2), "a")), "mine: positions must be finite"),
-    "list of positions": (field(positions=[[0, 0]]), "mine: positions: expected an array"),
-    "far range": (
-        depth(SCENE.with_range(sepi.DisparityRange(-1e6, 1e6, "given"))),
-        "dots: disparity range .* 64",
-    ),
-    "range as tuple": (
-        field(disparity_range=(-1, 1)),
-        r"mine: disparity_range: expected a DisparityRange, got \(-1, 1\)",
-    ),
-    "range of text": (lambda: sepi.DisparityRange("a", 1, "given"), "got 'a' and 1"),  # type: ignore[arg-type]
-    "camera as tuple": (field(camera=(1, 2, 3)), "mine: camera: expected a Camera"),
-    "camera of text": (lambda: sepi.Camera("a", 1, 1), "camera: expected"),  # type: ignore[arg-type]
-    "view of three": (field(view=(0, 0, 0)), "mine: view: expected two whole numbers"),
-    "view between": (field(view=(0.5, 0)), "mine: view: expected two whole numbers"),
-    "path as name": (field(name=Path("mine")), "name of the light field: expected text"),
+    "equal positions": (lambda: sepi.LightField(VIEWS, "mine", positions=np.zeros((3, 3, 2))), "mine: positions must"),
     "masks of numbers": (
-        field(masks={"sky": np.ones((64, 64), np.uint8)}),
+        lambda: sepi.LightField(VIEWS, "mine", masks={"sky": np.ones((64, 64), np.uint8)}),
         "mine: masks must be bool, got sky of uint8",
     ),
-    "spacing of text": (field(row_spacing="a"), "mine: row_spacing must be a positive number, got 'a'"),
-    "text as notes": (field(notes="abc"), "mine: notes: expected a tuple of texts, got 'abc'"),
-    "numbers as notes": (field(notes=(1,)), "mine: notes: expected a tuple of texts, got 1"),
-    "ground truth of text": (field(ground_truth=np.full((64, 64), "a")), "mine: ground_truth must be float32"),
-    "source of a range": (
-        field(disparity_range=sepi.DisparityRange(0, 1, "mine")),
-        "mine: source of the disparity range: unknown 'mine'; known: parameters, given, estimated",
+    "far range": (
+        lambda: sepi.estimate_depth(SCENE.with_range(sepi.DisparityRange(-1e6, 1e6, "given"))),
+        "dots: disparity range .* 64",
     ),
-    "camera of texts": (camera(focal_length_mm="a"), "camera: expected positive numbers, got focal length 'a' mm"),
-    "camera's shape": (camera(shape=64), "camera: shape: expected height and width of a view, got 64"),
-    "no path": (read(None), "light field: expected the path of a file or folder, got None"),
-    "options as mapping": (read(options={"view": (0, 0)}), "anywhere: options: expected sepi.ReadOptions"),
-    "range of three": (read(disparity_range=(1, 2, 3)), r"disparity_range: expected \(minimum, maximum\)"),
-    "range of one": (read(disparity_range=3), r"disparity_range: expected \(minimum, maximum\), got 3"),
-    "depth of a path": (depth("dots"), "light field: expected a LightField, .*, got 'dots'"),
-    "depth by no variant": (depth(SCENE, None), "variant: expected the name of a variant or a Variant, got None"),
-    "parameters as number": (depth(SCENE, "paper", {"initial": 3}), "parameters: initial: expected parameters"),
-    "parameters as list": (depth(SCENE, "paper", [1]), "parameters: expected stages"),
-    "memory as text": (depth(SCENE, memory="1"), "memory: expected a number of bytes, got '1'"),
-    "result of an array": (written("unwritten", VIEWS, None), "light field: expected a LightField"),
-    "result of a map": (written("unwritten", SCENE, ONES), "dots: maps: expected StageMaps"),
-    "result nowhere": (written(None, SCENE, sepi.StageMaps(ONES, ONES)), "folder of the result: expected a path"),
-    "attributes as list": (
-        written("unwritten", SCENE, sepi.StageMaps(ONES, ONES), [1]),
-        r"unwritten: attributes: expected names with values, got \[1\]",
-    ),
-    "maps as lists": (write([[1]]), "dots: map 'disparity': expected an array"),
-    "complex maps": (write(ONES.astype(complex)), "dots: map 'disparity': expected numbers, got complex128"),
-    "confidence without numbers": (write(ONES, ONES * np.nan), "dots: confidence must lie within 0..1, got NaN"),
-    "numbers of unknown": (write(unknown=ONES.astype(np.uint8)), "dots: map 'unknown': expected bool, got uint8"),
-    "text as seconds": (written("unwritten", SCENE, sepi.StageMaps(ONES, ONES), seconds="a"), "unwritten: seconds: "),
-    "size of text": (call(render, "dots", size="a"), "size must be a whole number"),
-    "scene of an array": (call(write_hci, VIEWS, "unwritten"), "light field: expected a LightField"),
-    "scene to nowhere": (call(write_hci, SCENE, None), "folder of the light field: expected a path, got None"),
-    "light field of an array": (call(write_light_field, "unwritten", VIEWS), "light field: expected a LightField"),
-    "light field to nowhere": (call(write_light_field, None, SCENE), "light field to write: expected a path"),
-    "result from nowhere": (call(sepi.read_result, None), "result: expected a path, got None"),
-    "map from nowhere": (call(read_disparity, 3), "disparity map: expected a path, got 3"),
-    "scale of text": (call(read_disparity, Path(__file__), scale="a"), "scale: expected a finite number, got 'a'"),
-    "no number as scale": (
-        call(read_disparity, Path(__file__), scale=np.nan),
-        "scale: expected a finite number, got nan",
-    ),
-    "PFM of colours": (call(write_pfm, "unwritten", VIEWS[0, 0]), r"unwritten: expected .* \(H, W\), got uint8"),
-    "PFM from nowhere": (call(read_pfm, None), "PFM to read: expected a path"),
-    "points of a map": (call(write_ply, "unwritten", ONES), "unwritten: positions: expected an array"),
-    "points of text": (call(point_cloud, VIEWS[0, 0], "a"), "point cloud: disparity: expected an array"),
-    "colours of text": (call(colour_code, "a"), "map to colour: expected an array"),
-    "unknown in an array": (call(unknown_pixels, VIEWS, ONES), "light field: expected a LightField"),
-    "unknown by a small map": (
-        call(unknown_pixels, SCENE, ONES[:5]),
-        r"dots: disparity: .*\(64, 64\), got float32 \(5",
-    ),
-    "threads of text": (call(use_threads, "a"), "threads: expected a whole number from 1 on, got 'a'"),
-    "no threads": (call(use_threads, 0), "threads: expected a whole number from 1 on, got 0"),
-    "sheared array": (call(ShearedViews, VIEWS), "light field: expected a LightField"),
-    "row of text": (call(stitched_epi, SCENE, "a", 0), "dots: row: expected a whole number"),
-    "stitched by text": (call(stitched_epi, SCENE, 3, "a"), "dots: disparity must be a finite number"),
-    "range of an array": (call(estimate_range, VIEWS), "light field: expected a LightField"),
-    "order of an array": (call(check_order, VIEWS), "light field: expected a LightField"),
-    "unknown order": (call(check_order, SCENE, "a"), "order: unknown 'a'; known: as-given"),
-    "score of text": (call(score, "a", ONES), "estimate: expected an array"),
-    "score by text": (call(score_regions, ONES, "a"), "ground_truth: expected an array"),
-    "regions of an array": (call(region_masks, VIEWS), "light field: expected a LightField"),
-    "evaluation of an array": (call(evaluation_of, VIEWS, ONES), "light field: expected a LightField"),
-    "evaluation of a small map": (call(evaluation_of, SCENE, ONES[:5]), "dots: disparity: expected an array"),
-    "evaluations of one map": (call(evaluations_of, SCENE, ONES), "dots: maps: expected names with their maps"),
-    "edges of text": (call(edges_of, "a"), "ground truth: expected an array"),
-    "hidden by text": (call(occluded, "a", SCENE.baselines), "ground truth: expected an array"),
-    "texture of text": (call(textureless, "a"), "reference view: expected an array"),
-    "confidence of text": (call(sparsification, "a", ONES), "confidence: expected an array"),
-    "best confidence of text": (call(oracle, "a"), "error: expected an array"),
-    "parameters of no variant": (call(stage_parameters, None), "variant: expected a Variant, got None"),
-    "number as reading": (field(reading=3), "mine: reading: expected text, got 3"),
-    "options: grid": (lambda: sepi.ReadOptions(grid="5x5"), "options: grid: expected two whole"),  # type: ignore[arg-type]
-    "options: exclude": (lambda: sepi.ReadOptions(exclude=((0, 0),)), "options: exclude: "),  # type: ignore[arg-type]
-    "options: central": (lambda: sepi.ReadOptions(central="3"), "options: central: "),  # type: ignore[arg-type]
-    "options: pattern": (lambda: sepi.ReadOptions(pattern=3), "options: pattern: "),  # type: ignore[arg-type]
+    "parameters as number": (lambda: sepi.estimate_depth(SCENE, "paper", {"initial": 3}), "initial: expected"),
+    "complex map": (lambda: write_maps(ONES.astype(complex)), "dots: map 'disparity': expected numbers"),
+    "confidence without numbers": (lambda: write_maps(ONES, ONES * np.nan), "confidence must lie within 0..1"),
+    "unknown in numbers": (lambda: write_maps(unknown=ONES.astype(np.uint8)), "map 'unknown': expected bool"),
+    "no number as scale": (lambda: read_disparity(Path(__file__), scale=np.nan), "expected a finite number, got nan"),
+    "PFM of colours": (lambda: write_pfm("unwritten", VIEWS[0, 0]), r"unwritten: expected .* \(H, W\), got uint8"),
+    "unknown by a small map": (lambda: unknown_pixels(SCENE, ONES[:5]), r"dots: disparity: .*\(64, 64\)"),
+    "evaluation of a small map": (lambda: evaluation_of(SCENE, ONES[:5]), "dots: disparity: expected an array"),
+    "no threads": (lambda: use_threads(0), "threads: expected a whole number from 1 on, got 0"),
+    "unknown order": (lambda: check_order(SCENE, "a"), "order: unknown 'a'; known: as-given"),
 }
+
+
+def write_maps(disparity: np.ndarray = ONES, confidence: np.ndarray = ONES, **extra: np.ndarray) -> None:
+    sepi.write_result("unwritten", SCENE, sepi.StageMaps(disparity, confidence, extra))
 
 
 @pytest.mark.parametrize("wrong", WRONG)

@@ -180,17 +180,6 @@ def test_a_threshold_that_is_none_is_refused(threshold: Any) -> None:
         score(np.zeros((2, 2), np.float32), np.zeros((2, 2), np.float32), thresholds=[threshold])
 
 
-def test_no_ground_truth_no_scores() -> None:
-    assert evaluation_of(scene(None), np.zeros((40, 40), np.float32)).scores == {}
-
-
-def test_wrong_shape_is_a_clear_error() -> None:
-    with pytest.raises(SepiError, match=r"disparity: .*\(40, 40\), got float32 \(40, 39\)"):
-        evaluation_of(scene(np.zeros((40, 40), np.float32)), np.zeros((40, 39), np.float32))
-    with pytest.raises(SepiError, match=r"ground_truth .*\(2, 2\), got \(2, 3\)"):
-        score(np.zeros((2, 2), np.float32), np.zeros((2, 3), np.float32))
-
-
 def run_command(
     folder: Path, light_field: LightField, maps: Mapping[str, np.ndarray | StageMaps], output: str = "scores.h5"
 ) -> tuple[Path, str]:
@@ -271,16 +260,6 @@ def test_command_says_that_there_is_no_truth(tmp_path: Path) -> None:
         assert file.attrs["scene"] == "noise"
 
 
-def test_command_on_a_foreign_file_is_one_line(tmp_path: Path) -> None:
-    write_light_field(tmp_path / "lightfield.h5", scene(None))
-    options = ["--light-field", tmp_path / "lightfield.h5", "--stages", tmp_path, "--output", tmp_path / "out.h5"]
-    absent = tmp_path / "sepi" / "absent.h5"
-    result = CliRunner().invoke(command, [str(word) for word in [*options, absent]])
-    assert result.exit_code == 1
-    assert result.output.strip() == f"sepi: {absent}: no such file"
-    assert not (tmp_path / "out.h5").exists()
-
-
 def test_a_map_from_elsewhere_is_refused(tmp_path: Path) -> None:
     """Its name would be wrong, and so the row of the table."""
     write_light_field(tmp_path / "lightfield.h5", scene(None))
@@ -288,12 +267,6 @@ def test_a_map_from_elsewhere_is_refused(tmp_path: Path) -> None:
     result = CliRunner().invoke(command, [str(word) for word in [*options, tmp_path / "b" / "sepi" / "initial.h5"]])
     assert result.exit_code == 1
     assert f"not below {tmp_path / 'a'}" in result.output
-
-
-def test_reading_scores_from_another_file_is_a_clear_error(tmp_path: Path) -> None:
-    write_light_field(tmp_path / "lightfield.h5", scene(None))
-    with pytest.raises(SepiError, match="not a score file"):
-        read_scores(tmp_path / "lightfield.h5")
 
 
 def test_a_map_that_was_not_scored_is_named(tmp_path: Path) -> None:

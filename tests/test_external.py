@@ -1,17 +1,15 @@
 """Maps of external methods: scored like ours, and whatever is wrong with one is told and stops nothing."""
 
 import json
-import os
 import warnings
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from sepi.errors import SepiError, SepiWarning
+from sepi.errors import SepiWarning
 from sepi.evaluate import evaluation_of
 from sepi.external import ExternalSource, command, external_maps
 from sepi.io.hdf5 import write_light_field
@@ -142,20 +140,6 @@ class TestImport:
         assert found["good"].problem == ""
         assert found["good"].evaluation.scores["paper"]["all"]["mse100"] > 0
 
-    @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-    def test_a_file_that_may_not_be_read(self, tmp_path: Path, light_field: LightField) -> None:
-        file = saved(tmp_path / "noise.pfm", np.ones(SHAPE, np.float32))
-        (tmp_path / "noise.pfm").chmod(0)
-        with pytest.warns(SepiWarning, match="Permission denied"):
-            assert external_maps(light_field, {"SPO": file})["SPO"].problem == "not readable"
-
-    def test_a_name_that_no_file_can_have(self, light_field: LightField) -> None:
-        with pytest.warns(SepiWarning, match="too long"):
-            assert (
-                external_maps(light_field, {"SPO": ExternalSource(path="a" * 300 + ".pfm")})["SPO"].problem
-                == "not readable"
-            )
-
 
 class TestFile:
     def external(self, light_field: LightField, estimate: np.ndarray) -> ExternalMap:
@@ -185,23 +169,6 @@ class TestFile:
         assert without_nan(back["SPO"].evaluation.scores) == without_nan(external.evaluation.scores)
         assert (back["SPO"].disparity, back["SPO"].evaluation.error, back["SPO"].evaluation.regions) == (None, None, {})
         assert back["lost"].problem == "no file"
-
-    def test_maps_say_their_unit_and_masks_take_no_room(
-        self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
-    ) -> None:
-        write_external(tmp_path / "a.h5", {"SPO": self.external(light_field, estimate)})
-        with h5py.File(tmp_path / "a.h5") as file:
-            assert file["methods/SPO/disparity"].attrs["units"] == "pixels per view step"
-            assert file["methods/SPO/regions/occluded"].compression == "gzip"
-
-    def test_no_method_at_all(self, tmp_path: Path) -> None:
-        write_external(tmp_path / "a.h5", {})
-        assert read_external(tmp_path / "a.h5") == {}
-
-    def test_another_file_is_a_clear_error(self, tmp_path: Path, light_field: LightField) -> None:
-        write_light_field(tmp_path / "lightfield.h5", light_field)
-        with pytest.raises(SepiError, match=r"lightfield\.h5: not a file of external maps"):
-            read_external(tmp_path / "lightfield.h5")
 
 
 class TestCommand:

@@ -1,47 +1,32 @@
 """What is published agrees with itself: version, archives, the README's examples, files for GitHub and Docker."""
 
+import os
 import re
-import shlex
 import shutil
 import subprocess
 import sys
 import tarfile
 import tomllib
 import zipfile
-from functools import cache
 from pathlib import Path
 from typing import Any
 
-import click
 import pytest
 import yaml
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
-from sepi.cli.main import main
 from sepi.io.provenance import package_version
 from tools import check_release
 
 ROOT = Path(__file__).parents[1]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-WORKFLOWS = sorted((ROOT / ".github/workflows").glob("*.yml"))
-FORMS = sorted(set((ROOT / ".github/ISSUE_TEMPLATE").glob("*.yml")) - {ROOT / ".github/ISSUE_TEMPLATE/config.yml"})
 
 
 def loaded(path: Path) -> dict[Any, Any]:
     """A YAML file; ``on`` of GitHub's workflows is read as ``True``."""
     content: dict[Any, Any] = yaml.safe_load(path.read_text())
     return content
-
-
-@cache
-def phony_targets() -> set[str]:
-    """What can be asked of make."""
-    done = subprocess.run(
-        ["make", "--print-data-base", "--question", "clean"], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    (line,) = re.findall(r"^\.PHONY: (.*)$", done.stdout, flags=re.MULTILINE)
-    return set(line.split())
 
 
 # --- version and metadata
@@ -66,14 +51,6 @@ def test_every_dependency_has_a_lowest_version() -> None:
         requirement = Requirement(line)
         operators = {specifier.operator for specifier in requirement.specifier}
         assert requirement.name == "sepi" or operators == {">="}, line
-
-
-def test_listed_pythons_are_allowed() -> None:
-    """The index says that a Python will do on which the package refuses to be installed."""
-    allowed = SpecifierSet(PROJECT["requires-python"])
-    listed = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["classifiers"]))
-    assert listed
-    assert all(allowed.contains(f"{version}.0") for version in listed)
 
 
 # --- archives
@@ -125,9 +102,12 @@ def test_wheel_holds_the_whole_package(tree: Path) -> None:
     """Installed from the index, the report has no templates or published figures: ``package-data`` lists them."""
     with zipfile.ZipFile(build(tree, "wheel")) as wheel:
         names = {name for name in wheel.namelist() if ".dist-info/" not in name}
+        kernels = [wheel.read(name) for name in names if name.startswith("sepi/kernels/baseline/_native.")]
     built = {name for name in names if name.endswith(BUILT)}
     assert names - built == files_of(tree, "sepi")
-    assert any(name.startswith("sepi/kernels/baseline/_native.") for name in built)
+    assert kernels
+    # by its Clang, not by the compiler that built Python, which scikit-build-core would name
+    assert "CXX" in os.environ or sys.platform != "linux" or all(re.search(rb"Clang \d+\.\d+", one) for one in kernels)
 
 
 # --- the check of a release
@@ -157,11 +137,6 @@ def test_wrong_tags_are_refused(tag: str, changelog: str, told: str) -> None:
         check_release.check_tag(tag, "1.2.3", changelog)
 
 
-def test_right_tag_is_taken() -> None:
-    """No release could be published."""
-    check_release.check_tag("v1.2.3", "1.2.3", "# Changelog\n\n## 1.2.3 (2026-01-31)\n\n- a line\n")
-
-
 def test_only_allowed_pythons_are_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A stand-in for a Python that is not there (pyenv has such) stops the check, or one that is too old is tried."""
     pythons = {"3.9": "echo 3.9.1", "3.12": "echo 3.12.1", "3.13": "exit 127", "3.12-config": "echo 3.12.1"}
@@ -174,50 +149,6 @@ def test_only_allowed_pythons_are_tried(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 # --- files for GitHub, pre-commit and Docker. Their schemas are checked by `make lint`
-
-
-@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
-def test_workflows_call_make_alone_and_may_do_little(path: Path) -> None:
-    """What passes on GitHub is not what passes here, or a step of a workflow can change the repository."""
-    workflow = loaded(path)
-    targets = phony_targets()
-    assert workflow["permissions"] in ({}, {"contents": "read"})
-    for job in workflow["jobs"].values():
-        assert set(job.get("permissions", {}).items()) <= {("contents", "read"), ("id-token", "write")}
-        for step in job["steps"]:
-            if "run" in step:
-                program, target, *_ = shlex.split(step["run"])
-                assert program == "make"
-                assert target in targets
-
-
-def test_only_the_published_job_may_speak_for_the_project() -> None:
-    """A step that runs other people's code, as a build does, could publish in this project's name."""
-    jobs = loaded(ROOT / ".github/workflows/release.yml")["jobs"]
-    speaking = [name for name, job in jobs.items() if "id-token" in job.get("permissions", {})]
-    assert speaking == ["publish"]
-    assert jobs["publish"]["environment"] == "pypi"
-    assert not any("run" in step for step in jobs["publish"]["steps"])
-
-
-def test_hooks_are_the_parts_of_lint() -> None:
-    """A commit passes its hooks and fails `make lint`."""
-    (local,) = loaded(ROOT / ".pre-commit-config.yaml")["repos"]
-    parts = {name for name in phony_targets() if name.startswith("lint-")}
-    assert {hook["entry"] for hook in local["hooks"]} == {f"make {part}" for part in parts}
-
-
-@pytest.mark.parametrize("path", FORMS, ids=lambda path: path.name)
-def test_forms_ask_for_what_sepi_can_tell(path: Path) -> None:
-    """A form asks for the output of a command or flag that is not there."""
-    context = click.Context(main)
-    asked = re.findall(r"`sepi ([^`]+)`", path.read_text())
-    assert asked or path.name == "proposal.yml"
-    for words in map(shlex.split, asked):
-        command = main.get_command(context, words[0]) if not words[0].startswith("--") else main
-        assert command is not None, words
-        known = {flag for parameter in command.get_params(context) for flag in parameter.opts}
-        assert {word for word in words if word.startswith("--")} <= known
 
 
 def test_image_is_made_of_what_docker_is_given() -> None:

@@ -25,6 +25,7 @@ static bool has_x86_64_v3() {
 NB_MODULE(_native, m) {
     m.doc() = "Compiled loops, for one kind of processor.";
     m.attr("LANES") = sepi::LANES;
+    m.attr("COMPILER") = __VERSION__;
     m.def("has_x86_64_v3", &has_x86_64_v3, "Whether this processor can use kernels that are built for x86-64-v3.");
     m.def("thread_count", &sepi::thread_count, "Threads of a loop, the caller's among them.");
     m.def("set_thread_count", &sepi::set_thread_count, "count"_a, "Have each loop use so many threads.");

@@ -15,13 +15,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bench import choices
 from bench.__main__ import _all_measured, main
 from bench.measure import Case, Measurement, Prepared, Result, command, measured, read_result
 from bench.plain import WARPS, Warp, by_opencv, plain_sweep
 from sepi.errors import SepiError
 from sepi.matching.plane_sweep import SweepParameters, sweep
-from sepi.process.machine import this_machine
 from sepi.scenes import render
 
 pytestmark = pytest.mark.slow
@@ -81,20 +79,6 @@ def test_plain_implementations_give_the_compiled_costs(warp: Warp) -> None:
     assert np.mean(np.abs(disparity - own.disparity[0]) > step) < 0.002
 
 
-def test_choices_are_changed_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The table of docs/reproduce/ablations.md: a row for each change, empty where nothing changes."""
-    page = Path(__file__).parents[2] / "docs/reproduce/ablations.md"
-    shown = page.read_text(encoding="utf-8").split("| changed |")[1].split("\n\n")[0].splitlines()[2:]
-    assert [row.split("|")[1].strip() for row in shown] == list(choices.ALTERNATIVES)
-    monkeypatch.setattr(choices, "opened", lambda name: render(name, size=64, views=3))
-    some = {"as chosen": ("", {}), "no window": ("initial", {"window_radius": 0}), "again": ("", {})}
-    monkeypatch.setattr(choices, "ALTERNATIVES", some)
-    head, _, *rows = ([cell.strip() for cell in row.split("|")[1:3]] for row in choices.table(["dots"]).splitlines())
-    assert head == ["changed", "dots"]
-    assert [name for name, _ in rows] == list(some)
-    assert rows[2][1] == "" != rows[1][1] != rows[0][1]
-
-
 class TestCompare:
     @pytest.fixture
     def files(self, tmp_path: Path) -> tuple[Path, Path]:
@@ -121,13 +105,6 @@ class TestCompare:
         called = CliRunner().invoke(main, ["compare", *map(str, files)])
         assert "not the same processor: abacus before, slide rule after" in called.stderr
         assert "not the same threads: 1 before, None after" in called.stderr
-
-
-def test_machine_names_no_host_and_no_user() -> None:
-    """Results are passed on."""
-    machine = this_machine()
-    assert {"processor", "cores", "python", "numpy"} <= set(machine)
-    assert not {"node", "host", "user", "path"} & set(machine)
 
 
 @pytest.mark.system

@@ -1,9 +1,7 @@
 """The comparison of maps on other numbers of threads."""
 
-import pytest
 from click.testing import CliRunner
 
-import bench.digests
 from bench.__main__ import main
 
 # of one texture: each process draws it
@@ -18,13 +16,3 @@ def test_one_digest_on_more_threads_than_cores_and_on_any_processor() -> None:
     heading, *_, row = result.output.strip().splitlines()
     assert heading.endswith(": 1 thread; 3 threads; 3 threads, for any processor")
     assert row.strip("| ").endswith("none")
-
-
-def test_a_difference_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the threads that make it, and not with exit code 0."""
-    monkeypatch.setattr(
-        bench.digests, "digests", lambda condition, variants, *_: dict.fromkeys(variants, str(condition))
-    )
-    result = CliRunner().invoke(main, [*SMALL, "--threads", "1"])
-    assert result.exit_code == 1
-    assert "1 thread, for any processor |" in result.output

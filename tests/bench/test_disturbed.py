@@ -1,7 +1,5 @@
 """The bench of disturbed light fields, and what it is for: never a wrong word on the order of the views."""
 
-from functools import partial
-
 import pytest
 from click.testing import CliRunner
 
@@ -23,18 +21,6 @@ def test_no_verdict_is_wrong(name: str) -> None:
     told = sum(verdicts.orders["right"] for verdicts in found.values())
     assert (told > 6 * len(turns)) == (name == "curved_occluders")
     assert all(verdicts.row_spacing == 1 for verdicts in found.values())
-
-
-def test_the_command_prints_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
-    first = dict(list(DISTURBANCES.items())[:1])
-    monkeypatch.setattr("bench.disturbed.DISTURBANCES", first)
-    monkeypatch.setattr("bench.__main__.render", partial(render, size=64, views=3))
-    result = CliRunner().invoke(main, ["disturb", "fronto_parallel"])
-    assert result.exit_code == 0, result.output
-    rows = result.output.splitlines()
-    assert len(rows) == 1 + 2 * len(first)
-    assert rows[1].split()[:7] == ["fronto_parallel", "as", "it", "is", "0", "8", "0"]
-    assert rows[-1].split()[-1] == "0"
 
 
 def test_an_unknown_light_field_is_refused() -> None:

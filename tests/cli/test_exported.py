@@ -7,12 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
-from error_lines import error_of, reading_error
+from error_lines import call, error_of, reading_error
 from geometries import jittered
 
 from sepi.camera import Camera
-from sepi.cli.main import main
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import write_png
 from sepi.io.provenance import digest_of
@@ -24,10 +22,6 @@ from sepi.scenes import render
 
 CAMERA = ("--focal-length", 35, "--baseline", 2, "--focus-distance", 3, "--sensor-size", 24)
 VIEWS = render("pyramids", size=64, views=3)
-
-
-def call(*words: object) -> Result:
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 def corrected() -> tuple[object, ...]:

@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
-from error_lines import error_of
+from error_lines import call, error_of
 
-from sepi.cli.main import main
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import write_png
 from sepi.io.pfm import write_pfm
@@ -25,10 +23,6 @@ from sepi.stage import StageMaps
 # row and column of the view whose truth it is, not the centre
 VIEW = (1, 2)
 SCALE = 1 / 32
-
-
-def call(*words: object) -> Result:
-    return CliRunner().invoke(main, list(map(str, words)))
 
 
 @pytest.fixture

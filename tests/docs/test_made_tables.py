@@ -71,16 +71,3 @@ def test_every_marked_table_is_made(tmp_path: Path) -> None:
         for old, new in zip(rows, filled(found, tmp_path).splitlines()[-len(rows) :], strict=True):
             # what no run has is named in plain words
             assert old != new or not re.match(r"\| [^|]*`", old) or found["empty"], old
-
-
-def test_every_table_of_figures_has_a_command() -> None:
-    """Figures that somebody types are those of a version that nobody knows."""
-    alone = set()
-    for page, file in FILES.items():
-        for before, rows in re.findall(r"(.*)\n\n?\|.*\n\|[-:| ]+\n((?:\|.*\n)+)", file.read_text(encoding="utf-8")):
-            cells = [cell.strip() for row in rows.splitlines() for cell in row.split("|")[2:-1]]
-            figures = [cell for cell in cells if re.match(r"[\d.,/ %-]*\d\.\d", cell)]
-            if 2 * len(figures) > len(cells) and not re.search("^    |-->$", before):
-                alone.add(page)
-    # what the paper prints, constants, and a page that a command writes
-    assert alone == {f"docs/reproduce/{name}.md" for name in ("published", "report", "rendered_results")}

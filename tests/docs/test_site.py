@@ -16,7 +16,6 @@ sys.path.insert(0, str(DOCS))
 import make_pictures
 import pictures.failures
 import pictures.stages
-from extensions.figures_in_tables import kept_together
 from pictures.style import INKS, write_drawing
 
 from sepi.lightfield import LightField
@@ -96,21 +95,6 @@ def test_drawing_of_maps(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     for module in (pictures.failures, pictures.stages):
         monkeypatch.setattr(module, "render", of_few_views)
     _draw(name, tmp_path)
-
-
-def test_drawings_repeat(tmp_path: Path) -> None:
-    """Every build of the site would differ from the last."""
-    for folder in ("a", "b"):
-        (tmp_path / folder).mkdir()
-        write_drawing(tmp_path / folder, "grid-of-views", make_pictures.drawings(SMALL)["grid-of-views"]())
-    first, second = (sorted(p.read_bytes() for p in (tmp_path / folder).iterdir()) for folder in ("a", "b"))
-    assert first == second
-    assert first[0] != first[1]
-
-
-def test_figures_of_a_cell_stay_together() -> None:
-    """Columns of three figures with strokes between are torn into a line for each."""
-    assert kept_together("a / b 1 / 2\n| 0.5 / 1 / - | a / b |") == "a / b 1 / 2\n| 0.5\xa0/\xa01\xa0/\xa0- | a / b |"
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from real_scenes import views_of
 
-from sepi.inspection.disparity_sign import Evidence, Look, add_pairs, occlusion_evidence
+from sepi.inspection.disparity_sign import Evidence, Look, add_pairs
 from sepi.inspection.view_layouts import Trial, Views
 from sepi.inspection.view_order import check_order
 from sepi.io.readers.options import ORDERS
@@ -291,23 +291,6 @@ def test_near_and_far_are_told_in_noise_and_in_small_pictures(hci: Path, kind: s
 
     light_field = grey_field(views_of(hci / "cotton").views[part])
     orders_are_named(DISTURBANCES[kind].change(light_field), ["flip-both"])
-
-
-def test_a_glance_may_say_that_all_is_well_but_not_that_it_is_not(hci: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every run would wait for the closer look, or one third of the rows would have depth turned inside out."""
-    looks: list[Look] = []
-
-    def noted(light_field: LightField, trial: Trial, look: Look, views: Views) -> Evidence:
-        looks.append(look)
-        return occlusion_evidence(light_field, trial, look, views)
-
-    monkeypatch.setattr("sepi.inspection.view_order.occlusion_evidence", noted)
-    light_field = views_of(hci / "cotton")
-    assert check_order(light_field).sign_clear
-    assert looks == [Look.GLANCE]
-    looks.clear()
-    assert check_order(misread(light_field, "flip-both")).best == "flip-both"
-    assert looks == list(Look)
 
 
 @pytest.mark.parametrize(("closer", "best"), [(1.4, "as-given"), (0.1, "flip-both"), (-1.4, "flip-both")])

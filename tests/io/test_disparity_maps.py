@@ -63,11 +63,6 @@ def test_own_png_says_what_its_levels_mean(result: Path, disparity: np.ndarray) 
     assert np.isnan(back[3, 4])
 
 
-def test_names_may_end_in_capitals(tmp_path: Path, disparity: np.ndarray) -> None:
-    write_pfm(tmp_path / "MAP.PFM", disparity)
-    np.testing.assert_array_equal(read_disparity(tmp_path / "MAP.PFM"), disparity)
-
-
 @pytest.mark.parametrize("name", ["disparity.pfm", "disparity.npy", "disparity_16bit.png", "result.h5"])
 def test_scale_and_offset_turn_another_convention(result: Path, name: str) -> None:
     plain = read_disparity(result / name)
@@ -144,17 +139,6 @@ class TestWhatIsNoMap:
             path.write_bytes(whole[:length])
             is_disparity(path)
             assert "not a PNG, or damaged" in self.error(path)
-
-
-def test_evaluate_takes_png_maps(result: Path, disparity: np.ndarray, tmp_path: Path) -> None:
-    called = CliRunner().invoke(main, ["evaluate", str(result / "disparity_16bit.png"), str(result)])
-    assert called.exit_code == 0, called.output
-    # the unknown pixel is unknown in both: left out, and nothing is wrong
-    assert called.stdout.splitlines()[1].split()[:3] == ["paper", "all", "0.000"]
-    cv2.imwrite(str(tmp_path / "levels.png"), np.ones(SHAPE, np.uint16))
-    called = CliRunner().invoke(main, ["evaluate", str(tmp_path / "levels.png"), str(result)])
-    assert called.exit_code == 1
-    assert "give a scale" in called.stderr
 
 
 @pytest.mark.extension("page")

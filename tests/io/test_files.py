@@ -121,12 +121,6 @@ def test_files_have_the_users_permissions(tmp_path: Path) -> None:
     assert (tmp_path / "maps").stat().st_mode & 0o777 == 0o750
 
 
-@pytest.mark.parametrize("name", ["with space.txt", "Lichtfeld-Größe-光.txt", "x" * 250 + ".txt", "-flag.txt"])
-def test_any_name_will_do(tmp_path: Path, name: str) -> None:
-    write_file(tmp_path / name)
-    assert names_in(tmp_path) == [name]
-
-
 def test_a_device_is_not_replaced_by_a_file(tmp_path: Path) -> None:
     """``-o /dev/stdout`` as root would take standard output away from every program."""
     os.mkfifo(tmp_path / "pipe")

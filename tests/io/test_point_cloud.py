@@ -1,5 +1,6 @@
 """Point clouds: where the points lie, what colour they have, and that other programs read the file."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,12 +33,14 @@ def test_what_is_no_ply_of_numbers_is_refused(tmp_path: Path, form: str, word: s
 
 
 def test_metric_point_lies_where_the_pinhole_camera_sees_it() -> None:
-    """By hand: 12 / (1 + 3) = 3 m away; 10 pixels right of the middle and 5.5 above it."""
+    """By hand: 12 / (1 + 3) = 3 m away; 10 pixels right of the middle and 5.5 above it, or less of a crop's middle."""
     disparity = np.full((H, W), np.nan, np.float32)
     disparity[4, 25] = 1
     cloud = cloud_of(light_field(camera=CAMERA), disparity)
     assert cloud.metric
     np.testing.assert_allclose(cloud.positions, [[10 * 3 / 400, 5.5 * 3 / 400, -3]], rtol=1e-6)
+    cropped = cloud_of(light_field(camera=replace(CAMERA, right=4, down=-2)), disparity)
+    np.testing.assert_allclose(cropped.positions, [[6 * 3 / 400, 3.5 * 3 / 400, -3]], rtol=1e-6)
 
 
 @pytest.mark.parametrize("view", [(2, 5), (0, 3), (4, 0)])

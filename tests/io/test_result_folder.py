@@ -236,13 +236,6 @@ def test_a_result_without_error_bars_claims_none(tmp_path: Path, light_field: Li
     assert not back.unknown.any()
 
 
-def test_equal_results_give_equal_bytes(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
-    for name in ("a", "b"):
-        names = write_result(tmp_path / name, light_field, with_bars(maps), {"variant": "paper"})
-    for name in names:
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
-
-
 def test_files_of_an_earlier_run_do_not_outlive_it(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
     """A mask of a stage that is now switched off, depth of a camera no longer given, a time, error bars of another
     variant or maps of all views would be taken for this run's; a user's own file stays.
@@ -312,44 +305,6 @@ def test_another_light_fields_result_is_not_overwritten(
     write_result(tmp_path, other, maps, force=True)
     (tmp_path / "result.h5").write_bytes(b"nothing")
     write_result(tmp_path, other, maps, force=True)
-
-
-def test_links_in_the_folder_are_replaced_and_not_followed(
-    tmp_path: Path, light_field: LightField, maps: StageMaps
-) -> None:
-    names = write_result(tmp_path / "first", light_field, maps, {})
-    (tmp_path / "out").mkdir()
-    (tmp_path / "precious").write_text("mine")
-    for name in names:
-        (tmp_path / "out" / name).symlink_to(tmp_path / "precious")
-    write_result(tmp_path / "out", light_field, maps, {}, force=True)
-    assert (tmp_path / "precious").read_text() == "mine"
-    for name in names:
-        assert not (tmp_path / "out" / name).is_symlink()
-        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "first" / name).read_bytes()
-
-
-@pytest.mark.parametrize("filled", [False, True])
-def test_the_folder_may_be_a_link_to_where_there_is_room(
-    tmp_path: Path, light_field: LightField, maps: StageMaps, filled: bool
-) -> None:
-    (tmp_path / "disk").mkdir()
-    if filled:
-        (tmp_path / "disk/notes.txt").write_text("mine")
-    (tmp_path / "out").symlink_to(tmp_path / "disk")
-    write_result(tmp_path / "out", light_field, maps, {}, force=filled)
-    assert (tmp_path / "out").is_symlink()
-    assert set(RESULT_FILES) < set(names_in(tmp_path / "disk"))
-
-
-def test_a_scene_is_not_written_into(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
-    """Its masks have the names of a result's: they would be replaced."""
-    assert cv2.imwrite(str(tmp_path / "input_Cam000.png"), np.zeros((4, 4), np.uint8))
-    (tmp_path / "mask_occluded.png").write_bytes(b"ground_truth")
-    with pytest.raises(SepiError, match="holds the views of a light field"):
-        write_result(tmp_path, light_field, maps, {})
-    assert names_in(tmp_path) == ["input_Cam000.png", "mask_occluded.png"]
-    assert (tmp_path / "mask_occluded.png").read_bytes() == b"ground_truth"
 
 
 BAD_MAPS = {
@@ -462,26 +417,6 @@ def test_no_result_at_all(tmp_path: Path) -> None:
     for path, name in [(tmp_path, "result.h5"), (tmp_path / "gone", "gone"), (tmp_path / "text.h5", "text.h5")]:
         with pytest.raises(SepiError, match=name):
             read_result(path)
-
-
-def test_failed_result_leaves_no_folder(
-    tmp_path: Path, light_field: LightField, maps: StageMaps, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(path: Path, *_: object) -> None:
-        raise SepiError(f"{path}: no space")
-
-    monkeypatch.setattr("sepi.io.result_folder.write_png", fail)
-    with pytest.raises(SepiError, match="no space"):
-        write_result(tmp_path / "out", light_field, maps, {})
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_result_needs_a_folder(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
-    (tmp_path / "out").write_text("mine")
-    for target in (tmp_path / "out", tmp_path / "out" / "below"):
-        with pytest.raises(SepiError, match="out"):
-            write_result(target, light_field, maps, {})
-    assert (tmp_path / "out").read_text() == "mine"
 
 
 def test_colours_show_finite_values_whatever_else_is_there() -> None:

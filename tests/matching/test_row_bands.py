@@ -10,16 +10,13 @@ import pytest
 from geometries import GEOMETRIES, standing
 
 from sepi.errors import SepiError
-from sepi.kernels import base_detail
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching import row_bands as module
 from sepi.matching.memory_limit import bytes_of_bands
 from sepi.matching.row_bands import FEWEST_ROWS, row_bands
-from sepi.optimize import SecondOrderParameters, second_order
 from sepi.pipeline import estimate_depth
 from sepi.process.workspace import Workspace
 from sepi.scenes import render
-from sepi.stage import StageMaps, no_progress
 from sepi.variants import stage_parameters, variant_named
 
 
@@ -71,25 +68,6 @@ def test_maps_are_the_same_for_any_number_of_bands(variant: str, geometry: str, 
         np.testing.assert_array_equal(in_bands.confidence, at_once.confidence)
         for name, values in at_once.extra.items():
             np.testing.assert_array_equal(in_bands.extra[name], values)
-
-
-def test_refinement_in_bands_makes_detail_once(monkeypatch: Any) -> None:
-    """Where there is memory for it; else large light fields take half as long again."""
-    made: list[int] = []
-    detail_of_views = base_detail.detail_of_views
-
-    def counting(*given: Any) -> None:
-        made[-1] += given[2].sum() * given[-1].shape[2]
-        detail_of_views(*given)
-
-    monkeypatch.setattr(base_detail, "detail_of_views", counting)
-    scene = render("wall", size=64, views=5)
-    before = StageMaps(scene.ground_truth, np.ones_like(scene.ground_truth))
-    for workspace in (Workspace(1, detail_bytes=2 * 25 * 64 * 64), Workspace(1)):
-        made.append(0)
-        second_order(replace(scene, workspace=workspace), before, SecondOrderParameters(), no_progress)
-    rows_of_all = 25 * 64
-    assert made[0] == rows_of_all < made[1]
 
 
 def test_a_limit_on_memory_leaves_the_rest_to_the_bands() -> None:

@@ -14,10 +14,8 @@ from sepi.matching.semi_global import Places
 from sepi.matching.sweep_arrays import Visibility, sampled_candidates
 from sepi.matching.view_subsets import spread_views, views_without_aliases
 from sepi.matching.visibility_sweep import (
-    FirstDepthParameters,
     VisibleViewsParameters,
     depth_from_visible_views,
-    first_depth,
     occluded_in_any_view,
 )
 from sepi.scenes import render
@@ -75,24 +73,6 @@ def test_views_that_are_missing_do_not_stand_for_others() -> None:
     chosen = spread_views(field, 9)
     assert not (chosen & ~present).any()
     assert 9 <= chosen.sum() < present.sum()
-
-
-def test_all_maps_but_the_last_compare_few_views(monkeypatch) -> None:
-    """They only tell what is hidden where; the last one is what the user gets."""
-    compared = []
-    monkeypatch.setattr(
-        visibility,
-        "sweep_visible_rows",
-        lambda views, _visibility, _scales2, _shares, candidates, *others: (
-            compared.append((int(views.present.sum()), candidates.disparities.size)) or others[-1].fill(0)
-        ),
-    )
-    field = render("dots", size=64)
-    of_first = FirstDepthParameters(first_views=13, num_disparities=21)
-    first = first_depth(field, of_first, no_progress)
-    of_visible = VisibleViewsParameters(first_views=13, passes=3, num_disparities=21)
-    depth_from_visible_views(field, first.disparity, of_visible, no_progress)
-    assert compared == [(13, 11), (13, 11), (13, 11), (41, 21)]
 
 
 def test_a_wrong_map_is_put_right() -> None:

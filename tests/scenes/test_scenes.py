@@ -340,14 +340,6 @@ def test_folder_is_read_back_exactly(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("small_textures")
-def test_failed_folder_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cv2, "imencode", lambda *_: (False, None))
-    with pytest.raises(SepiError, match=r"input_Cam000\.png"):
-        write_hci(render("fronto_parallel", size=64, views=2), tmp_path / "scene")
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.usefixtures("small_textures")
 def test_existing_folder_is_not_overwritten(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(SepiError, match="exists already"):

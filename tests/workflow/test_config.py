@@ -79,53 +79,21 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
     ("values", "expected"),
     [
         ({"hci_rot": "x"}, "config: unknown 'hci_rot'; did you mean 'hci_root'?"),
-        ({"builtin": {"sizes": 96}}, "config.builtin: unknown 'sizes'; did you mean 'size'?"),
-        ({"builtin": {"size": "big"}}, "config.builtin.size: input should be a valid integer, got 'big'"),
         ({"builtin": {"size": 3}}, "config.builtin.size: input should be greater than or equal to 64, got 3"),
         ({"builtin": {"scenes": ["dotz"]}}, "config.builtin.scenes: unknown 'dotz'; did you mean 'dots'?"),
         (
             {"builtin": {"scenes": []}},
             "config: no scenes; list some in builtin.scenes or light_fields",
         ),
-        ({"bad_thresholds": [0]}, "config.bad_thresholds.0: input should be greater than 0, got 0"),
-        ({"builtin": 3}, "config.builtin: input should be an object, got 3"),
         ({"hci_root": "/nowhere"}, "config.hci_root: no folder '/nowhere'"),
-        ({"stages": {"initail": {}}}, "config.stages: unknown 'initail'; did you mean 'initial'?"),
-        ({"stages": {"initial": {"sapi": {}}}}, "config.stages.initial: unknown 'sapi'; did you mean 'sepi'?"),
-        (
-            {"stages": {"initial": {"sepi": {"num_disparity": 3}}}},
-            "config.stages.initial.sepi: unknown 'num_disparity'; did you mean 'num_disparities'?",
-        ),
-        (
-            {"stages": {"initial": {"sepi": {"num_disparities": 20.5}}}},
-            "config.stages.initial.sepi.num_disparities: input should be a valid integer, got 20.5",
-        ),
         (
             {"variants": {"mine": {"initial": "sepi"}}},
             "config.variants.mine: no choice for stage 'occlusion' (one of half_sepi, wang, visibility, ",
-        ),
-        ({"variants": {"mine": {"base": "pap"}}}, "config.variants.mine.base: unknown 'pap'; did you mean 'paper'?"),
-        (
-            {"variants": {"mine": {"base": "best", "occlusion": "halfsepi"}}},
-            "config.variants.mine.occlusion: unknown 'halfsepi'; did you mean 'half_sepi'?",
-        ),
-        (
-            {"variants": {"mine": {"base": "best", "occlusion": {"alpha_treshold": 0}}}},
-            "config.variants.mine.occlusion: unknown 'alpha_treshold'; did you mean 'alpha_threshold'?",
         ),
         (
             {"variants": {"mine": {"base": "best", "occlusion": {"alpha_threshold": 2}}}},
             "config.variants.mine.occlusion.alpha_threshold: input should be less than or equal to 1, got 2",
         ),
-        (
-            {"variants": {"mine": {"base": "best", "occlusion": {"choice": "none", "passes": 1}}}},
-            "config.variants.mine.occlusion: unknown 'passes'",
-        ),
-        (
-            {"variants": {"mine": {"base": "best", "optimize": {"solves": 0}}}},
-            "config.variants.mine.optimize: value error, refinements and solves cannot both be 0",
-        ),
-        ({"variants": {"mine": {"base": "best", "optimize": 3}}}, "config.variants.mine.optimize: expected a choice"),
         (
             {"variants": {"mine": {"base": "other"}, "other": {"base": "mine"}}},
             "config.variants.other.base: ",
@@ -135,21 +103,15 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
         # its folder would lie where the file does that says that the scene is complete
         ({"variants": {"complete": {"base": "wang"}}}, "config.variants.complete: a variant's name must be letters"),
         ({"variants": {"a/b": {"base": "wang"}}}, "config.variants.a/b: a variant's name must be letters"),
-        ({"stages": {"initial": {"seppi": {}}}}, "config.stages.initial: unknown 'seppi'; did you mean 'sepi'?"),
         (
             {"stages": {"initial": {"sepi": {"canny_low": 0.1}}}},
             "config.stages.initial.sepi: unknown 'canny_low'; known: num_disparities, scale",
-        ),
-        (
-            {"stages": {"initial": {"sepi": {"num_disparities": 2}}}},
-            "config.stages.initial.sepi.num_disparities: input should be greater than or equal to 3, got 2",
         ),
         (
             {"disparity_range": {"builtin/dotz": [0, 1]}},
             "config.disparity_range: unknown 'builtin/dotz'; did you mean 'builtin/dots'?",
         ),
         ({"disparity_range": {"builtin/dots": [2, 1]}}, "config.disparity_range of builtin/dots"),
-        ({"disparity_range": {"builtin/dots": [2]}}, "config.disparity_range.builtin/dots.1: field required"),
     ],
 )
 def test_a_wrong_key_or_value_is_named(values: dict[str, Any], expected: str) -> None:
@@ -212,14 +174,15 @@ class TestFolderOfScenes:
         (tmp_path / "notes").mkdir()
         assert self.settings(tmp_path).scenes_of("hci") == ["antinous", "cotton", "sideboard"]
 
-    def test_the_folder_may_be_a_scene_itself(self, tmp_path: Path) -> None:
-        assert self.settings(make_scene(tmp_path / "cotton")).scenes_of("hci") == ["cotton"]
-
     def test_size_and_number_of_views_are_read(self, tmp_path: Path) -> None:
         """Threads and memory of every job follow from them."""
         make_scene(tmp_path / "cotton", views=25, width=64, height=48)
         scene = self.settings(tmp_path).scene("hci", "cotton")
         assert (scene.views, scene.height, scene.width) == (25, 48, 64)
+        corner = {"hci_root": str(tmp_path), "report": {"pixels": {"hci/cotton": [[47, 63]]}}}
+        assert load_settings(corner).report.pixels == {"hci/cotton": [(47, 63)]}
+        corner["report"] = {"pixels": {"hci/cotton": [[63, 47]]}}
+        assert "report.pixels.hci/cotton: row 63, column 47 lies outside" in message_of(corner)
 
     @pytest.mark.parametrize("dataset", ["hci", "own"])
     def test_ground_truth_is_no_input_of_the_maps(self, tmp_path: Path, dataset: str) -> None:
@@ -276,16 +239,6 @@ class TestFolderOfScenes:
         (folder / "input_Cam000.png").write_bytes(b"")
         assert self.settings(tmp_path).scene("hci", "cotton").samples > 0
 
-    def test_an_unknown_scene_is_named(self, tmp_path: Path) -> None:
-        make_scene(tmp_path / "cotton")
-        with pytest.raises(SepiError, match="scene of dataset 'hci': unknown 'coton'; did you mean 'cotton'"):
-            self.settings(tmp_path).scene("hci", "coton")
-
-    def test_the_benchmark_folder_as_it_is_handed_out(self, hci: Path) -> None:
-        settings = self.settings(hci)
-        assert settings.scenes_of("hci") == ["antinous", "cotton"]
-        assert settings.scene("hci", "antinous").samples == 81 * 512 * 512
-
 
 class TestOwnLightFields:
     """Light fields of any format go through the workflow, too."""
@@ -331,21 +284,10 @@ class TestOwnLightFields:
         [
             ({"path": "/nowhere"}, "config.light_fields.a: no file or folder '/nowhere'"),
             ({}, "config.light_fields.a.path: field required"),
-            ({"path": "/", "gird": [3, 3]}, "config.light_fields.a: unknown 'gird'; did you mean 'grid'?"),
-            ({"path": "/", "grid": "3 by 3"}, "config.light_fields.a.grid: input should be a valid array, got '3 by"),
-            ({"path": ""}, "config.light_fields.a.path: string should have at least 1 character"),
             ({"path": "/", "order": "flip-row"}, "a.order: unknown 'flip-row'; did you mean 'flip-rows'"),
             ({"path": "/", "format": "nmupy"}, "config.light_fields.a.format: unknown 'nmupy'; did you mean 'numpy'"),
-            ({"path": "/", "row_spacing": 0.0}, "config.light_fields.a.row_spacing: input should be greater than 0"),
-            ({"path": "/", "central": 0}, "config.light_fields.a.central: input should be greater than or equal to 1"),
-            ({"path": "/", "view": [-1, 2]}, "light_fields.a.view.0: input should be greater than or equal to 0"),
             ({"path": "/", "truth": "/nowhere.pfm"}, "config.light_fields.a.truth: no file '/nowhere.pfm'"),
             ({"path": "/", "truth_scale": 2.0}, "config.light_fields.a.truth_scale: needs a ground truth file"),
-            (
-                {"path": "/", "truth": "/", "truth_scale": 0.0},
-                "config.light_fields.a.truth_scale: input should be greater than 0",
-            ),
-            ({"path": "/", "central": "big"}, "config.light_fields.a.central: input should be a valid integer"),
             ("/data/lego", "config.light_fields.a: input should be an object, got '/data/lego'"),
         ],
     )
@@ -399,9 +341,6 @@ class TestExternal:
 
     def file(self, path: str, dataset: str = "hci", scene: str = "cotton") -> Path:
         return load_settings({"external": {"SPO": path}}).external["SPO"].file(dataset, scene)
-
-    def test_none_by_default(self) -> None:
-        assert load_settings({}).external == {}
 
     def test_a_folder_means_the_file_of_the_scenes_name(self, tmp_path: Path) -> None:
         assert self.file(str(tmp_path)) == tmp_path / "cotton.pfm"
@@ -462,12 +401,6 @@ class TestExternal:
         ("entry", "expected"),
         [
             (5, "config.external.SPO: input should be an object, got 5"),
-            (None, "config.external.SPO: input should be an object, got None"),
-            ("", "config.external.SPO.path: string should have at least 1 character"),
-            ({}, "config.external.SPO.path: field required"),
-            ({"path": 2024}, "config.external.SPO.path: input should be a valid string, got 2024"),
-            ({"path": "/", "scal": 1}, "config.external.SPO: unknown 'scal'; did you mean 'scale'?"),
-            ({"path": "/", "scale": "big"}, "config.external.SPO.scale: input should be a valid number, got 'big'"),
             ({"path": "/", "scale": 0}, "config.external.SPO.scale: must not be 0"),
             ({"path": "/", "offset": None}, "config.external.SPO.offset: input should be a valid number, got None"),
             ("/maps/{scen}", "config.external.SPO.path: unknown '{scen}'; did you mean '{scene}'?"),

@@ -17,6 +17,7 @@ from sepi.registry import added
 from sepi.report.published import FOLDER as PUBLISHED
 from sepi.variants import HANDED_ON, STAGES
 from sepi.workflow.code_digest import code_digest, ingest_modules, stage_modules
+from sepi.workflow.config import load_settings
 from sepi.workflow.datasets import Scene
 from sepi.workflow.settings import MOST_ON_PAGE, Report
 
@@ -51,11 +52,15 @@ def read(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return Workflow(REPOSITORY, root / "run", config).read()
 
 
-def of_size(size: int, folder: Path, **more: Any) -> dict[str, Any]:
-    """The functions of the rules' files, for a built-in scene of this size."""
+def needs(folder: Path, size: int, attempt: int = 1, **more: Any) -> tuple[int, dict[str, dict[str, int]]]:
+    """Threads of the first stage for a built-in scene of this size; of some rules the memory and minutes of a job."""
     config = {"builtin": {"scenes": ["dots"], "size": size}, **more}
-    found: dict[str, Any] = Workflow(REPOSITORY, folder / "run", config).read().globals
-    return found
+    rules = {rule.name: rule.resources for rule in Workflow(REPOSITORY, folder / "run", config).read().rules}
+    asked = {
+        name: {key: rules[name][key].evaluate(scene(), attempt=attempt).value for key in ("mem_mb", "runtime")}
+        for name in ("ingest", "initial", "occlusion", "optimize", "export")
+    }
+    return rules["initial"]["_cores"].evaluate(scene()).value, asked
 
 
 def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
@@ -127,15 +132,14 @@ def test_every_file_that_a_job_reads_is_an_input(read: Any) -> None:
 
 def test_the_page_can_be_left_out_and_is_by_itself_where_there_are_too_many_scenes(tmp_path: Path) -> None:
     """Nothing of it is made then, and whoever asks for it is told in one line."""
-    for values, expected in (({}, True), ({"page": False}, False)):
-        found = of_size(64, tmp_path, report=values)
-        files = found["every_file"]()
-        assert {f"reports/{name}index.html" in files for name in ("", "comparison/", "rendered/")} == {expected}
-        assert bool(found["page_of_scene"]()) == expected
+    for page in (True, False):
+        planned = Workflow(REPOSITORY, tmp_path / "run", TINY | {"report": {"page": page}}).plan("all")
+        assert {"page" in planned, "graph" in planned} == {page}
+    settings = load_settings({"report": {"page": False}})
     with pytest.raises(SepiError, match=r"^reports/index.html: not made: report.page is false; true asks for it$"):
-        found["SETTINGS"].require_target("reports/index.html")
+        settings.require_target("reports/index.html")
     scenes = {("own", str(number)): None for number in range(MOST_ON_PAGE)}
-    many = replace(found["SETTINGS"], scenes=scenes, report=Report())
+    many = replace(settings, scenes=scenes, report=Report())
     assert many.has_page
     assert not replace(many, scenes=scenes | {("own", "one"): None}).has_page
 
@@ -149,38 +153,24 @@ def test_the_page_can_be_left_out_and_is_by_itself_where_there_are_too_many_scen
         ("reports/comparison/page/bultin/dots.json", "bultin", "builtin"),
     ],
 )
-def test_a_wrong_scene_in_a_target_is_told(read: Any, target: str, wrong: str, meant: str) -> None:
+def test_a_wrong_scene_in_a_target_is_told(target: str, wrong: str, meant: str) -> None:
     """Snakemake would show a dozen lines of its own, or of Python."""
+    settings = load_settings({})
     with pytest.raises(SepiError, match=f"unknown '{wrong}'; did you mean '{meant}'"):
-        read.globals["SETTINGS"].require_target(target)
-    read.globals["SETTINGS"].require_target(target.replace(wrong, meant))
+        settings.require_target(target)
+    settings.require_target(target.replace(wrong, meant))
 
 
-def test_what_a_cluster_ended_is_tried_with_twice_as_much(read: Any) -> None:
-    found = read.globals
-    for stage in ("initial", "occlusion", "optimize"):
-        for ask in (found["stage_memory_for"](stage, 13, 1300), found["stage_minutes_for"](stage, 30)):
-            assert ask(scene(), attempt=2) == 2 * ask(scene(), attempt=1) > 0
-    for ask in (found["memory_for"](12), found["minutes_for"](1)):
-        assert ask(scene(), attempt=2) == 2 * ask(scene(), attempt=1) > 0
-
-
-def test_threads_follow_the_size_of_the_scene(tmp_path: Path) -> None:
-    """Of one thread alone, a benchmark scene takes three times as long."""
-    assert [of_size(size, tmp_path)["threads_for"](scene()) for size in (64, 512, 1024)] == [1, 3, 8]
-
-
-def test_many_candidates_ask_for_memory_and_time(tmp_path: Path) -> None:
-    """Those of a wide range; a cluster would end the job."""
-    asked = []
-    for number in (91, 911):
-        values = {"initial": {"semi_global": {"num_disparities": number}}}
-        found = of_size(512, tmp_path, stages=values)
-        memory, minutes = found["stage_memory_for"]("initial", 13, 1300), found["stage_minutes_for"]("initial", 0.2)
-        asked.append((memory(scene(), attempt=1), minutes(scene(), attempt=1)))
-    (little, short), (much, long) = asked
-    assert much - little >= 800 * 4 * 512 * 512 / 2**20
-    assert long > 2 * short
+def test_jobs_ask_for_what_their_scene_takes(tmp_path: Path) -> None:
+    """Of one thread alone, a benchmark scene takes three times as long; a cluster ends jobs that ask for too little."""
+    assert [needs(tmp_path, size)[0] for size in (64, 512, 1024)] == [1, 3, 8]
+    once, again = (needs(tmp_path, 512, attempt)[1] for attempt in (1, 2))
+    for rule, asked in once.items():
+        assert all(again[rule][name] == 2 * asked[name] > 0 for name in ("mem_mb", "runtime"))
+    # candidates of a wide range need memory and time
+    many = needs(tmp_path, 512, stages={"initial": {"semi_global": {"num_disparities": 911}}})[1]["initial"]
+    assert many["mem_mb"] - once["initial"]["mem_mb"] >= 800 * 4 * 512 * 512 / 2**20
+    assert many["runtime"] > 2 * once["initial"]["runtime"]
 
 
 def test_minutes_are_several_times_what_was_measured() -> None:

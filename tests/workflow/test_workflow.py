@@ -461,16 +461,6 @@ class TestTargets:
         assert variants == set(VARIANTS) - {*compared_methods(), *needing_files(), "best", "paper"}
         assert of_stages(Counter(job.rule.name for job in jobs)) == ABLATION
 
-    def test_an_unknown_name_in_a_target_is_named(self, workflow: Workflow) -> None:
-        # also where the path of the Snakefile says it in a roundabout way
-        relative = replace(workflow, tree=Path(os.path.relpath(REPOSITORY, workflow.folder.resolve())))
-        result = relative.run("results/hci/box/papr/result.h5", flags=("--dry-run",))
-        assert result.returncode == 1
-        (line,) = result.stdout.splitlines()[-1:]
-        assert line.startswith("sepi: ")
-        assert "unknown 'papr'; did you mean 'paper'?" in line
-        assert "Exception" not in result.stdout
-
 
 class TestConfiguration:
     def test_an_unknown_key_is_one_line_and_nothing_runs(self, workflow: Workflow) -> None:

@@ -1,7 +1,6 @@
 """Submissions to the benchmark: packed is what it reads, and what it would refuse is found before."""
 
 import os
-import stat
 import struct
 import tracemalloc
 import warnings
@@ -93,31 +92,21 @@ MAP, TIME = "disp_maps/cotton.pfm", "runtimes/cotton.txt"
 WRONG = {
     "no map": (without(MAP), MAP, "missing"),
     "no run time": (without(TIME), TIME, "missing"),
-    "no maps": (without("disp_maps"), "disp_maps/", "no such folder"),
     "no run times": (without("runtimes"), "runtimes/", "no such folder"),
     "small map": (having(MAP, pfm(64, 64)), MAP, "64x64 pixels; expected 512x512"),
-    "map of another shape": (having(MAP, pfm(256, 1024)), MAP, "1024x256 pixels; expected 512x512"),
     "large map": (having(MAP, pfm(1024, 1024)), MAP, "too many for a map of 512x512 pixels"),
     "colour map": (having(MAP, pfm(16, 16, magic="PF")), MAP, "not a one-channel PFM"),
-    "not a PFM": (having(MAP, b"\x89PNG\r\n\x1a\n"), MAP, "not a one-channel PFM"),
-    "empty map": (having(MAP, b""), MAP, "not a one-channel PFM"),
     "truncated map": (having(MAP, GOOD_MAP[:-1]), MAP, "expected 1048576 bytes"),
     "NaN": (having(MAP, spotted(3, np.nan)), MAP, "3 of 262144 values are not finite"),
-    "infinite": (having(MAP, spotted(1, -np.inf)), MAP, "1 of 262144 values are not finite"),
     "no number": (having(TIME, b"fast\n"), TIME, "as a number, got 'fast'"),
-    "number and unit": (having(TIME, b"12.5 s\n"), TIME, "as a number, got '12.5 s'"),
-    "two numbers": (having(TIME, b"12.5\n13\n"), TIME, "as a number"),
     "decimal comma": (having(TIME, b"12,5\n"), TIME, "as a number"),
-    "empty run time": (having(TIME, b""), TIME, "as a number, got ''"),
     "bytes": (having(TIME, b"\xff\x00\x1b[2J"), TIME, "as a number"),
     "zero": (having(TIME, b"0\n"), TIME, "positive"),
     "negative": (having(TIME, b"-3.5\n"), TIME, "positive"),
     "NaN seconds": (having(TIME, b"nan\n"), TIME, "positive"),
-    "infinite seconds": (having(TIME, b"1e999\n"), TIME, "positive"),
     "long text": (having(TIME, b"1" * 1000), TIME, "1000 bytes are too many for one number"),
     "stray file": (having("readme.md", b"hi"), "readme.md", "does not belong"),
     "scene of another set": (having("disp_maps/antinous.pfm", GOOD_MAP), "disp_maps/antinous.pfm", "does not belong"),
-    "file below": (having("disp_maps/old/cotton.pfm", GOOD_MAP), "disp_maps/old", "does not belong"),
     "system's file": (having("disp_maps/.DS_Store", b""), "disp_maps/.DS_Store", "does not belong"),
 }
 
@@ -135,29 +124,6 @@ def test_each_problem_is_one_line_that_begins_with_the_file(made: Callable[[File
     assert line.isprintable()
 
 
-def test_a_name_in_capitals_is_another_name(made: Callable[[Files], Path]) -> None:
-    files = good()
-    files["disp_maps/Cotton.pfm"] = files.pop(MAP)
-    first, second = sorted(problems_of(made(files)))
-    assert first == "disp_maps/Cotton.pfm: does not belong to a submission; leave it out"
-    assert second == f"{MAP}: missing"
-
-
-def test_all_in_a_folder_of_its_own_is_said_in_few_words(made: Callable[[Files], Path]) -> None:
-    """What most programs make of 'compress this folder'."""
-    lines = problems_of(made({f"mine/{name}": data for name, data in good().items()}))
-    assert lines[0].startswith("mine/: ")
-    assert "disp_maps/ and runtimes/ at the root" in lines[0]
-    assert [line.partition(":")[0] for line in lines[1:]] == ["disp_maps/", "runtimes/"]
-
-
-def test_many_strange_files_do_not_bury_the_other_problems(made: Callable[[Files], Path]) -> None:
-    lines = problems_of(made(without(TIME)(good()) | {f"extra{at}": b"" for at in range(50)}))
-    assert len(lines) == 12
-    assert "40 more" in lines[10]
-    assert lines[11] == f"{TIME}: missing"
-
-
 def test_part_of_the_scenes_must_be_asked_for(made: Callable[[Files], Path]) -> None:
     path = made({MAP: GOOD_MAP, TIME: b"3\n"})
     assert len(problems_of(path)) == 22
@@ -169,13 +135,6 @@ def test_part_of_a_scene_is_not_enough(tmp_path: Path) -> None:
     lines = problems_of(zipped(tmp_path / "a.zip", {MAP: GOOD_MAP, "runtimes/boxes.txt": b"3\n"}), partial=True)
     assert sorted(lines) == ["disp_maps/boxes.pfm: missing", f"{TIME}: missing"]
     assert len(problems_of(zipped(tmp_path / "b.zip", {}), partial=True)) == 2
-
-
-def test_system_folders_of_an_archive_are_named(tmp_path: Path) -> None:
-    files = good() | {f"__MACOSX/disp_maps/._{scene}.pfm": b"" for scene in SCENES[:2]}
-    lines = problems_of(zipped(tmp_path / "a.zip", files))
-    assert len(lines) == 2
-    assert all(line.startswith("__MACOSX/disp_maps/._") and "does not belong" in line for line in lines)
 
 
 @pytest.mark.parametrize(
@@ -215,20 +174,6 @@ def test_a_name_given_twice_is_a_problem(tmp_path: Path) -> None:
     assert second.startswith(f"{MAP}: not a one-channel PFM")
 
 
-def test_entries_for_folders_do_no_harm(tmp_path: Path) -> None:
-    assert problems_of(zipped(tmp_path / "a.zip", {"disp_maps/": b"", "runtimes/": b""} | good())) == []
-
-
-def test_a_link_in_an_archive_is_not_a_map(tmp_path: Path) -> None:
-    path = zipped(tmp_path / "a.zip", without(MAP)(good()))
-    with zipfile.ZipFile(path, "a") as archive:
-        info = zipfile.ZipInfo(MAP)
-        info.create_system, info.external_attr = 3, (stat.S_IFLNK | 0o777) << 16
-        archive.writestr(info, "/etc/passwd")
-    (line,) = problems_of(path)
-    assert line.startswith(f"{MAP}: not a one-channel PFM")
-
-
 def test_a_bomb_is_not_unpacked(tmp_path: Path) -> None:
     """Neither many zeros in few bytes nor a header that claims the right size cost memory."""
     path = tmp_path / "a.zip"
@@ -249,28 +194,6 @@ def test_a_bomb_is_not_unpacked(tmp_path: Path) -> None:
     path.write_bytes(data.replace(struct.pack("<I", 2**26), struct.pack("<I", len(GOOD_MAP))))
     (line,) = problems_of(path)
     assert line.startswith(f"{MAP}: cannot be unpacked")
-
-
-def test_packing_that_the_benchmark_may_not_know(tmp_path: Path) -> None:
-    path = zipped(tmp_path / "a.zip", without(TIME)(good()))
-    with zipfile.ZipFile(path, "a") as archive:
-        archive.writestr(TIME, b"12.5\n", zipfile.ZIP_LZMA)
-    (line,) = problems_of(path)
-    assert line.startswith(f"{TIME}: compressed by method 14")
-
-
-def test_a_changed_byte_is_found(tmp_path: Path) -> None:
-    path = tmp_path / "a.zip"
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, data in good().items():
-            archive.writestr(name, data)
-        at = archive.getinfo(MAP).header_offset + 5000
-    data = bytearray(path.read_bytes())
-    data[at] ^= 1
-    path.write_bytes(data)
-    (line,) = problems_of(path)
-    assert line.startswith(f"{MAP}: cannot be unpacked")
-    assert "CRC" in line
 
 
 def test_an_archive_cut_anywhere_is_one_line(tmp_path: Path) -> None:

@@ -196,22 +196,6 @@ def test_camera_that_turns_too_far_is_told_with_the_pictures() -> None:
         require_sideways(Path("in"), ("a.png", "b.png", "c.png"), steps, 1.0)
 
 
-def test_model_that_depth_refuses_is_kept_and_the_reason_told(
-    sweep: tuple[Path, list[Shot]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """An hour's work is not thrown away, and who goes on with it is not surprised."""
-
-    def refused(*_: object) -> None:
-        raise SepiError("the cameras stand one behind the other")
-
-    monkeypatch.setattr("sepi.extensions.cameras.calibration.rectification_of", refused)
-    words = ["calibrate", str(_four_of(sweep, tmp_path / "in")), "-o", str(tmp_path / "out"), "--force"]
-    done = CliRunner().invoke(main, words)
-    assert done.exit_code == 1
-    assert "the cameras stand one behind the other" in done.output
-    assert (tmp_path / "out/sparse/0/images.txt").is_file()
-
-
 def test_without_pycolmap_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pycolmap", None)
     done = CliRunner().invoke(main, ["calibrate", str(tmp_path)])

@@ -22,6 +22,7 @@ from sepi.extensions.cameras import rectification
 from sepi.extensions.cameras.camera_poses import camera_poses
 from sepi.extensions.cameras.files import read_model
 from sepi.extensions.cameras.rectification import light_field_of, rectification_of
+from sepi.extensions.cameras.table import rotation_of
 from sepi.io.all_views import read_result_at, write_all_views
 from sepi.io.pfm import read_pfm
 from sepi.io.point_cloud import point_cloud
@@ -412,17 +413,6 @@ def test_the_reference_camera_is_chosen_by_its_picture(folder: Path) -> None:
         sepi.read_light_field(folder / "00.png", options=sepi.ReadOptions(reference="00.png"), file_format="numpy")
 
 
-@pytest.mark.parametrize("spreadsheet", [str, lambda text: text.replace(",", ";").replace("0.01", "0,01")])
-def test_csv_says_the_same_as_yaml(folder: Path, tmp_path: Path, spreadsheet: Any) -> None:
-    """A spreadsheet in most of Europe writes semicolons, and decimal commas."""
-    rows = ["file,x,y,z,fx,k1"] + [f"{n}{m}.png,{m},{n},0,80,0.01" for n in range(3) for m in range(3)]
-    (tmp_path / "cameras.csv").write_text(spreadsheet("\n".join(rows)))
-    model = read_model(tmp_path, str(folder))
-    assert len(model.shots) == 9
-    assert model.shots[5].centre.tolist() == [2, 1, 0]
-    assert model.shots[0].lens == Lens(64, 64, (80, 80), (31.5, 31.5), distortion=(0.01, *(0.0,) * 7))
-
-
 LENS = Lens(128, 96, (100.0, 110.0), (60.5, 40.5))
 KINDS = ("cameras.csv", "cameras.yaml", "transforms.json", "sparse/cameras.txt")
 
@@ -548,6 +538,11 @@ def test_poses_that_are_not_read_are_named(tmp_path: Path) -> None:
             SepiError, match=r"poses_bounds\.npy has camera poses .* expected transforms\.json, a COLMAP"
         ):
             sepi.read_light_field(path)
+
+
+def test_a_quaternion_is_the_matrix_of_the_same_turn() -> None:
+    """Its real part comes first; taken for the last, every camera looks elsewhere."""
+    np.testing.assert_allclose(rotation_of([0.70711, 0, 0, 0.70711]), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-9)
 
 
 def test_a_grid_that_the_cameras_do_not_make_is_told(tmp_path: Path) -> None:

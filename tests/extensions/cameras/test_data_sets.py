@@ -11,7 +11,6 @@ from geometries import GEOMETRIES, standing
 from plyfile import PlyData
 
 from sepi.camera import Camera
-from sepi.errors import SepiError
 from sepi.extensions.cameras.colmap import write_colmap
 from sepi.extensions.cameras.nerfstudio import write_nerfstudio
 from sepi.extensions.cameras.posed_views import PosedViews, posed_views
@@ -22,7 +21,6 @@ pycolmap = pytest.importorskip("pycolmap")
 
 CAMERA = Camera(scale=30.0, offset=6.0, focal_px=90.0)
 NORMALS = "model/stereo/normal_maps/view_01_01.png.geometric.bin"
-WRITERS = {"colmap": write_colmap, "nerfstudio": write_nerfstudio}
 
 
 def scene_of(geometry: str = "grid", **known: Any) -> LightField:
@@ -258,33 +256,3 @@ def test_no_points_are_no_file_of_points(tmp_path: Path) -> None:
 
 
 # --- both
-
-
-@pytest.mark.parametrize("kind", WRITERS)
-def test_equal_content_gives_equal_bytes(tmp_path: Path, kind: str) -> None:
-    posed = posed_of(scene_of())
-    for name in ("a", "b"):
-        WRITERS[kind](tmp_path / name, posed)
-    files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file())
-    assert len(files) > 16
-    for file in files:
-        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
-
-
-@pytest.mark.parametrize("kind", WRITERS)
-def test_a_folder_is_whole_or_absent_and_nothing_is_replaced(
-    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    posed = posed_of(scene_of())
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine/notes.txt").write_text("mine")
-    with pytest.raises(SepiError, match="mine: exists already"):
-        WRITERS[kind](tmp_path / "mine", posed)
-
-    def fail(path: Path, *_: object) -> None:
-        raise SepiError(f"{path}: no space")
-
-    monkeypatch.setattr(f"sepi.extensions.cameras.{kind}.write_png", fail)
-    with pytest.raises(SepiError, match="no space"):
-        WRITERS[kind](tmp_path / "out", posed)
-    assert [path.name for path in tmp_path.iterdir()] == ["mine"]

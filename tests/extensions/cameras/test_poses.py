@@ -9,13 +9,12 @@ import cv2
 import numpy as np
 import pytest
 import tifffile
-from click.testing import CliRunner, Result
-from error_lines import error_of
+from click.testing import Result
+from error_lines import call, error_of
 from geometries import ROW_SPACING, jittered
 from hdf5_edits import changed
 
 from sepi.camera import Camera
-from sepi.cli.main import main
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import read_picture
 from sepi.io.readers.options import ReadOptions
@@ -27,10 +26,6 @@ from sepi.stage import StageMaps
 
 CAMERA = Camera(scale=30.0, offset=6.0, focal_px=90.0)
 FLAGS = ("--focal-length", 35, "--baseline", 2, "--focus-distance", 3, "--sensor-size", 24)
-
-
-def call(*words: object) -> Result:
-    return CliRunner().invoke(main, [str(word) for word in words])
 
 
 def put(light_field: LightField) -> None:

@@ -297,15 +297,6 @@ def test_a_pixel_that_changes_sides_may_be_of_either() -> None:
     np.testing.assert_array_equal(after.sigma[~moved], maps.extra["sigma"][~moved])
 
 
-def test_variants_without_error_bars_have_none_of_other_views(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor is a map that has them given to views beside which others tell nothing."""
-    truth = np.asarray(layers().ground_truth, np.float32)
-    monkeypatch.setattr("sepi.extensions.views.all_views.estimate_depth", lambda *_: StageMaps(truth, truth * 0))
-    for maps in (None, barred(truth)):
-        found = estimate_all_views(layers(), maps, edge_views=0)
-        assert found.sigma is found.low is found.high is None
-
-
 def test_maps_of_another_shape_are_refused() -> None:
     """They would be of another light field."""
     flat = np.zeros((8, 8), np.float32)

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from error_lines import error_of
+from error_lines import error_of, everything_in
 from PIL import Image
 from several_threads import threads
 
 import sepi
 from sepi.cli.main import main
-from sepi.errors import SepiError
 from sepi.extensions.views import refocusing
 from sepi.extensions.views.refocused_folder import stack_names
 from sepi.io.hdf5 import write_light_field
@@ -58,10 +57,6 @@ def refocus(*words: object) -> Result:
 
 def index(folder: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO((Path(folder) / "focus.csv").read_text())))
-
-
-def everything_in(folder: str) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in Path(folder).iterdir()}
 
 
 def levels(picture: np.ndarray, full: int = 255) -> np.ndarray:
@@ -276,25 +271,4 @@ def test_what_is_wrong_is_one_line(scene: LightField, words: tuple[str, ...], me
     write_pfm(Path("empty.pfm"), np.full(SHAPE, np.nan, np.float32))
     before = {path.name for path in Path.cwd().iterdir()}
     assert message in error_of(refocus(*words))
-    assert {path.name for path in Path.cwd().iterdir()} == before
-
-
-def test_the_light_field_is_not_written_over(scene: LightField) -> None:
-    write_hci(scene, Path("folder"))
-    message = error_of(refocus("folder", "maps", "-o", "folder"))
-    assert message.startswith("sepi: folder: ")
-
-
-def test_a_failure_half_way_leaves_nothing(scene: LightField, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A folder with half a stack would be taken for a whole one."""
-    usual = refocusing.refocus
-
-    def failing(light_field: LightField, disparity: float, *more: Any, **options: Any) -> Any:
-        if disparity < 0:
-            raise SepiError("the disk is full")
-        return usual(light_field, disparity, *more, **options)
-
-    before = {path.name for path in Path.cwd().iterdir()}
-    monkeypatch.setattr(refocusing, "refocus", failing)
-    assert "the disk is full" in error_of(refocus("lf.h5", "maps"))
     assert {path.name for path in Path.cwd().iterdir()} == before

@@ -54,12 +54,6 @@ def test_the_range_of_the_truth_is_not_taken(tmp_path: Path) -> None:
     assert taken(write(tmp_path / "a.h5")).disparity_range is None
 
 
-def test_attributes_may_be_arrays_of_one(tmp_path: Path) -> None:
-    arrays = {key: np.array([value]) for key, value in GEOMETRY.items()}
-    light_field = taken(write(tmp_path / "a.h5", **arrays))
-    assert light_field.camera == Camera(15.0, 1.25, 300.0)
-
-
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("view", [None, (0, 1), (2, 2)])
 def test_truth_is_that_of_the_view_whose_depth_is_wanted(
@@ -144,18 +138,3 @@ def test_a_group_or_nothing_in_place_of_the_views(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "none.h5", "w") as file:
         file["other"] = LF
     assert "not a file of the first HCI benchmark" in refused(tmp_path / "none.h5")
-
-
-def test_axes_are_fixed(tmp_path: Path) -> None:
-    for options in ({"axes": "TSHWC"}, {"variable": "LF"}, {"grid": (3, 5)}, {"follow_links": True}):
-        assert "does not apply" in refused(write(tmp_path / "a.h5"), **options)
-
-
-def test_depth_that_signals_is_unknown_without_a_word(tmp_path: Path) -> None:
-    """A NaN of the sort that processors signal came out as a warning about a cast."""
-    depth = DEPTH.copy()
-    depth[1, 2, 0, 0] = np.array([0x7FA00000], np.uint32).view(np.float32)[0]
-    raw = depth.view(np.uint32)
-    raw[1, 2, 0, 0] = 0x7FA00000
-    ground_truth = taken(write(tmp_path / "a.h5", depth=depth)).ground_truth
-    assert np.isnan(ground_truth[0, 0])
