@@ -15,7 +15,7 @@ from sepi.extensions.rendered.catalogue import RENDERED
 from sepi.io.hdf5 import read_stage
 from sepi.io.truth import read_with_truth
 from sepi.lightfield import FloatMap, LightField
-from sepi.report.plan import RENDERED_TABLES
+from sepi.report.plan import TABLES
 from sepi.report.plots.overview import write_overview
 from sepi.report.plots.pictures import Picture, disparity_limits, error_picture, map_picture, reference_picture
 from sepi.variants import VARIANTS
@@ -48,7 +48,7 @@ def pictures(light_field: LightField, disparity: FloatMap) -> list[tuple[str, Pi
 
 def tables(reports: Path) -> str:
     """The tables of the rendered scenes, one after the other."""
-    found = [(reports / f"{name}.md").read_text(encoding="utf-8") for name in RENDERED_TABLES]
+    found = [(reports / f"{name}.md").read_text(encoding="utf-8") for name in TABLES["rendered"]]
     # a title of the page, and one level less for all others
     return "# Results on the rendered scenes\n\n" + re.sub(r"^#", "##", "\n".join(found), flags=re.MULTILINE)
 

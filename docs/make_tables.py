@@ -14,14 +14,12 @@ file count that have ``NAME=VALUE``, as given or of :data:`USUAL`; of several fo
 
 from __future__ import annotations
 
-import csv
 import re
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from statistics import mean
 
 import click
+import pandas as pd
 
 USUAL = {"protocol": "paper", "region": "all", "stage": "optimize"}
 """Final maps as a whole."""
@@ -33,21 +31,13 @@ TABLE = re.compile(
 FIGURE = re.compile(r"\{([^:}]+):([^}]+)\}")
 
 
-class Figures(list[str]):
-    """Cells of a column; written as their mean, without those that have no figure."""
-
-    def __format__(self, form: str) -> str:
-        known = [float(cell) for cell in self if cell not in ("", "nan")]
-        return format(mean(known), form) if known else "-"
-
-
 def name_in(cell: str) -> str:
     """What a cell of a page names."""
     return (re.search("`(.+?)`", cell) or re.match("([^,(]*)", cell) or "")[1].strip()
 
 
-def _written(figures: Mapping[str, Figures], form: re.Match[str]) -> str:
-    return format(figures[form[1]], form[2])
+def _written(figures: pd.Series, form: re.Match[str]) -> str:
+    return "-" if pd.isna(figures[form[1]]) else format(figures[form[1]], form[2])
 
 
 def filled(table: re.Match[str], run: Path) -> str:
@@ -56,22 +46,24 @@ def filled(table: re.Match[str], run: Path) -> str:
     rows, _, across = named.partition(" by ")
     keys = [*rows.split(), *filter(None, [across])]
     wanted = {k: v for k, v in USUAL.items() if k not in keys} | dict(w.split("=") for w in given if "=" in w)
-    known: dict[tuple[str, ...], dict[str, Figures]] = {}
-    for file in (run / word for word in given if "=" not in word and (run / word).exists()):
-        for record in csv.DictReader(file.read_text(encoding="utf-8").splitlines()):
-            if all(record.get(key, value) == value for key, value in wanted.items()):
-                figures = known.setdefault(tuple(record[key] for key in keys), {})
-                for column, text in record.items():
-                    figures.setdefault(column, Figures()).append(text)
+    files = [run / word for word in given if "=" not in word and (run / word).exists()]
+    if not files:
+        return table[0]
+    records = pd.concat([pd.read_csv(file, dtype=str) for file in files])
+    for key in wanted.keys() & records.columns:
+        # of several files some may lack the column
+        records = records[records[key].fillna(wanted[key]) == wanted[key]]
+    of_row = records[keys].agg("\n".join, axis=1)
+    figures = records.apply(pd.to_numeric, errors="coerce").groupby(of_row).mean()
     forms = " ".join(table["forms"].split()).split(" | ")
     head, _, *cells = ([cell.strip() for cell in line.split("|")[1:-1]] for line in table["rows"].splitlines())
     names = len(rows.split())
     for row in cells:
         for place in range(names, len(row)):
-            name = (*map(name_in, row[:names]), *([name_in(head[place])] if across else []))
-            if name in known:
+            name = "\n".join([*map(name_in, row[:names]), *([name_in(head[place])] if across else [])])
+            if name in figures.index:
                 form = forms[(place - names) % len(forms)]
-                text = FIGURE.sub(partial(_written, known[name]), form)
+                text = FIGURE.sub(partial(_written, figures.loc[name]), form)
                 row[place] = "" if table["empty"] and row != cells[0] and text == cells[0][place] else text
     start = table[0].splitlines()[: -len(cells)]
     return "\n".join([*start, *("|" + "".join(f" {c} |" if c else " |" for c in row) for row in cells), ""])

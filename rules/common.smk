@@ -15,12 +15,12 @@ from sepi.errors import SepiError
 from sepi.io.result_files import RESULT_FILES
 from sepi.registry import added, extensions
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of, compared_methods
-from sepi.report.plan import Plan
+from sepi.report.plan import PARTS, Plan
 from sepi.validation import require_known
 from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, keep, remember, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
-from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
+from sepi.workflow.result_paths import RESULTS, key_of, scene_files
 
 # the folder of the Snakefile, and whether another workflow uses it as a module
 FOLDER = os.path.dirname(str(workflow.current_basedir))
@@ -86,11 +86,13 @@ def as_far_as_computed(plan):
 REPORTS = {
     plan.report: as_far_as_computed(plan)
     for plan in (
-        PLAN,
+        PLAN.main(),
         PLAN.comparison(),
         *(dataset.report(PLAN, SETTINGS.scenes_of(name)) for name, dataset in SETTINGS.apart.items()),
     )
 }
+# the parts of variant best have numbers and tables, and neither a page nor images of their own
+PLANS = REPORTS | {PARTS: replace(PLAN.parts_of_best(), scenes=REPORTS[""].scenes, missing=REPORTS[""].missing)}
 
 
 def own_file(path):
@@ -104,14 +106,10 @@ def source_file(name):
     return path if os.path.isfile(path) else ancient(workflow.source_path(f"../{name}"))
 
 
-# the Snakefile, the files that it includes, and the template that they read
-INCLUDED = re.findall(r'^include: "(.+)"$', Path(source_file("Snakefile")).read_text(), re.MULTILINE)
-PLAN_TEMPLATE = "rules/plan.json.j2"
 # rules of extensions
 ADDED_RULES = [
     str(Path(find_spec(name).origin).with_name("rules.smk")) for one in extensions().values() for name in one.rules
 ]
-RULE_FILES = [*(source_file(name) for name in ["Snakefile", *INCLUDED, PLAN_TEMPLATE]), *ADDED_RULES]
 
 
 # patterns of a scene's files in rules
@@ -139,7 +137,7 @@ wildcard_constraints:
     dataset="[^/]+",
     scene="[^/]+",
     variant="[^/]+",
-    which="|".join([*(plan.ending() for plan in REPORTS.values()), PARTS_ENDING]),
+    which="|".join(plan.ending for plan in PLANS.values()),
     report="|".join(name and f"{name}/" for name in REPORTS),
 
 
@@ -196,9 +194,8 @@ def result_files(variants, scenes=REPORTS[""].pairs):
 
 
 def plan_of(which):
-    """Plan of a file of numbers or scores, and whether the file is of the parts of variant best."""
-    parts = which == PARTS_ENDING
-    return REPORTS["" if parts else which.removeprefix("_")], parts
+    """Plan of a file of numbers or scores."""
+    return PLANS[which.removeprefix("_")]
 
 
 def report_of(wildcards):
@@ -208,8 +205,7 @@ def report_of(wildcards):
 
 def scored_maps(wildcards):
     """Stage files whose maps go into a score file."""
-    plan, parts = plan_of(wildcards.which)
-    return plan.scored_files(wildcards.dataset, wildcards.scene, parts)
+    return plan_of(wildcards.which).scored_files(wildcards.dataset, wildcards.scene)
 
 
 def choice_for(stage):

@@ -5,7 +5,7 @@
 # with a shell command
 rule plan:
     input:
-        source_file(PLAN_TEMPLATE),
+        source_file("rules/plan.json.j2"),
     output:
         "reports/page/plan{which}.json",
     log:
@@ -13,22 +13,21 @@ rule plan:
     localrule: True
     params:
         # functions, so that braces in names are not wildcards
-        text=lambda wildcards: plan_of(wildcards.which)[0].to_json(),
+        text=lambda wildcards: plan_of(wildcards.which).to_json(),
     message:
         "plan of the report"
     template_engine:
         "jinja2"
 
 
-# All numbers of the report in one file: scores, times, facts about the scenes, and the tables made of them. The parts
-# of variant best have a file of their own (report_parts), since `all` does not run those variants.
+# All numbers of the report in one table, and facts about the scenes beside it. The parts of variant best have files of
+# their own (report_parts), since `all` does not run those variants.
 rule numbers:
     input:
         plan="reports/page/plan{which}.json",
         measured=lambda wildcards: measured_files(wildcards.which),
-        published=sorted(PUBLISHED.glob("*.csv")),
     output:
-        "reports/report{which}.json",
+        multiext("reports/report{which}", ".json", ".csv"),
     log:
         "logs/report{which}.log",
     benchmark:
@@ -40,14 +39,13 @@ rule numbers:
         runtime=lambda wildcards: 5 + sum(scene.minutes(0.1) for scene in scenes_of(wildcards.which)) // 5,
     params:
         results=results_folder,
-        flags=lambda wildcards: "--parts" if wildcards.which == PARTS_ENDING else "",
         code=code_digest("sepi.report.numbers"),
     message:
         "numbers of the report"
     shell:
         command(
             "sepi.report.numbers --results {params.results:q} --plan {input.plan:q} "
-            "{params.flags} --output {output:q} 2> {log:q}"
+            "--output {output[0]:q} 2> {log:q}"
         )
 
 
@@ -58,7 +56,8 @@ for which in TABLES:
         name:
             f"tables{which}"
         input:
-            f"reports/report{which}.json",
+            numbers=multiext(f"reports/report{which}", ".json", ".csv"),
+            published=sorted(PUBLISHED.glob("*.csv")),
         output:
             report(
                 [file for file in table_files(which) if file.endswith(".csv")],
@@ -78,13 +77,14 @@ for which in TABLES:
         message:
             "tables"
         shell:
-            command("sepi.report.tables --numbers {input:q} --output {params.folder:q} 2> {log:q}")
+            command("sepi.report.tables --numbers {input.numbers[0]:q} --output {params.folder:q} 2> {log:q}")
 
 
 # Charts of the numbers, in print quality
 rule charts:
     input:
-        "reports/report.json",
+        numbers=multiext("reports/report", ".json", ".csv"),
+        published=sorted(PUBLISHED.glob("*.csv")),
     output:
         report(multiext("reports/figures/ablation", ".png", ".pdf"), caption="captions/ablation.rst", category="Charts"),
         report(
@@ -108,7 +108,7 @@ rule charts:
         "charts"
     shell:
         command(
-            "sepi.report.charts --numbers {input:q} --chart ablation --chart time_and_memory --chart error_bars "
+            "sepi.report.charts --numbers {input.numbers[0]:q} --chart ablation --chart time_and_memory --chart error_bars "
             "--output {params.folder:q} 2> {log:q}"
         )
 
@@ -116,7 +116,7 @@ rule charts:
 # Chart of the parts of variant best
 rule parts_chart:
     input:
-        "reports/report_parts.json",
+        multiext("reports/report_parts", ".json", ".csv"),
     output:
         report(
             multiext("reports/figures/ablation_best", ".png", ".pdf"),
@@ -135,7 +135,7 @@ rule parts_chart:
     message:
         "chart of the parts of best"
     shell:
-        command("sepi.report.charts --numbers {input:q} --chart ablation_best --output {params.folder:q} 2> {log:q}")
+        command("sepi.report.charts --numbers {input[0]:q} --chart ablation_best --output {params.folder:q} 2> {log:q}")
 
 
 # Images of a scene: reference view, ground truth, each stage and variant, errors, masks, external methods' maps, and
@@ -193,28 +193,3 @@ rule scene:
         runtime=1,
     message:
         "{wildcards.dataset}/{wildcards.scene}: complete"
-
-
-# Graph of the rules, as Snakemake draws it
-rule graph:
-    input:
-        snakefile=RULE_FILES[0],
-        rules=RULE_FILES[1:],
-    output:
-        "reports/page/rules.svg",
-    log:
-        "logs/graph.log",
-    benchmark:
-        "benchmarks/graph.tsv"
-    localrule: True
-    threads: 1
-    params:
-        flags="--external" if SETTINGS.external else "",
-        code=code_digest("sepi.report.graph"),
-    message:
-        "rule graph"
-    shell:
-        command(
-            "sepi.report.graph --snakefile {input.snakefile:q} {params.flags} --output {output:q} "
-            "{input.rules:q} 2> {log:q}"
-        )

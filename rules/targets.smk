@@ -1,12 +1,12 @@
 # Files of pages, tables and images, and the inputs that they are made from.
 
-from sepi.report.plan import COMPARISON, PARTS_TABLES
-from sepi.report.published import FOLDER as PUBLISHED
+from sepi.report.plan import COMPARISON, PUBLISHED
 
-PARTS = "reports/report_parts.json" if SETTINGS.report.parts_of_best else []
+PARTS_OF_BEST = multiext("reports/report_parts", ".json", ".csv") if SETTINGS.report.parts_of_best else []
 # ending of a file of numbers to the folder and the names of its tables
-TABLES = {plan.ending(): (f"reports/{name}".rstrip("/"), plan.tables()) for name, plan in REPORTS.items()}
-TABLES[PARTS_ENDING] = ("reports", PARTS_TABLES)
+TABLES = {
+    plan.ending: (f"reports/{'' if name == PARTS else name}".rstrip("/"), plan.tables) for name, plan in PLANS.items()
+}
 
 
 def table_files(which):
@@ -23,22 +23,22 @@ def figure_files(names):
 def report_files(name=""):
     """Files of a report: page if there is one, numbers, tables, and images of every scene."""
     plan = REPORTS[name]
-    folder, _ = TABLES[plan.ending()]
+    folder, _ = TABLES[plan.ending]
     page = [f"{folder}/index.html"] if SETTINGS.has_page else []
     pictures = [f"{folder}/maps/{dataset}/{scene}" for dataset, scene in plan.pictured]
-    return [*page, f"reports/report{plan.ending()}.json", *table_files(plan.ending()), *pictures]
+    return [*page, *multiext(f"reports/report{plan.ending}", ".json", ".csv"), *table_files(plan.ending), *pictures]
 
 
 def all_files():
     """Files of the main report, its charts, and the parts of ``best`` if the configuration asks for them."""
     charts = figure_files(["ablation", "time_and_memory", "error_bars"])
-    return list(dict.fromkeys([*report_files(), *charts, *(ablation_files() if PARTS else [])]))
+    return list(dict.fromkeys([*report_files(), *charts, *(ablation_files() if PARTS_OF_BEST else [])]))
 
 
 def ablation_files():
     """Files of the paper's table 4, and of the ablation of ``best``."""
     paper = [file for file in table_files("") if Path(file).stem == "table4_ablation"]
-    return [*paper, *table_files(PARTS_ENDING), *figure_files(["ablation", "ablation_best"])]
+    return [*paper, *table_files(f"_{PARTS}"), *figure_files(["ablation", "ablation_best"])]
 
 
 def every_file():
@@ -48,13 +48,12 @@ def every_file():
 
 def measured_files(which):
     """Inputs of a file of numbers."""
-    plan, parts = plan_of(which)
-    return plan.number_inputs(parts)
+    return plan_of(which).number_inputs()
 
 
 def scenes_of(which):
     """Scenes of a file of numbers."""
-    return [SETTINGS.scene(*pair) for pair in plan_of(which)[0].pairs]
+    return [SETTINGS.scene(*pair) for pair in plan_of(which).pairs]
 
 
 def page_of_scene():

@@ -27,9 +27,9 @@ from sepi.lightfield import FloatMap, LightField
 from sepi.process.machine import this_machine
 from sepi.report import numbers
 from sepi.report.figures import read_results
-from sepi.report.graph import drawn
 from sepi.report.panels import panels_of
 from sepi.report.plan import MAIN_VARIANT, Plan
+from sepi.report.runs import Runs, read_numbers
 from sepi.scenes import render
 from sepi.stage import StageMaps, entry, no_progress
 from sepi.variants import STAGES, VARIANTS, stage_parameters
@@ -43,7 +43,6 @@ ASKED = {COTTON: (20, 41)}
 UNKNOWN = (slice(30, 34), slice(6, 12))
 """Rows and columns that the external map does not know."""
 
-EDGES = [("ingest", "initial"), ("initial", "numbers"), ("initial", "maps"), ("numbers", "page"), ("maps", "page")]
 # of a camera that sees the scene in front of it
 _CAMERA = Camera(scale=40.0, offset=8.0, focal_px=90.0)
 
@@ -55,7 +54,7 @@ class Example:
     Attributes
     ----------
     plan : Plan
-    numbers : dict
+    numbers : Runs
         As ``sepi.report.numbers`` collects them.
     scenes : list of dict
         What the page has of every scene.
@@ -63,12 +62,12 @@ class Example:
     """
 
     plan: Plan
-    numbers: dict[str, Any]
+    numbers: Runs
     scenes: list[dict[str, Any]]
     page: Path
 
     def light_field(self, scene: tuple[str, str]) -> LightField:
-        return read_light_field(self.plan.light_field_file(*scene))
+        return read_light_field(self.plan.files(*scene).light_field)
 
     def final(self, scene: tuple[str, str], variant: str) -> StageMaps:
         """The maps after the last stage, from their file."""
@@ -116,24 +115,25 @@ def make_example(folder: Path) -> Example:
     plan = Plan(folder / "results", {dataset: [name] for dataset, name in pairs}, variants, ("SPO", "wrong_size"))
     for scene in pairs:
         write_results(plan, scene)
-    found = json.loads(numbers.as_text(numbers.collect(plan)))
+    numbers.write_numbers(numbers.collect(plan), folder / "report.json")
+    found = read_numbers(folder / "report.json")
     scenes = [scene_json(plan, scene) for scene in pairs]
     page = folder / "index.html"
-    page.write_text(page_of(found, scenes, drawn(EDGES)), encoding="utf-8")
+    page.write_text(page_of(found, scenes), encoding="utf-8")
     return Example(plan, found, scenes, page)
 
 
 def write_results(plan: Plan, scene: tuple[str, str]) -> None:
     """Every file of a scene that the report reads."""
     light_field = small_light_field(scene)
-    write_light_field(plan.light_field_file(*scene), light_field)
-    write_truth(plan.truth_file(*scene), (light_field.ground_truth, light_field.masks))
+    write_light_field(plan.files(*scene).light_field, light_field)
+    write_truth(plan.files(*scene).truth, (light_field.ground_truth, light_field.masks))
     for variant in plan.variants:
         run_stages(plan, scene, light_field, variant)
     write_plan_scores(plan, scene, light_field)
     maps = methods_maps(plan, light_field) if scene == COTTON else {}
     absent = {method: ExternalMap(f"/maps/{method}/{light_field.name}.pfm", "no file") for method in plan.external}
-    write_external(plan.external_file(*scene), absent | maps)
+    write_external(plan.files(*scene).external, absent | maps)
 
 
 def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, variant: str) -> None:

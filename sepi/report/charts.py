@@ -11,10 +11,9 @@ from matplotlib.patches import Patch
 
 from sepi.process.command import SepiCommand
 from sepi.report.page_data import BarGroup, StageTimes, ablation_bars, part_bars, stage_times
-from sepi.report.plots.error_bars import VariantBars, write_error_bars
-from sepi.report.plots.saving import new_figure, save
+from sepi.report.plots.error_bars import write_error_bars
+from sepi.report.plots.saving import new_figure, save, save_sentence
 from sepi.report.runs import Runs, read_numbers
-from sepi.report.tabular.error_bars import pooled_reliability, variants_with_bars, whole
 
 _OURS, _PUBLISHED = "#4a7fae", "#b9bfc5"
 _STAGES = ("#3b5b92", "#2a8c8c", "#7ab648", "#d9b430", "#b25d2c", "#7d4f9e")
@@ -23,9 +22,7 @@ _STAGES = ("#3b5b92", "#2a8c8c", "#7ab648", "#d9b430", "#b25d2c", "#7d4f9e")
 def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
     """Write bars for each group of :func:`sepi.report.page_data.ablation_bars`; without groups, a sentence."""
     if not groups:
-        figure = new_figure(4.2, 1)
-        figure.text(0.5, 0.5, "no scene with ground truth", ha="center", va="center", fontsize=8)
-        save(figure, folder, name)
+        save_sentence(folder, name, "no scene with ground truth")
         return
     columns = min(3, len(groups))
     lines = -(-len(groups) // columns)
@@ -78,24 +75,10 @@ def write_times(folder: Path, name: str, rows: Sequence[StageTimes]) -> None:
     save(figure, folder, name)
 
 
-def error_bars(folder: Path, name: str, runs: Runs) -> None:
-    """Write the chart of the error bars, of all scenes together and of each."""
-    pairs = runs.scored_pairs()
-    found = [
-        VariantBars(
-            variant,
-            pooled_reliability(runs, variant, pairs),
-            *([whole(runs, pair, variant)[score] for pair in pairs] for score in ("coverage", "width")),
-        )
-        for variant in variants_with_bars(runs)
-    ]
-    write_error_bars(folder, name, ["/".join(pair) for pair in pairs], found)
-
-
 CHARTS: dict[str, Callable[[Path, str, Runs], None]] = {
     "ablation": lambda folder, name, runs: write_bars(folder, name, ablation_bars(runs)),
     "time_and_memory": lambda folder, name, runs: write_times(folder, name, stage_times(runs)),
-    "error_bars": error_bars,
+    "error_bars": write_error_bars,
     "ablation_best": lambda folder, name, runs: write_bars(folder, name, part_bars(runs)),
 }
 """Name of each chart to the function that writes it."""
@@ -107,7 +90,7 @@ CHARTS: dict[str, Callable[[Path, str, Runs], None]] = {
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")
 def command(numbers_path: Path, names: tuple[str, ...], output: Path) -> None:
     """Write charts of the report, each as PNG and PDF."""
-    runs = Runs(read_numbers(numbers_path))
+    runs = read_numbers(numbers_path)
     for name in names:
         CHARTS[name](output, name, runs)
 

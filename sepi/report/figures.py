@@ -37,14 +37,14 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
     read = cache(read_stage)
     maps = {
         variant: {stage: read(plan.stage_file(dataset, scene, variant, stage)) for stage in plan.stages}
-        for variant in plan.listed
+        for variant in plan.variants
     }
-    light_field = read_with_truth(plan.light_field_file(dataset, scene), plan.truth_file(dataset, scene))
+    light_field = read_with_truth(plan.files(dataset, scene).light_field, plan.files(dataset, scene).truth)
     for stages in maps.values():
         stages[plan.stages[-1]] = with_unknown(light_field, stages[plan.stages[-1]])
     keys = {variant: plan.stage_key(variant, plan.stages[-1]) for variant in maps}
     scored = read_evaluations(plan.scores_file(dataset, scene), list(keys.values()))
-    external = read_external(plan.external_file(dataset, scene)) if plan.external else {}
+    external = read_external(plan.files(dataset, scene).external) if plan.external else {}
     return SceneResults(
         light_field=light_field,
         maps=maps,

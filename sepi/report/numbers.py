@@ -1,6 +1,6 @@
-"""All numbers of the report in one JSON file, and the command that collects them.
+"""All numbers of the report in one CSV file, facts about them in a JSON file, and the command that collects them.
 
-Tables and page are made from this file alone.
+Tables and page are made from these files alone.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
@@ -17,63 +17,80 @@ from typing import Any
 import click
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
-from sepi.io.scores import Scores, read_external, read_reliability, read_scores, without_nan
+from sepi.io.files import atomic_path
+from sepi.io.scores import ExternalMap, Scores, read_external, read_reliability, read_scores, without_nan
 from sepi.io.truth import read_with_truth
 from sepi.process.command import SepiCommand
-from sepi.report.plan import Plan
+from sepi.report.plan import PARTS, Plan
 from sepi.report.pooled import pooled_q25
-from sepi.report.runs import Runs, read_json
-from sepi.report.tables import table
-from sepi.report.tabular.layout import as_json, write
-from sepi.scoring.error_bars import ERROR_BAR_SCORES
-from sepi.scoring.scores import COUNTS, EDGE_SCORES, PROTOCOLS, SCORED_REGIONS, score_heads
+from sepi.report.runs import EXTERNAL, KEYS, TENTHS, Runs, read_json
+from sepi.scoring.scores import PROTOCOLS, SCORED_REGIONS
 from sepi.validation import require_known
 from sepi.workflow.rendered_scenes import DATASET
-from sepi.workflow.result_paths import stage_of
+
+_Number = tuple[str, str, str, str, str, str, str, str, float]
+"""A row of :attr:`sepi.report.runs.Runs.numbers`."""
 
 
-def collect(plan: Plan, parts: bool = False) -> dict[str, Any]:
-    """The numbers of a report, read from ``plan.number_inputs(parts)``.
-
-    Parameters
-    ----------
-    plan : Plan
-        Scenes, variants and external methods.
-    parts : bool
-        Collect the numbers for the ablation of the best variant, instead of those for all other tables.
+def collect(plan: Plan) -> Runs:
+    """The numbers of a report, read from ``plan.number_inputs()``.
 
     Returns
     -------
-    dict
-        Values of JSON: text, numbers, None (also for NaN), lists and dictionaries. ``made``: date of the newest
-        result, and machines of the stages with versions; ``protocols``: name to border; ``plan``; ``parameters``:
-        stage to choice to a list of the parameters used, since scenes may differ; ``scenes``: a list, each
-        with ``dataset``, ``scene``, ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``,
-        ``seconds``, ``peak_memory_mb``, ``reliability``, None without error bars) and ``external`` (method to
-        ``problem``, ``source``, ``sha256``, ``scores``); for rendered scenes ``pooled_q25``
-        (:data:`sepi.report.pooled.Pooled`); ``tables``: name to :func:`sepi.report.tabular.layout.as_json`. With
-        ``parts``, scenes have ``stages`` only, and ``scores`` is None except after the last stage.
+    Runs
+        Its numbers are the scores of every map, by ``region``, of the parts of ``best`` after the last stage alone;
+        ``seconds`` and ``peak_memory_mb`` of every stage that is switched on, under no protocol; the reliability of
+        confidences (:data:`sepi.report.runs.TENTHS`); and of rendered scenes Q25 over all that have the same noise.
+
+        Its facts are values of JSON, with None for NaN. ``made``: date of the newest result, and machines of the stages
+        with versions; ``protocols``: name to border; ``plan``; ``parameters``: stage to choice to a list of the
+        parameters used, since scenes may differ; ``scenes``: a list, each with ``dataset``, ``scene``, and except for
+        the parts of ``best``, ``light_field`` and ``external`` (method to ``problem``, ``source``, ``sha256``).
 
     Raises
     ------
     SepiError
         If a file is missing or has other contents.
     """
-    machines, parameters = _made_by(plan, parts)
-    numbers: dict[str, Any] = {
-        "made": {"date": _newest(plan.number_inputs(parts)), "machines": machines},
+    timings = {
+        (*pair, variant, stage): _timing(plan, *pair, variant, stage)
+        for pair, variant, stage in itertools.product(plan.pairs, plan.variants, plan.stages)
+        if plan.runs_stage(variant, stage)
+    }
+    machines: list[Any] = []
+    parameters: dict[str, dict[str, list[Any]]] = {stage: {} for stage in plan.stages}
+    for (_, _, variant, stage), timing in timings.items():
+        ran_with = parameters[stage].setdefault(plan.variants[variant][stage], [])
+        for known, value in ((machines, timing["machine"]), (ran_with, timing["parameters"])):
+            known += [] if value in known else [value]
+    facts = {
+        "made": {"date": _newest(plan.number_inputs()), "machines": machines},
         "protocols": dict(PROTOCOLS),
         "plan": json.loads(plan.to_json()),
         "parameters": parameters,
-        "scenes": [_scene(plan, dataset, scene, parts) for dataset, scene in plan.pairs],
+        "scenes": [_facts(plan, dataset, scene) for dataset, scene in plan.pairs],
     }
+    numbers = [number for dataset, scene in plan.pairs for number in _scores_of_scene(plan, dataset, scene)]
+    for (dataset, scene, variant, stage), timing in timings.items():
+        about = (dataset, scene, variant, stage, plan.variants[variant][stage], "", "")
+        numbers += [(*about, name, float(timing[name])) for name in ("seconds", "peak_memory_mb")]
     if plan.report == DATASET:
-        numbers["pooled_q25"] = pooled_q25(plan)
-    numbers = without_nan(numbers)
-    runs = Runs(numbers)
-    tables = {name: as_json(table(name, runs)) for name in plan.tables(parts)}
-    return numbers | {"tables": tables}
+        for level, method, region, quarter in pooled_q25(plan):
+            stage = EXTERNAL if method in plan.external else plan.stages[-1]
+            numbers.append((DATASET, level, method, stage, "", "paper", region, "q25", quarter))
+    return Runs(without_nan(facts), pd.DataFrame(numbers, columns=[*KEYS, "score", "value"]))
+
+
+def write_numbers(runs: Runs, path: Path) -> None:
+    """Write the facts to this JSON file, and the numbers to the CSV file beside it."""
+    for file, text in (
+        (path.with_suffix(".csv"), runs.numbers.to_csv(index=False, na_rep="nan", lineterminator="\n")),
+        (path, json.dumps(runs.facts, indent=1, allow_nan=False, ensure_ascii=False) + "\n"),
+    ):
+        with atomic_path(file) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _newest(files: Sequence[Path]) -> str:
@@ -82,40 +99,21 @@ def _newest(files: Sequence[Path]) -> str:
     return datetime.fromtimestamp(newest).astimezone().isoformat(timespec="seconds")
 
 
-def _made_by(plan: Plan, parts: bool) -> tuple[list[Any], dict[str, dict[str, list[Any]]]]:
-    """Machines of the stages, and parameters by stage and choice, from the stage files."""
-    machines: list[Any] = []
-    parameters: dict[str, dict[str, list[Any]]] = {stage: {} for stage in plan.stages}
-    for (dataset, scene), variant, stage in itertools.product(plan.pairs, plan.collected(parts), plan.stages):
-        if plan.runs_stage(variant, stage):
-            timing = _timing(plan.stage_file(dataset, scene, variant, stage, "time.json"), stage)
-            ran_with = parameters[stage].setdefault(plan.variants[variant][stage], [])
-            for known, value in ((machines, timing["machine"]), (ran_with, timing["parameters"])):
-                if value not in known:
-                    known.append(value)
-    return machines, parameters
-
-
-def _timing(path: Path, stage: str) -> dict[str, Any]:
+def _timing(plan: Plan, dataset: str, scene: str, variant: str, stage: str) -> dict[str, Any]:
     """Time and memory of a stage, its machine and its parameters."""
+    path = plan.stage_file(dataset, scene, variant, stage, "time.json")
     keys = {"seconds", "peak_memory_mb", "machine", "parameters"}
     return read_json(path, keys, "the time of a stage", f"sepi.{stage}")
 
 
-def as_text(value: Any) -> str:
-    """JSON with one number per line, for readable differences."""
-    return json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-def _scene(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
+def _facts(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
     found: dict[str, Any] = {"dataset": dataset, "scene": scene}
-    if parts:
-        return found | {"stages": _stages(plan, dataset, scene, parts)}
-    return found | {
-        "light_field": _light_field(plan.light_field_file(dataset, scene), plan.truth_file(dataset, scene)),
-        "stages": _stages(plan, dataset, scene, parts),
-        "external": _external(plan, dataset, scene),
-    }
+    if plan.report == PARTS:
+        return found
+    maps = _external(plan, dataset, scene).items()
+    about = {method: {key: getattr(one, key) for key in ("problem", "source", "sha256")} for method, one in maps}
+    light_field = _light_field(plan.files(dataset, scene).light_field, plan.files(dataset, scene).truth)
+    return found | {"light_field": light_field, "external": about}
 
 
 def _light_field(path: Path, truth: Path) -> dict[str, Any]:
@@ -143,61 +141,42 @@ def _light_field(path: Path, truth: Path) -> dict[str, Any]:
     }
 
 
-def _stages(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
-    """Scores and times by the path of a stage's choices; a stage that variants share occurs once."""
-    files = {
-        plan.stage_key(variant, stage): plan.stage_file(dataset, scene, variant, stage, "time.json")
-        for variant in plan.collected(parts)
-        for stage in plan.stages
-    }
-    # in the ablation of parts, only the last stage is scored
-    last = [plan.stage_key(variant, plan.stages[-1]) for variant in plan.collected(parts)]
-    scored, wanted = plan.scores_file(dataset, scene, parts), last if parts else files.keys()
-    scores, reliability = read_scores(scored, wanted), read_reliability(scored, wanted)
-    found = {}
-    for key, path in files.items():
-        took = _timing(path, stage_of(key))
-        found[key] = {
-            "stage": stage_of(key),
-            "scores": _ordered(plan, scores[key]) if key in scores else None,
-            "seconds": float(took["seconds"]),
-            "peak_memory_mb": float(took["peak_memory_mb"]),
-            "reliability": reliability[key].tolist() if key in reliability else None,
-        }
-    return found
-
-
-def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
-    """Scores of the external methods, or the problems of their maps."""
-    if not plan.external:
-        return {}
-    path = plan.external_file(dataset, scene)
-    maps = read_external(path, with_maps=False)
-    require_known(str(path), plan.external, maps)
-    return {
-        method: {key: getattr(maps[method], key) for key in ("problem", "source", "sha256")}
-        | {"scores": _ordered(plan, maps[method].evaluation.scores)}
-        for method in plan.external
-    }
-
-
-def _ordered(plan: Plan, scores: Mapping[str, Mapping[str, Scores]]) -> dict[str, Any]:
-    """Scores in the order of protocols, regions and names."""
-    names = (*score_heads(plan.bad_thresholds), *EDGE_SCORES, *COUNTS)
-    of_bars = ERROR_BAR_SCORES.keys()
-    found: dict[str, Any] = {}
-    for protocol in PROTOCOLS if scores else ():
-        regions = scores[protocol]
-        order = dict.fromkeys([*SCORED_REGIONS, *sorted(regions)])
-        found[protocol] = {
-            region: {name: regions[region][name] for name in (*names, *(n for n in of_bars if n in regions[region]))}
-            for region in order
-        }
-    return found
-
-
 def _digest(values: npt.NDArray[Any]) -> str:
     return hashlib.sha256(np.ascontiguousarray(values).data.cast("B")).hexdigest()
+
+
+def _scores_of_scene(plan: Plan, dataset: str, scene: str) -> Iterator[_Number]:
+    """Scores of a scene's maps."""
+    path = plan.scores_file(dataset, scene)
+    keys = dict.fromkeys(itertools.starmap(plan.stage_key, itertools.product(plan.variants, plan.scored_stages)))
+    scores, reliability = read_scores(path, keys), read_reliability(path, keys)
+    for variant, stage in itertools.product(plan.variants, plan.stages):
+        about = (dataset, scene, variant, stage, plan.variants[variant][stage])
+        key = plan.stage_key(variant, stage)
+        yield from ((*about, *score) for score in _scores(scores.get(key, {})))
+        for name, values in zip(("pixels", "said", "found"), reliability.get(key, ()), strict=False):
+            yield from ((*about, TENTHS, str(tenth), name, float(value)) for tenth, value in enumerate(values))
+    for method, external in _external(plan, dataset, scene).items():
+        about = (dataset, scene, method, EXTERNAL, "")
+        yield from ((*about, *score) for score in _scores(external.evaluation.scores))
+
+
+def _external(plan: Plan, dataset: str, scene: str) -> dict[str, ExternalMap]:
+    """The external methods' maps, without their pixels."""
+    if not plan.external:
+        return {}
+    path = plan.files(dataset, scene).external
+    maps = read_external(path, with_maps=False)
+    require_known(str(path), plan.external, maps)
+    return {method: maps[method] for method in plan.external}
+
+
+def _scores(scores: Mapping[str, Mapping[str, Scores]]) -> Iterator[tuple[str, str, str, float]]:
+    """Protocol, region, name and value of scores, in the order of protocols and regions."""
+    for protocol in PROTOCOLS if scores else ():
+        regions = scores[protocol]
+        for region in dict.fromkeys([*SCORED_REGIONS, *sorted(regions)]):
+            yield from ((protocol, region, name, value) for name, value in regions[region].items())
 
 
 @click.command(name="python -m sepi.report.numbers", cls=SepiCommand)
@@ -209,14 +188,13 @@ def _digest(values: npt.NDArray[Any]) -> str:
     required=True,
     help="JSON file: scenes per dataset, choices per variant and stage.",
 )
-@click.option("--parts", is_flag=True, help="What the ablation of the best variant needs, and nothing else.")
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="JSON file to write.")
-def command(results: Path, path: Path, parts: bool, output: Path) -> None:
-    """Collect all numbers of the report in one JSON file."""
+@click.option("--output", type=click.Path(path_type=Path), required=True, help="JSON file to write, a CSV beside it.")
+def command(results: Path, path: Path, output: Path) -> None:
+    """Collect all numbers of the report in a CSV file, and facts about them in a JSON file of that name."""
     plan = Plan.from_json(
         results, json.dumps(read_json(path, {"scenes", "variants"}, "the plan of a report", "snakemake"))
     )
-    write(output, as_text(collect(plan, parts)))
+    write_numbers(collect(plan), output)
 
 
 if __name__ == "__main__":

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass
 from typing import Any
 
 from sepi.report import published
-from sepi.report.runs import Numbers, Runs
-from sepi.report.tabular.methods import Mean, average, count_note, datasets_of
+from sepi.report.runs import Runs
+from sepi.report.tabular.comparison import mean_by_region
+from sepi.report.tabular.methods import count_note, datasets_of, own_key
 from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 
@@ -22,14 +23,12 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
         number of scenes, if lower than in the row.
     """
 
-    def ours(dataset: str, scenes: Sequence[str]) -> dict[str, Any]:
-        found = {
-            variant: [average(runs, dataset, scenes, score, WHOLE_MAP, variant) for score in ("mse100", "q25")]
-            for variant in runs.plan.compared
-        }
+    def ours(dataset: str, scenes: list[str]) -> dict[str, Any]:
+        found = [runs.of(score, dataset).loc[scenes] for score in ("mse100", "q25")]
+        keys = {variant: own_key(variant) for variant in runs.plan.compared}
         return {
-            "ours": {variant: [_known(mean) for mean in means] for variant, means in found.items()},
-            "notes": {v: count_note([mean.scenes for mean in means], len(scenes)) for v, means in found.items()},
+            "ours": {variant: [_known(one[key].mean()) for one in found] for variant, key in keys.items()},
+            "notes": {v: count_note([int(one[key].count()) for one in found], len(scenes)) for v, key in keys.items()},
         }
 
     rows: list[dict[str, Any]] = []
@@ -38,7 +37,7 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
             name = published.paper_scene(dataset, scene)
             if name is not None:
                 tables = (published.table1(), published.table2())
-                theirs = [table.cells[dataset, name].get(published.PAPERS_METHOD) for table in tables]
+                theirs = [_known(table.at[(dataset, name), published.PAPERS_METHOD]) for table in tables]
                 rows.append({"scene": f"{dataset}/{scene}", "published": theirs, **ours(dataset, [scene])})
     for dataset in runs.plan.scenes:
         others = [scene for scene in runs.scored(dataset) if published.paper_scene(dataset, scene) is None]
@@ -53,7 +52,7 @@ def missing_scenes(runs: Runs) -> dict[str, list[str]]:
     found = {}
     for dataset in published.DATASETS:
         here = {published.paper_scene(dataset, scene) for scene in runs.plan.scenes.get(dataset, ())}
-        found[dataset] = [scene for scene in published.table1().scenes(dataset) if scene not in here]
+        found[dataset] = [scene for scene in published.scenes(dataset) if scene not in here]
     return found
 
 
@@ -107,34 +106,28 @@ class BarGroup:
 def ablation_bars(runs: Runs) -> list[BarGroup]:
     """Average MSE x100 of each listed variant beside the published one, a group per dataset and region."""
     groups = []
+    variants = list(runs.plan.variants)
     for dataset in datasets_of(runs.plan):
-        scenes = runs.scored(dataset)
-        theirs = published.table4().get(dataset, {})
+        means, counts = mean_by_region(runs, dataset, variants)
+        in_paper = published.table4().loc[dataset] if dataset in published.DATASETS else published.table4().iloc[:0]
+        theirs = in_paper.reindex(variants)
         for region in REGIONS:
-            means = {v: average(runs, dataset, scenes, "mse100", region, v) for v in runs.plan.listed}
-            most = max((mean.scenes for mean in means.values()), default=0)
+            most = int(counts.loc[region].max())
             rows = [
-                Bar(v, _known(mean), theirs.get(v, {}).get(region), count_note([mean.scenes], most))
-                for v, mean in means.items()
+                Bar(v, _known(mean), _known(theirs.at[v, region]), count_note([int(counts.at[region, v])], most))
+                for v, mean in means.loc[region].items()
             ]
             title = "whole map" if region == WHOLE_MAP else region
-            groups.append(BarGroup(dataset, title, most, len(scenes), rows))
+            groups.append(BarGroup(dataset, title, most, len(runs.scored(dataset)), rows))
     return [group for group in groups if group.figures]
 
 
 def part_bars(parts: Runs) -> list[BarGroup]:
     """MSE x100 of the variants in the ablation of ``best``, a group per scene."""
-    names = parts.plan.parts
-    pairs = [pair for pair in parts.plan.pairs if names and parts.scores(*pair, names[0])]
+    found = {pair: parts.of("mse100", pair[0]).loc[pair[1]] for pair in parts.scored_pairs}
     return [
-        BarGroup(
-            f"{dataset}/{scene}",
-            "whole map",
-            1,
-            1,
-            [Bar(variant, parts.final(dataset, scene, "mse100", variant=variant)) for variant in names],
-        )
-        for dataset, scene in pairs
+        BarGroup("/".join(pair), "whole map", 1, 1, [Bar(v, _known(errors[own_key(v)])) for v in parts.plan.variants])
+        for pair, errors in found.items()
     ]
 
 
@@ -161,48 +154,42 @@ class StageTimes:
 def stage_times(runs: Runs) -> list[StageTimes]:
     """Seconds and memory of the compared variants' stages, per scene."""
     rows = []
-    for dataset, scene in runs.plan.pairs:
+    for pair in runs.plan.pairs:
         for variant in runs.plan.compared:
-            timings = {stage: runs.timing(dataset, scene, variant, stage) for stage in runs.plan.stages}
+            took = runs.took(pair, variant).fillna(0.0)
             rows.append(
-                StageTimes(
-                    f"{dataset}/{scene}",
-                    variant,
-                    {stage: timing.seconds for stage, timing in timings.items()},
-                    {stage: timing.peak_memory_mb for stage, timing in timings.items()},
-                )
+                StageTimes("/".join(pair), variant, took["seconds"].to_dict(), took["peak_memory_mb"].to_dict())
             )
     return rows
 
 
-def total_seconds(*reports: Numbers) -> float:
+def total_seconds(*reports: Runs) -> float:
     """Total seconds of all stages in these numbers, each counted once."""
     seconds = {
-        (scene["dataset"], scene["scene"], key): stage["seconds"]
-        for numbers in reports
-        for scene in numbers["scenes"]
-        for key, stage in scene["stages"].items()
+        (row.dataset, row.scene, runs.plan.stage_key(row.variant, row.stage)): row.value
+        for runs in reports
+        for row in runs.numbers[runs.numbers["score"] == "seconds"].itertuples()
     }
     return float(sum(seconds.values()))
 
 
-def parameter_rows(numbers: Numbers) -> list[tuple[str, list[tuple[str, Any]]]]:
+def parameter_rows(runs: Runs) -> list[tuple[str, list[tuple[str, Any]]]]:
     """Stage and choice with its parameters; repeated if scenes have different ones."""
     return [
         (
             f"{stage}: {choice}",
             [(name, "by range and grid" if value is None else value) for name, value in values.items()],
         )
-        for stage, choices in numbers["parameters"].items()
+        for stage, choices in runs.facts["parameters"].items()
         for choice, found in choices.items()
         for values in found
     ]
 
 
-def shown_variants(runs: Runs, parts: Numbers | None) -> dict[str, dict[str, str]]:
+def shown_variants(runs: Runs, parts: Runs | None) -> dict[str, dict[str, str]]:
     """Variants with figures on the page, and their choices of stages."""
-    names = [*runs.plan.listed, *(runs.plan.parts if parts is not None else ())]
-    return {name: dict(runs.plan.variants[name]) for name in dict.fromkeys(names)}
+    found = {**runs.plan.variants, **({} if parts is None else parts.plan.variants)}
+    return {name: dict(choices) for name, choices in found.items()}
 
 
 def first_scene(runs: Runs) -> str:
@@ -211,5 +198,5 @@ def first_scene(runs: Runs) -> str:
     return "/".join(known[0] if known else runs.plan.pairs[-1])
 
 
-def _known(mean: Mean) -> float | None:
-    return mean.value if mean.scenes and isinstance(mean.value, float) else None
+def _known(figure: float) -> float | None:
+    return None if math.isnan(figure) else float(figure)

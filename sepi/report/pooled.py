@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -11,36 +11,30 @@ from sepi.report.plan import Plan
 from sepi.scoring.scores import WHOLE_MAP
 from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 
-Pooled = dict[str, dict[str, dict[str, float]]]
-"""Method to level of noise and seed, such as ``low 1``, to region to Q25 x100."""
 
-
-def pooled_q25(plan: Plan) -> Pooled:
-    """Q25 x100 of the final maps over the pixels of all rendered scenes of a level of noise, by region."""
+def pooled_q25(plan: Plan) -> Iterator[tuple[str, str, str, float]]:
+    """Q25 x100 over the pixels of all rendered scenes of a level of noise: :func:`level_of`, method, region, figure."""
     levels: dict[str, list[str]] = {}
-    for scene in plan.scenes.get(DATASET, ()):
-        found = rendered_scene(scene)
-        levels.setdefault(level_of(found.noise, found.seed), []).append(scene)
-    last = plan.stages[-1]
-    pooled: Pooled = {}
+    for scene in plan.scenes[DATASET]:
+        levels.setdefault(level_of(scene), []).append(scene)
     for level, scenes in levels.items():
         for variant in plan.compared:
-            key = plan.stage_key(variant, last)
+            key = plan.stage_key(variant, plan.stages[-1])
             found_of = (read_evaluations(plan.scores_file(DATASET, scene), [key])[key] for scene in scenes)
-            pooled.setdefault(variant, {})[level] = _quarters(found_of)
-        maps = [read_external(plan.external_file(DATASET, scene)) for scene in scenes] if plan.external else []
+            yield from ((level, variant, *quarter) for quarter in _quarters(found_of))
+        maps = [read_external(plan.files(DATASET, scene).external) for scene in scenes] if plan.external else []
         for method in plan.external:
-            pooled.setdefault(method, {})[level] = _quarters(found[method].evaluation for found in maps)
-    return pooled
+            yield from ((level, method, *quarter) for quarter in _quarters(found[method].evaluation for found in maps))
 
 
-def level_of(noise: str, seed: int) -> str:
-    """Name of a level of noise and a seed."""
-    return f"{noise} {seed}"
+def level_of(scene: str) -> str:
+    """Name of all rendered scenes of the noise and seed of one."""
+    found = rendered_scene(scene)
+    return f"all scenes, noise {found.noise}, seed {found.seed}"
 
 
-def _quarters(evaluations: Iterable[Evaluation]) -> dict[str, float]:
-    """Q25 x100 over the pixels of several maps, by region."""
+def _quarters(evaluations: Iterable[Evaluation]) -> list[tuple[str, float]]:
+    """Regions and Q25 x100 over the pixels of several maps."""
     errors: dict[str, list[np.ndarray]] = {}
     counts: dict[str, int] = {}
     for found in evaluations:
@@ -49,7 +43,7 @@ def _quarters(evaluations: Iterable[Evaluation]) -> dict[str, float]:
             error = np.abs(found.error) if region == WHOLE_MAP else np.abs(found.error[found.regions[region]])
             errors.setdefault(region, []).append(error[np.isfinite(error)])
             counts[region] = counts.get(region, 0) + int(scores["pixels"])
-    return {region: _quarter(parts, counts[region]) for region, parts in errors.items()}
+    return [(region, _quarter(parts, counts[region])) for region, parts in errors.items()]
 
 
 def _quarter(errors: Sequence[np.ndarray], pixels: int) -> float:

@@ -8,16 +8,12 @@ References
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
+from typing import cast
 
-from sepi.scoring.scores import REGIONS, WHOLE_MAP
+import pandas as pd
 
-FOLDER = Path(__file__).parent / "published"
-"""Folder of the data files."""
+from sepi.report.plan import PUBLISHED
 
 AVERAGE = "Average"
 """Name of the average rows in the paper's tables 1 and 2."""
@@ -31,72 +27,76 @@ DATASETS: dict[str, str] = {"hci": "HCI 4D light field benchmark", "hci_2013": "
 # folders of the archive of 2013 with other names than in the paper
 _ARCHIVE_NAMES = {("hci_2013", "monasroom"): "Monas"}
 
-# the averages of the learned methods are without this scene
+# the averages of the learned methods are without these scenes, in table 2
 _LEFT_OUT_OF_TABLE2 = frozenset({"Boxes", "Cotton", "Dino", "Sideboard"})
 
-RegionTable = dict[str, dict[str, float]]
-"""Method or variant to region of :data:`sepi.scoring.scores.REGIONS` to average 100 x MSE, if the paper has one."""
 
+@cache
+def methods() -> pd.DataFrame:
+    """Methods of tables 1 to 3 by key, columns (a) to (k) first, then those of table 3 only.
 
-@dataclass(frozen=True)
-class Method:
-    """A method in the paper's tables.
-
-    Attributes
-    ----------
-    key : str
-        Name in the data files.
-    column : str
-        Letter of its column in tables 1 and 2; empty if it is in table 3 only.
-    authors, name : str
-        As in the paper; ``name`` is empty if the paper gives none.
-    learning : str
-        ``"none"``, ``"supervised"`` or ``"unsupervised"``.
-    variant : str
-        The variant that computes it, if any; else empty.
+    Returns
+    -------
+    DataFrame
+        ``column``: letter of its column in tables 1 and 2, empty if it is in table 3 only; ``authors`` and ``name``: as
+        in the paper; ``learning``: ``"none"``, ``"supervised"`` or ``"unsupervised"``; ``variant``: the one that
+        computes it, if any; ``label``: authors and name for a table's header.
     """
-
-    key: str
-    column: str
-    authors: str
-    name: str
-    learning: str
-    variant: str
-
-    @property
-    def label(self) -> str:
-        """Authors and name for a table's header."""
-        return f"{self.authors} ({self.name})" if self.name else self.authors
+    found = _read("methods", index="key").fillna("")
+    named = found["authors"] + " (" + found["name"] + ")"
+    return found.assign(label=named.where(found["name"] != "", found["authors"]))
 
 
-@dataclass(frozen=True)
-class SceneTable:
-    """Table 1 or 2: a figure per dataset, scene and method.
+def counterpart(variant: str) -> str:
+    """Key of the published method with which a variant is compared: a compared method's own, else the paper's."""
+    return next((str(key) for key, name in methods()["variant"].items() if name == variant), PAPERS_METHOD)
 
-    Attributes
-    ----------
-    cells : mapping
-        ``(dataset, scene)`` to ``{method key: figure}``, in the paper's order. A method trained on the scene has no
-        figure.
-    averages : mapping
-        Dataset to ``{method key: figure}``, the average rows as printed.
-    left_out : set
-        Scenes outside the averages of methods that lack figures.
+
+@cache
+def table1() -> pd.DataFrame:
+    """Table 1: 100 x MSE over the whole map; rows ``(dataset, scene)``, then the averages as printed, columns methods.
+
+    A method trained on a scene has no figure for it.
     """
+    return _read("table1_mse", index=["dataset", "scene"])
 
-    cells: Mapping[tuple[str, str], Mapping[str, float]]
-    averages: Mapping[str, Mapping[str, float]]
-    left_out: frozenset[str] = frozenset()
 
-    def scenes(self, dataset: str) -> list[str]:
-        """Scenes of a dataset, in the paper's order."""
-        return [scene for name, scene in self.cells if name == dataset]
+@cache
+def table2() -> pd.DataFrame:
+    """Table 2: Q25 x 100 over the whole map, as :func:`table1`."""
+    return _read("table2_q25", index=["dataset", "scene"])
 
-    def averaged(self, dataset: str, method: str) -> int:
-        """Number of scenes in a method's printed average for a dataset; 0 without figures."""
-        scenes = self.scenes(dataset)
-        known = [scene for scene in scenes if method in self.cells[dataset, scene]]
-        return len(known) if len(known) == len(scenes) else len({*known} - self.left_out)
+
+@cache
+def table3() -> pd.DataFrame:
+    """Table 3: 100 x MSE; rows methods, columns ``(dataset, region)``."""
+    found = _read("table3_regions", index="method")
+    return found.set_axis(pd.MultiIndex.from_tuples([tuple(name.rsplit("_", 1)) for name in found.columns]), axis=1)
+
+
+@cache
+def table4() -> pd.DataFrame:
+    """Table 4: 100 x MSE; rows ``(dataset, variant)``, columns regions. Wang's occlusion stage is from the text."""
+    return _read("table4_ablation", index=["dataset", "variant"])
+
+
+@cache
+def runtime() -> dict[str, float]:
+    """Seconds per stage and ``"total"``, for 512 x 512 pixels and 9 x 9 views on one core of an Intel Core i7-8700."""
+    return {str(stage): float(took) for stage, took in _read("runtime", index="stage")["seconds"].items()}
+
+
+def scenes(dataset: str) -> list[str]:
+    """The paper's scenes of a dataset, in its order; none of a dataset that it does not have."""
+    return [scene for name, scene in table1().index if name == dataset and scene != AVERAGE]
+
+
+def averaged(table: pd.DataFrame, dataset: str) -> dict[str, int]:
+    """Number of scenes in each method's printed average for a dataset of table 1 or 2."""
+    known = table.loc[dataset].drop(AVERAGE).notna()
+    left_out = known.index.isin(_LEFT_OUT_OF_TABLE2 if table is table2() else [])
+    every, fewer = known.sum(), known[~left_out].sum()
+    return cast("dict[str, int]", every.where(every == len(known), fewer).to_dict())
 
 
 def paper_scene(dataset: str, scene: str) -> str | None:
@@ -105,73 +105,9 @@ def paper_scene(dataset: str, scene: str) -> str | None:
     Only datasets in :data:`DATASETS` count, so that the built-in scene ``dots`` is not mistaken for the benchmark's.
     Capitals do not matter.
     """
-    named = {name.lower(): name for name in table1().scenes(dataset)}
+    named = {name.lower(): name for name in scenes(dataset)}
     return named.get(scene.lower(), _ARCHIVE_NAMES.get((dataset, scene.lower())))
 
 
-@cache
-def methods() -> dict[str, Method]:
-    """Methods of tables 1 to 3 by key: columns (a) to (k), then those of table 3 only."""
-    return {row["key"]: Method(**row) for row in _rows("methods.csv")}
-
-
-def counterpart(variant: str) -> Method:
-    """The published method with which a variant is compared: a compared method's own, else the paper's."""
-    return next((one for one in methods().values() if one.variant == variant), methods()[PAPERS_METHOD])
-
-
-@cache
-def table1() -> SceneTable:
-    """Table 1: 100 x MSE over the whole map."""
-    return _scene_table("table1_mse.csv")
-
-
-@cache
-def table2() -> SceneTable:
-    """Table 2: Q25 x 100 over the whole map."""
-    return _scene_table("table2_q25.csv", _LEFT_OUT_OF_TABLE2)
-
-
-@cache
-def table3() -> dict[str, RegionTable]:
-    """Table 3 by dataset: methods in occluded and textureless regions."""
-    return {
-        dataset: {
-            row["method"]: {region: float(row[f"{dataset}_{region}"]) for region in REGIONS if region != WHOLE_MAP}
-            for row in _rows("table3_regions.csv")
-        }
-        for dataset in DATASETS
-    }
-
-
-@cache
-def table4() -> dict[str, RegionTable]:
-    """Table 4 by dataset, with the text's figures for Wang's occlusion stage: variants over map and regions."""
-    table: dict[str, RegionTable] = {dataset: {} for dataset in DATASETS}
-    for row in _rows("table4_ablation.csv"):
-        table[row["dataset"]][row["variant"]] = {region: float(row[region]) for region in REGIONS if row[region]}
-    return table
-
-
-@cache
-def runtime() -> dict[str, float]:
-    """Seconds per stage and ``"total"``, for 512 x 512 pixels and 9 x 9 views on one core of an Intel Core i7-8700."""
-    return {row["stage"]: float(row["seconds"]) for row in _rows("runtime.csv")}
-
-
-def _scene_table(name: str, left_out: frozenset[str] = frozenset()) -> SceneTable:
-    cells: dict[tuple[str, str], dict[str, float]] = {}
-    averages: dict[str, dict[str, float]] = {}
-    for row in _rows(name):
-        dataset, scene = row.pop("dataset"), row.pop("scene")
-        figures = {method: float(text) for method, text in row.items() if text}
-        if scene == AVERAGE:
-            averages[dataset] = figures
-        else:
-            cells[dataset, scene] = figures
-    return SceneTable(cells, averages, left_out)
-
-
-def _rows(name: str) -> list[dict[str, str]]:
-    text = (FOLDER / name).read_text(encoding="utf-8")
-    return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
+def _read(name: str, index: str | list[str]) -> pd.DataFrame:
+    return pd.read_csv(PUBLISHED / f"{name}.csv", comment="#", index_col=index)

@@ -1,118 +1,165 @@
-"""Scores and timings for the tables, looked up in the numbers of a report."""
+"""The numbers of a report: scores and times in one data frame, and facts about what they are of."""
 
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from sepi.errors import SepiError
-from sepi.io.scores import AllScores
-from sepi.report.plan import MAIN_VARIANT, Plan
-from sepi.scoring.error_bars import Reliability
-from sepi.scoring.scores import WHOLE_MAP
+from sepi.external import NO_FILE
+from sepi.report.plan import Plan
+from sepi.report.tabular.methods import compared_methods, own_key
+from sepi.scoring.error_bars import ERROR_BAR_SCORES, Reliability
+from sepi.scoring.scores import COUNTS, EDGE_SCORES, WHOLE_MAP, score_heads
 
-Numbers = Mapping[str, Any]
-"""Result of :func:`sepi.report.numbers.collect`."""
+KEYS = ["dataset", "scene", "variant", "stage", "choice", "protocol", "region"]
+"""Columns that name a number, besides ``score``."""
 
+EXTERNAL = "external"
+"""Stage of the maps of external methods, whose names are in the column ``variant``."""
 
-@dataclass(frozen=True)
-class Timing:
-    """Wall-clock seconds and peak memory of a stage, MB."""
-
-    seconds: float
-    peak_memory_mb: float
+TENTHS = "tenths of confidence"
+"""Protocol of the numbers of a :class:`Reliability`; their regions are tenths, 0 to 9."""
 
 
 @dataclass(frozen=True)
 class Runs:
-    """Scores and timings of a plan, from the numbers of a report."""
+    """Scores and times of a plan.
 
-    numbers: Numbers
+    Attributes
+    ----------
+    facts : mapping
+        Values of JSON, as :func:`sepi.report.numbers.collect` describes them.
+    numbers : DataFrame
+        A row for each number: :data:`KEYS`, ``score``, ``value``. A score over no pixels is NaN.
+    """
+
+    facts: Mapping[str, Any]
+    numbers: pd.DataFrame
 
     @cached_property
     def plan(self) -> Plan:
         """Scenes, variants and external methods; its files are not available."""
-        return Plan.from_json(Path(), json.dumps(self.numbers["plan"]))
-
-    def light_field(self, dataset: str, scene: str) -> dict[str, Any]:
-        """Facts about a light field: ``grid``, ``shape``, ``range``, ``sha256`` and more."""
-        found: dict[str, Any] = self._scenes[dataset, scene]["light_field"]
-        return found
-
-    def scores(self, dataset: str, scene: str, variant: str, stage: str | None = None) -> AllScores:
-        """Protocol to region to scores after a stage (default: the last); empty without ground truth."""
-        found: AllScores = _with_nan(self._stage(dataset, scene, variant, stage or self.plan.stages[-1])["scores"])
-        return found
-
-    def scored(self, dataset: str, variant: str = MAIN_VARIANT) -> list[str]:
-        """Scenes of a dataset with scores of this variant, that is, with ground truth."""
-        scenes = self.plan.scenes.get(dataset, ())
-        return [scene for scene in scenes if self.scores(dataset, scene, variant)]
-
-    def scored_pairs(self, variant: str = MAIN_VARIANT) -> list[tuple[str, str]]:
-        """Every ``(dataset, scene)`` with scores."""
-        return [(dataset, scene) for dataset in self.plan.scenes for scene in self.scored(dataset, variant)]
-
-    def final(
-        self, dataset: str, scene: str, score: str, region: str = WHOLE_MAP, variant: str = MAIN_VARIANT
-    ) -> float:
-        """A score of a final map by the paper's protocol."""
-        return self.scores(dataset, scene, variant)["paper"][region][score]
-
-    def timing(self, dataset: str, scene: str, variant: str, stage: str) -> Timing:
-        """Time and memory of a stage; 0 for one that is switched off."""
-        if not self.plan.runs_stage(variant, stage):
-            return Timing(0.0, 0.0)
-        values = self._stage(dataset, scene, variant, stage)
-        return Timing(values["seconds"], values["peak_memory_mb"])
-
-    def reliability(self, dataset: str, scene: str, variant: str) -> Reliability:
-        """Reliability of the confidence of a final map that has error bars and scores."""
-        found = _with_nan(self._stage(dataset, scene, variant, self.plan.stages[-1])["reliability"])
-        return Reliability(*(np.array(values, np.float64) for values in found))
-
-    def external_scores(self, dataset: str, scene: str, method: str) -> AllScores:
-        """Protocol to region to scores of another method's map; empty without a map that can be scored."""
-        found: AllScores = _with_nan(self._scenes[dataset, scene]["external"][method]["scores"])
-        return found
-
-    def external_problem(self, dataset: str, scene: str, method: str) -> str:
-        """Reason why an external map has no scores; empty if it has scores or there is no ground truth."""
-        return str(self._scenes[dataset, scene]["external"][method]["problem"])
-
-    def pooled_q25(self, method: str, level: str, region: str) -> float:
-        """Q25 x100 over the pixels of several scenes (:func:`sepi.report.pooled.pooled_q25`)."""
-        found: float = _with_nan(self.numbers["pooled_q25"][method][level].get(region))
-        return found
-
-    def _stage(self, dataset: str, scene: str, variant: str, stage: str) -> dict[str, Any]:
-        key = self.plan.stage_key(variant, stage)
-        stages: dict[str, dict[str, Any]] = self._scenes[dataset, scene]["stages"]
-        if key not in stages:
-            raise SepiError(f"{dataset}/{scene}: these numbers have nothing of {variant} ({key})")
-        return stages[key]
+        return Plan.from_json(Path(), json.dumps(self.facts["plan"]))
 
     @cached_property
-    def _scenes(self) -> dict[tuple[str, str], dict[str, Any]]:
-        return {(values["dataset"], values["scene"]): values for values in self.numbers["scenes"]}
+    def methods(self) -> pd.DataFrame:
+        """Methods of the tables, as :func:`compared_methods`."""
+        return compared_methods(self.plan)
+
+    @cached_property
+    def maps(self) -> pd.DataFrame:
+        """A column for each score; rows :data:`KEYS`, in the order of the numbers."""
+        order = pd.MultiIndex.from_frame(self.numbers[KEYS].drop_duplicates())
+        known = [*score_heads(self.plan.bad_thresholds), *EDGE_SCORES, *COUNTS, *ERROR_BAR_SCORES]
+        found = self.numbers.pivot(index=KEYS, columns="score", values="value").reindex(index=order)
+        return found.reindex(columns=dict.fromkeys([*known, "seconds", "peak_memory_mb", *found.columns]))
+
+    @cached_property
+    def final(self) -> pd.DataFrame:
+        """Scores of final maps by the paper's protocol; rows ``(dataset, scene, method, region)``.
+
+        ``method`` is a key of :attr:`methods`, or for variants that are not compared, :func:`own_key`.
+        """
+        found = self.maps.reset_index()
+        found = found[(found["protocol"] == "paper") & found["stage"].isin([self.plan.stages[-1], EXTERNAL])]
+        external = dict(zip(self.plan.external, self.methods.index[self.methods["kind"] == EXTERNAL], strict=True))
+        of_maps = zip(found["variant"], found["stage"], strict=True)
+        keys = [external[name] if stage == EXTERNAL else own_key(name) for name, stage in of_maps]
+        return found.assign(method=keys).set_index(["dataset", "scene", "method", "region"])
+
+    def of(self, score: str, dataset: str, region: str = WHOLE_MAP) -> pd.DataFrame:
+        """A score of the final maps of a dataset: a row for each scene with ground truth, a column for each method."""
+        scenes = self.scored(dataset)
+        rows = pd.MultiIndex.from_product([[dataset], scenes, [region]])
+        return self.final[score].unstack("method").reindex(index=rows).set_axis(scenes)
+
+    def scored(self, dataset: str) -> list[str]:
+        """Scenes of a dataset with scores, that is, with ground truth."""
+        return [scene for name, scene in self.scored_pairs if name == dataset]
+
+    @cached_property
+    def scored_pairs(self) -> list[tuple[str, str]]:
+        """Every ``(dataset, scene)`` with scores."""
+        known = set(self.final.index.droplevel(["method", "region"]))
+        return [pair for pair in self.plan.pairs if pair in known]
+
+    def took(self, pair: tuple[str, str], variant: str) -> pd.DataFrame:
+        """Seconds and peak memory, MB, of a variant's stages; NaN for those that are switched off."""
+        every = pd.MultiIndex.from_product([[pair[0]], [pair[1]], [variant], self.plan.stages])
+        return self.times.reindex(every).set_axis(self.plan.stages)
+
+    @cached_property
+    def times(self) -> pd.DataFrame:
+        """Seconds and peak memory, MB, of stages that are switched on; rows ``(dataset, scene, variant, stage)``."""
+        return self.maps[["seconds", "peak_memory_mb"]].dropna().droplevel(["choice", "protocol", "region"])
+
+    def reliability(self, variant: str, pairs: Sequence[tuple[str, str]]) -> Reliability:
+        """Reliability of a variant's confidence over the pixels of several scenes together."""
+        found = self.maps.xs((variant, self.plan.stages[-1], TENTHS), level=("variant", "stage", "protocol"))
+        found = found[found.index.droplevel(["choice", "region"]).isin(pairs)]
+        found = weighted_means(found[["said", "found"]], found["pixels"], "region")
+        return Reliability(*(found[name].to_numpy(np.float64) for name in ("pixels", "said", "found")))
+
+    @cached_property
+    def scenes(self) -> dict[tuple[str, str], dict[str, Any]]:
+        """Facts about each ``(dataset, scene)``."""
+        return {(values["dataset"], values["scene"]): values for values in self.facts["scenes"]}
+
+    def problem(self, dataset: str, scenes: Sequence[str], method: str) -> str:
+        """Why an external method has no scores of scenes, or of how many it has some; empty if of all."""
+        problems = [self.scenes[dataset, scene]["external"][method]["problem"] for scene in scenes]
+        alike = len(set(problems)) < 2
+        return "".join(problems[:1]) if alike else f"{problems.count('')} of {len(scenes)} scenes"
+
+    def problems(self, dataset: str, scenes: Sequence[str]) -> pd.Series:
+        """The :meth:`problem` of every method in the tables, empty but for external ones."""
+        found = self.methods[["name", "kind"]].itertuples(index=False)
+        told = [self.problem(dataset, scenes, name) if kind == EXTERNAL else "" for name, kind in found]
+        return pd.Series(told, self.methods.index, dtype=object)
+
+    def has_column(self, dataset: str, method: str) -> bool:
+        """Whether an external method has a column on a dataset's page.
+
+        A method with files for other datasets only has none. A method without any file has one, to show the problem.
+        """
+        with_file = {one for one, scene in self.plan.pairs if self.problem(one, [scene], method) != NO_FILE}
+        return dataset in with_file or (not with_file and dataset in self.plan.scenes)
 
 
-def read_numbers(path: Path) -> dict[str, Any]:
-    """The numbers in a file that ``python -m sepi.report.numbers`` wrote.
+def weighted_means(values: pd.DataFrame, pixels: pd.Series, by: Any) -> pd.DataFrame:
+    """Means over the pixels of several maps, with their number in the column ``pixels``; NaN over none."""
+    products = values.mul(pixels, axis=0)[pixels > 0]
+    sums = products.groupby(by, sort=False).agg(lambda column: column.sum(skipna=False))
+    every = pixels.groupby(by, sort=False).sum()
+    return sums.reindex(every.index).div(every, axis=0).assign(pixels=every)
+
+
+def read_numbers(path: Path) -> Runs:
+    """The numbers in two files that ``python -m sepi.report.numbers`` wrote: this one, and ``.csv`` beside it.
 
     Raises
     ------
     SepiError
-        If the file is missing or has other contents.
+        If a file is missing or has other contents.
     """
-    return read_json(path, {"plan", "scenes", "tables"}, "the numbers of a report", "sepi.report.numbers")
+    facts = read_json(path, {"plan", "scenes"}, "the numbers of a report", "sepi.report.numbers")
+    table = path.with_suffix(".csv")
+    try:
+        kinds = dict.fromkeys([*KEYS, "score"], str) | {"value": float}
+        numbers = pd.read_csv(table, usecols=[*kinds], dtype=kinds, keep_default_na=False, na_values={"value": ["nan"]})
+    except OSError as error:
+        raise SepiError(f"{table}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise SepiError(f"{table}: not the numbers of a report, which python -m sepi.report.numbers writes") from error
+    return Runs(facts, numbers)
 
 
 def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, Any]:
@@ -132,12 +179,3 @@ def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, A
     if not isinstance(found, dict) or not keys <= found.keys():
         raise SepiError(f"{path}: not {what}, which python -m {module} writes")
     return found
-
-
-def _with_nan(value: Any) -> Any:
-    """A value with NaN for None, which is JSON's score over no pixels."""
-    if isinstance(value, dict):
-        return {key: _with_nan(inner) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_with_nan(inner) for inner in value]
-    return math.nan if value is None else value

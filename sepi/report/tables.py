@@ -8,23 +8,20 @@ from pathlib import Path
 
 import click
 
+from sepi.io.files import atomic_path
 from sepi.process.command import SepiCommand
 from sepi.report import published
 from sepi.report.runs import Runs, read_numbers
-from sepi.report.tabular.ablation import ablation_table, parts_table
-from sepi.report.tabular.comparison import region_table, scene_table
-from sepi.report.tabular.computed_methods import computed_methods_table
-from sepi.report.tabular.edges import edge_table
+from sepi.report.tabular.comparison import ablation_table, region_table, scene_table
 from sepi.report.tabular.error_bars import error_bar_table
-from sepi.report.tabular.latex import as_latex
-from sepi.report.tabular.layout import Report, as_csv, write
-from sepi.report.tabular.markdown import as_markdown
+from sepi.report.tabular.formats import as_csv, as_latex, as_markdown
 from sepi.report.tabular.properties import property_table
 from sepi.report.tabular.properties import scene_table as rendered_scene_table
-from sepi.report.tabular.stages import runtime_table, stage_table
+from sepi.report.tabular.scores import computed_methods_table, edge_table, parts_table, runtime_table, stage_table
+from sepi.report.tabular.table import Table
 from sepi.validation import require_known
 
-BUILDERS: dict[str, Callable[[Runs], Report]] = {
+BUILDERS: dict[str, Callable[[Runs], Table]] = {
     "methods": computed_methods_table,
     "table1_mse": lambda runs: scene_table(runs, "mse100", published.table1(), "Table 1: MSE x100"),
     "table2_q25": lambda runs: scene_table(runs, "q25", published.table2(), "Table 2: Q25 x100"),
@@ -44,11 +41,11 @@ BUILDERS: dict[str, Callable[[Runs], Report]] = {
 """Name of each table to the function that makes it."""
 
 
-def table(name: str, runs: Runs) -> Report:
+def table(name: str, runs: Runs) -> Table:
     """One of the tables; its caption names the scenes that are left out."""
-    report = BUILDERS[name](runs)
+    found = BUILDERS[name](runs)
     missing = ", ".join(f"`{scene}`" for scene in runs.plan.missing)
-    return replace(report, caption=f"{report.caption} Without {missing}, not computed yet.") if missing else report
+    return replace(found, caption=f"{found.caption} Without {missing}, not computed yet.") if missing else found
 
 
 @click.command(name="python -m sepi.report.tables", cls=SepiCommand)
@@ -57,13 +54,13 @@ def table(name: str, runs: Runs) -> Report:
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")
 def command(path: Path, names: tuple[str, ...], output: Path) -> None:
     """Write the tables of a report's numbers as CSV, Markdown and LaTeX."""
-    numbers = read_numbers(path)
-    require_known(f"{path}: tables", names, numbers["tables"])
-    runs = Runs(numbers)
-    for name in names or numbers["tables"]:
-        report = table(name, runs)
-        for ending, text in (("csv", as_csv(report)), ("md", as_markdown(report)), ("tex", as_latex(report, name))):
-            write(output / f"{name}.{ending}", text)
+    runs = read_numbers(path)
+    require_known(f"{path}: tables", names, runs.plan.tables)
+    for name in names or runs.plan.tables:
+        found = table(name, runs)
+        for ending, text in (("csv", as_csv(found)), ("md", as_markdown(found)), ("tex", as_latex(found, name))):
+            with atomic_path(output / f"{name}.{ending}") as temporary:
+                temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

@@ -14,9 +14,6 @@ from sepi.variants import HANDED_ON, STAGES
 RESULTS = Path("results")
 """Folder of the results, relative to the workflow's working directory."""
 
-PARTS_ENDING = "_parts"
-"""Ending of the files that only the ablation of the best variant has."""
-
 
 @dataclass(frozen=True)
 class SceneFiles:
@@ -66,7 +63,7 @@ class SceneFiles:
         return self.stages / key / f"{stage_of(key)}.{ending}"
 
     def scores(self, which: str = "") -> Path:
-        """The scores of the maps; with ``which``, only those of the ablation (:data:`PARTS_ENDING`) or ``_REPORT``."""
+        """The scores of the maps; with ``which``, those of the report ``_REPORT`` alone."""
         return self.folder / f"scores{which}.h5"
 
     def variant(self, name: str) -> Path:

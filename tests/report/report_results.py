@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from sepi import variants as built_in
 from sepi.evaluate import evaluation_of, evaluations_of
 from sepi.external import NO_FILE
 from sepi.io.hdf5 import read_stage, write_light_field, write_stage
@@ -19,9 +21,9 @@ from sepi.io.truth import write_truth
 from sepi.lightfield import DisparityRange, LightField
 from sepi.report import numbers, tables
 from sepi.report.plan import Plan
-from sepi.report.runs import Runs
-from sepi.report.tabular.layout import Report, as_csv
-from sepi.report.tabular.markdown import as_markdown
+from sepi.report.runs import Runs, read_numbers
+from sepi.report.tabular.formats import as_csv, as_markdown
+from sepi.report.tabular.table import Table
 from sepi.stage import StageMaps
 
 SIZE = 40
@@ -61,6 +63,11 @@ EXTERNAL: dict[str, dict[str, float | str]] = {
 }
 
 
+def choices(*names: str) -> dict[str, Mapping[str, str]]:
+    """Variants of the package."""
+    return {name: built_in.VARIANTS[name].labels for name in names}
+
+
 MACHINE = {"processor": "of a cluster", "cores": 64, "python": "3.12.1", "sepi": "0.0.1", "numpy": "1.26.4"}
 
 
@@ -98,8 +105,8 @@ def with_results(made: Plan) -> Plan:
     """The plan, its result files written."""
     for dataset, name in made.pairs:
         scene = light_field(name)
-        write_light_field(made.light_field_file(dataset, name), replace(scene, ground_truth=None, masks={}))
-        write_truth(made.truth_file(dataset, name), (scene.ground_truth, scene.masks))
+        write_light_field(made.files(dataset, name).light_field, replace(scene, ground_truth=None, masks={}))
+        write_truth(made.files(dataset, name).truth, (scene.ground_truth, scene.masks))
         for variant in made.variants:
             for stage in (stage for stage in made.stages if made.runs_stage(variant, stage)):
                 maps = stage_maps(scene, variant, stage)
@@ -109,13 +116,13 @@ def with_results(made: Plan) -> Plan:
                 took = {"seconds": 1.5, "peak_memory_mb": 200 + 10 * len(stage)}
                 timing.write_text(json.dumps({**took, "machine": MACHINE, "parameters": {"words": len(stage)}}))
         folder = made.files(dataset, name).stages
-        for parts in (False,) if made.report else (False, True):
-            files = made.scored_files(dataset, name, parts)
+        for one in (made,) if made.report else (made, made.parts_of_best()):
+            files = one.scored_files(dataset, name)
             scored = evaluations_of(scene, {map_name(folder, file): read_stage(file) for file in files})
-            write_scores(made.scores_file(dataset, name, parts), scored, {"scene": name})
+            write_scores(one.scores_file(dataset, name), scored, {"scene": name})
         if made.external:
             maps = {method: external_map(scene, EXTERNAL[method][name]) for method in made.external}
-            write_external(made.external_file(dataset, name), maps)
+            write_external(made.files(dataset, name).external, maps)
     return made
 
 
@@ -129,15 +136,17 @@ def external_map(scene: LightField, what: float | str) -> ExternalMap:
     return ExternalMap("/maps/some.pfm", "", 64 * "a", disparity, scores)
 
 
-def numbers_of(plan: Plan, parts: bool = False) -> dict[str, Any]:
-    """The numbers of a plan as their file brings them."""
-    found: dict[str, Any] = json.loads(numbers.as_text(numbers.collect(plan, parts=parts)), parse_constant=pytest.fail)
-    return found
+def numbers_of(plan: Plan) -> Runs:
+    """The numbers of a plan as their files bring them."""
+    path = plan.results / f"report{plan.ending}.json"
+    numbers.write_numbers(numbers.collect(plan), path)
+    json.loads(path.read_text(), parse_constant=pytest.fail)
+    return read_numbers(path)
 
 
-def linked(plan: Plan, folder: Path, parts: bool = False) -> Plan:
+def linked(plan: Plan, folder: Path) -> Plan:
     """The plan in a folder that has the inputs of its numbers and nothing else."""
-    for path in plan.number_inputs(parts):
+    for path in plan.number_inputs():
         copied = folder / path.relative_to(plan.results)
         copied.parent.mkdir(parents=True, exist_ok=True)
         copied.hardlink_to(path)
@@ -150,16 +159,16 @@ def run(command: Any, plan: Plan, output: Path, *more: str) -> Result:
     return CliRunner().invoke(command, arguments, catch_exceptions=False)
 
 
-def report_of(found: dict[str, Any], table: str) -> Report:
-    return tables.BUILDERS[table](Runs(found))
+def report_of(found: Runs, table: str) -> Table:
+    return tables.BUILDERS[table](found)
 
 
-def markdown(found: dict[str, Any], table: str) -> str:
+def markdown(found: Runs, table: str) -> str:
     """A table's Markdown, its columns not aligned."""
     return re.sub(" +", " ", as_markdown(report_of(found, table)))
 
 
-def csv_rows(found: dict[str, Any], table: str) -> list[dict[str, str]]:
+def csv_rows(found: Runs, table: str) -> list[dict[str, str]]:
     """Rows of a table's CSV file, in which cells may hold line breaks."""
     return list(csv.DictReader(as_csv(report_of(found, table)).splitlines(keepends=True)))
 
@@ -170,17 +179,22 @@ def only(rows: list[dict[str, str]], **cells: str) -> dict[str, str]:
     return found[0]
 
 
-def cells_of(found: dict[str, Any], table: str, heading: str, row: str) -> dict[str, Any]:
-    """Head of each column to the cell of the JSON in one row of one section of a table."""
-    (section,) = [one for one in found["tables"][table]["sections"] if one["heading"].split(":")[0] == heading]
-    (line,) = [line for line in section["rows"] if line["cells"][0]["text"] == row]
-    return {column["head"]: cell for column, cell in zip(section["columns"], line["cells"], strict=True)}
+def cells_of(found: Runs, table: str, heading: str, row: str) -> dict[str, tuple[str, float | None, str, str]]:
+    """Head of each column to a cell in one row of one section of a table: text, figure, mark, its column's kind."""
+    (section,) = [one for one in report_of(found, table).sections if one.heading.split(":")[0] == heading]
+    (line,) = [cells for _, _, cells in section.lines if cells[0][0] == row]
+    return {head.text: (*cell, head.kind) for head, cell in zip(section.heads, line, strict=True)}
 
 
-def renamed(value: Any, names: dict[str, str]) -> Any:
+def renamed(found: Runs, names: dict[str, str]) -> Runs:
+    """Numbers in which keys and texts have other names."""
+    return Runs(renamed_facts(found.facts, names), found.numbers.replace(names))
+
+
+def renamed_facts(value: Any, names: dict[str, str]) -> Any:
     """JSON in which keys and texts have other names."""
     if isinstance(value, dict):
-        return {names.get(key, key): renamed(inner, names) for key, inner in value.items()}
+        return {names.get(key, key): renamed_facts(inner, names) for key, inner in value.items()}
     if isinstance(value, list):
-        return [renamed(inner, names) for inner in value]
+        return [renamed_facts(inner, names) for inner in value]
     return names.get(value, value) if isinstance(value, str) else value

@@ -50,7 +50,7 @@ def test_what_no_view_knows_is_shown(tmp_path: Path) -> None:
     plan = with_results(Plan(tmp_path / "results", {"hci": ["cotton"]}, VARIANTS))
     scene = light_field("cotton")
     scene.views[:, :, :15, :20] = 0
-    write_light_field(plan.light_field_file("hci", "cotton"), scene)
+    write_light_field(plan.files("hci", "cotton").light_field, scene)
     panels = {panel.key: panel for panel in panels_of(figures.read_results(plan, "hci", "cotton"))}
     for variant in VARIANTS:
         expected = np.zeros(scene.shape, bool)

@@ -4,30 +4,30 @@ import hashlib
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from click.testing import CliRunner
-from report_results import MACHINE, SIZE, cells_of, light_field, linked
+from report_results import MACHINE, SIZE, cells_of, light_field, linked, renamed
 
 from sepi.errors import SepiError
 from sepi.io.scores import read_evaluations, write_scores
 from sepi.report import numbers
 from sepi.report.numbers import collect
-from sepi.report.plan import PARTS_TABLES, TABLES, Plan
-from sepi.report.runs import Runs
+from sepi.report.plan import Plan
+from sepi.report.runs import TENTHS, Runs, read_numbers
 
 
 @pytest.mark.parametrize("parts", [False, True])
 def test_numbers_read_their_declared_inputs_and_no_others(parts: bool, complete: Plan, tmp_path: Path) -> None:
     """The workflow collects them when these are there; one that is not read would make it run again for nothing."""
-    there = linked(complete, tmp_path, parts)
-    assert set(collect(there, parts=parts)["tables"]) == {name for name in TABLES if (name in PARTS_TABLES) == parts}
-    for path in there.number_inputs(parts):
+    there = linked(complete.parts_of_best() if parts else complete.main(), tmp_path)
+    collect(there)
+    for path in there.number_inputs():
         away = path.rename(path.with_name("away"))
         with pytest.raises(SepiError, match=re.escape(str(path))):
-            collect(there, parts=parts)
+            collect(there)
         away.rename(path)
 
 
@@ -36,7 +36,7 @@ def test_numbers_read_their_declared_inputs_and_no_others(parts: bool, complete:
 def test_a_missing_or_broken_file_is_one_line(
     ending: str, content: bytes | None, complete: Plan, tmp_path: Path
 ) -> None:
-    there = linked(complete, tmp_path / "results")
+    there = linked(complete.main(), tmp_path / "results")
     path = next(path for path in there.number_inputs() if path.name.endswith(ending))
     path.unlink()
     if content is not None:
@@ -64,12 +64,13 @@ def test_a_map_without_scores_is_named(plan: Plan, tmp_path: Path) -> None:
 
 def test_numbers_say_what_they_are_of(complete: Plan, tmp_path: Path) -> None:
     """Versions and parameters are those that the maps were made with, wherever and whenever they are collected."""
-    there = linked(complete, tmp_path)
+    there = linked(complete.main(), tmp_path)
     path = there.stage_file("hci", "cotton", "paper", "optimize", "time.json")
     changed = json.loads(path.read_text()) | {"machine": {**MACHINE, "sepi": "0.0.2"}, "parameters": {"words": 1}}
     path.unlink()
     path.write_text(json.dumps(changed))
-    found = collect(there)
+    runs = collect(there)
+    found = runs.facts
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d[+-]\d\d:\d\d", found["made"]["date"])
     assert found["made"]["machines"] == [MACHINE, {**MACHINE, "sepi": "0.0.2"}]
     assert found["protocols"] == {"paper": 0, "benchmark": 15}
@@ -98,47 +99,56 @@ def test_numbers_say_what_they_are_of(complete: Plan, tmp_path: Path) -> None:
         "ground_truth_sha256": hashlib.sha256(known.ground_truth.tobytes()).hexdigest(),
     }
     assert scene["light_field"] == expected
-    assert list(scene["stages"])[:2] == ["sepi", "sepi/half_sepi"]
-    first = scene["stages"]["sepi"]
-    assert (first["stage"], first["seconds"], first["peak_memory_mb"]) == ("initial", 1.5, 270)
-    assert first["scores"]["paper"]["all"]["mse100"] == pytest.approx(16)
-    pixels, said, shares = scene["stages"][complete.stage_key("best", "optimize")]["reliability"]
+    first = runs.maps.xs(("paper", "initial"), level=("variant", "stage"))
+    assert [*first.xs("", level="protocol")[["seconds", "peak_memory_mb"]].iloc[0]] == [1.5, 270]
+    assert [*first.xs(("paper", "all"), level=("protocol", "region"))["mse100"]] == pytest.approx([16])
+    assert not first.index.isin([TENTHS], level="protocol").any(), "no final map"
+    pixels, said, shares = runs.reliability("best", [("hci", "cotton")])
     assert (pixels[5], said[5], shares[5]) == (SIZE**2, 0.5, 1.0)
-    assert first["reliability"] is None, "no final map"
     spo = scene["external"]["SPO"]
     assert (spo["problem"], spo["source"], spo["sha256"]) == ("", "/maps/some.pfm", 64 * "a")
-    assert spo["scores"]["benchmark"]["all"]["mse100"] == pytest.approx(4)
+    assert [
+        *runs.maps.xs(("SPO", "benchmark", "all"), level=("variant", "protocol", "region"))["mse100"]
+    ] == pytest.approx([4])
 
 
 def test_numbers_of_the_parts_hold_only_these(complete: Plan) -> None:
-    (scene,) = collect(complete, parts=True)["scenes"]
-    assert set(scene) == {"dataset", "scene", "stages"}
-    assert set(scene["stages"]) == {
-        *(complete.stage_key("best", stage) for stage in complete.stages),
-        complete.stage_key("best_wls", "optimize"),
-    }
-    assert [stage["scores"] is None for stage in scene["stages"].values()] == [True, True, True, False, False]
+    runs = collect(complete.parts_of_best())
+    assert runs.facts["scenes"] == [{"dataset": "hci", "scene": "cotton"}]
+    assert set(runs.numbers["variant"]) == {"best", "best_wls"}
+    assert set(runs.numbers.loc[runs.numbers["score"] == "mse100", "stage"]) == {"optimize"}
+    assert len(runs.numbers[runs.numbers["score"] == "seconds"]) == 2 * len(complete.stages)
 
 
-def test_a_stage_that_hands_its_maps_on_has_scores_and_no_time(found: dict[str, Any]) -> None:
-    runs = Runs(found)
-    scores, handed_on = (runs.scores("hci", "cotton", "no_occlusion", stage) for stage in ("initial", "occlusion"))
-    assert handed_on == scores
-    assert runs.timing("hci", "cotton", "no_occlusion", "occlusion").seconds == 0
-    assert runs.timing("hci", "cotton", "no_occlusion", "optimize").seconds == 1.5
+def test_a_stage_that_hands_its_maps_on_has_scores_and_no_time(found: Runs) -> None:
+    of_variant = found.maps.xs(("cotton", "no_occlusion"), level=("scene", "variant"))
+    before, handed_on = (
+        of_variant.xs((stage, "paper"), level=("stage", "protocol")).reset_index(drop=True)
+        for stage in ("initial", "occlusion")
+    )
+    pd.testing.assert_frame_equal(handed_on, before)
+    took = found.took(("hci", "cotton"), "no_occlusion")["seconds"]
+    assert [*took.fillna(0)] == [1.5, 0, 1.5, 1.5]
 
 
-def test_a_score_over_no_pixels_is_null_and_comes_back(found: dict[str, Any]) -> None:
-    """JSON has no NaN (numbers_of refuses one): a browser refuses a file that does."""
-    (flat,) = [scene for scene in found["scenes"] if scene["scene"] == "flat"]
-    assert flat["stages"]["sepi"]["scores"]["paper"]["occluded"]["mse100"] is None
-    assert np.isnan(Runs(found).final("builtin", "flat", "mse100", "occluded"))
+def test_a_score_over_no_pixels_comes_back(found: Runs) -> None:
+    assert np.isnan(found.of("mse100", "builtin", "occluded").at["flat", "ours"])
     cells = cells_of(found, "table4_ablation", "builtin", "flat")
-    assert (cells["paper"]["text"], cells["paper"]["value"]) == ("4.00/n/a/4.00", 4)
+    assert cells["paper"][:2] == ("4.00/n/a/4.00", 4)
 
 
 def test_numbers_are_the_same_text_each_time(plan: Plan) -> None:
     """All but when and where they were made; a difference shows one score per line."""
-    one, two = (numbers.as_text(collect(plan) | {"made": {}}) for _ in range(2))
-    assert one == two
-    assert re.search(r'^ +"pixels": 1600,?$', one, re.MULTILINE)
+    one, two = (collect(plan) for _ in range(2))
+    pd.testing.assert_frame_equal(one.numbers, two.numbers)
+    assert {**one.facts, "made": 0} == {**two.facts, "made": 0}
+
+
+def test_files_hold_every_digit(found: Runs, tmp_path: Path) -> None:
+    """Tables made of files are those of the run; names that look like numbers or like nothing stay names."""
+    names = {"cotton": "007", "mine": "nan", "dots": ' a,"b"\r\n\x85'}
+    runs = renamed(found, names)
+    numbers.write_numbers(runs, tmp_path / "a.json")
+    again = read_numbers(tmp_path / "a.json")
+    pd.testing.assert_frame_equal(again.numbers, runs.numbers, check_exact=True)
+    assert again.facts == runs.facts

@@ -1,92 +1,93 @@
 """The command that writes the tables, and what holds for all of them."""
 
 import csv
-import json
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 from report_results import csv_rows, markdown, only, renamed, report_of
 
 from sepi.external import NO_FILE
 from sepi.report import numbers, tables
-from sepi.report.plan import PARTS_TABLES, TABLES
-from sepi.report.tabular.latex import as_latex
-from sepi.report.tabular.layout import as_csv, as_json
+from sepi.report.plan import TABLES
+from sepi.report.runs import KEYS, Runs
+from sepi.report.tabular.formats import as_csv, as_latex
 
-MAIN_TABLES = [name for name in TABLES if name not in PARTS_TABLES]
-
-
-def test_every_table_is_written_thrice_and_the_same_each_time(found: dict[str, Any], tmp_path: Path) -> None:
-    path = tmp_path / "report.json"
-    path.write_text(numbers.as_text(found), encoding="utf-8")
-    for folder in (tmp_path / "one", tmp_path / "two"):
-        result = CliRunner().invoke(tables.command, ["--numbers", str(path), "--output", str(folder)])
-        assert result.exit_code == 0, result.output
-        assert {file.name for file in folder.iterdir()} == {
-            f"{name}.{ending}" for name in MAIN_TABLES for ending in ("csv", "md", "tex")
-        }
-    for file in (tmp_path / "one").iterdir():
-        assert file.read_bytes() == (tmp_path / "two" / file.name).read_bytes()
+MAIN_TABLES = TABLES[""]
 
 
-def test_one_table_alone(found: dict[str, Any], tmp_path: Path) -> None:
-    path = tmp_path / "report.json"
-    path.write_text(numbers.as_text(found), encoding="utf-8")
-    words = ["--numbers", str(path), "--output", str(tmp_path / "out"), "--table", "runtime"]
-    assert CliRunner().invoke(tables.command, words).exit_code == 0
-    assert {file.stem for file in (tmp_path / "out").iterdir()} == {"runtime"}
+def run_tables(folder: Path, output: Path, *more: str) -> Result:
+    """The command, with the numbers ``a.json`` and ``a.csv`` of a folder."""
+    return CliRunner().invoke(tables.command, ["--numbers", str(folder / "a.json"), "--output", str(output), *more])
+
+
+def test_every_table_is_written_thrice_and_the_same_each_time(found: Runs, tmp_path: Path) -> None:
+    numbers.write_numbers(found, tmp_path / "a.json")
+    one, two, alone = (tmp_path / name for name in ("one", "two", "alone"))
+    for folder, words in ((one, ()), (two, ()), (alone, ("--table", "runtime"))):
+        assert run_tables(tmp_path, folder, *words).exit_code == 0
+    endings = ("csv", "md", "tex")
+    assert {file.name for file in one.iterdir()} == {f"{name}.{ending}" for name in MAIN_TABLES for ending in endings}
+    assert {file.name for file in alone.iterdir()} == {f"runtime.{ending}" for ending in endings}
+    for file in one.iterdir():
+        assert file.read_bytes() == (two / file.name).read_bytes()
+
+
+HEADS = ",".join([*KEYS, "score", "value"])
 
 
 @pytest.mark.parametrize(
-    ("content", "arguments", "message"),
+    ("name", "content", "message"),
     [
-        (None, [], "cannot be read"),
-        ("{", [], "not JSON"),
-        ('{"plan": {}}', [], "not the numbers of a report"),
-        (
-            '{"plan": {}, "scenes": [], "tables": {"runtime": {}}}',
-            ["--table", "ablation_best"],
-            "tables: unknown 'ablation_best'; known: runtime",
-        ),
+        ("a.json", None, "cannot be read"),
+        ("a.json", "{", "not JSON"),
+        ("a.json", '{"plan": {}}', "not the numbers of a report"),
+        ("a.csv", None, "cannot be read"),
+        ("a.csv", "", "not the numbers of a report"),
+        ("a.csv", "[]", "not the numbers of a report"),
+        ("a.csv", "a,b\n1,2\n", "not the numbers of a report"),
+        ("a.csv", "\xff", "not the numbers of a report"),
+        ("a.csv", f"{HEADS}\n1,2,3,4,5,6,7,8,words\n", "not the numbers of a report"),
+        ("a.csv", f"{HEADS}\n1,2,3,4,5,6,7,8,\n", "not the numbers of a report"),
     ],
 )
-def test_wrong_numbers_are_one_line(content: str | None, arguments: list[str], message: str, tmp_path: Path) -> None:
-    path = tmp_path / "report.json"
+def test_wrong_numbers_are_one_line(name: str, content: str | None, message: str, found: Runs, tmp_path: Path) -> None:
+    """Of another program, or edited."""
+    numbers.write_numbers(found, tmp_path / "a.json")
+    (tmp_path / name).unlink()
     if content is not None:
-        path.write_text(content)
-    words = ["--numbers", str(path), "--output", str(tmp_path / "out"), *arguments]
-    result = CliRunner().invoke(tables.command, words)
+        (tmp_path / name).write_bytes(content.encode("latin-1"))
+    result = run_tables(tmp_path, tmp_path / "out")
     assert result.exit_code == 1
-    assert result.output.startswith(f"sepi: {path}: {message}")
+    assert result.output.startswith(f"sepi: {tmp_path / name}: {message}")
     assert len(result.output.splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("table", MAIN_TABLES)
-def test_the_page_and_the_tables_show_the_same(table: str, external: dict[str, Any]) -> None:
-    """The HTML page shows what JSON says, a paper what LaTeX says: no figure may differ."""
-    report = report_of(external, table)
-    shown = external["tables"][table]
-    assert shown == json.loads(json.dumps(as_json(report)))
-    assert {"title", "caption", "sections"} == set(shown)
-    signs = {"best": "**", "second": "*", None: ""}
+def test_a_table_of_another_report_is_told(found: Runs, tmp_path: Path) -> None:
+    numbers.write_numbers(found, tmp_path / "a.json")
+    result = run_tables(tmp_path, tmp_path, "--table", "ablation_best")
+    assert "a.json: tables: unknown 'ablation_best'; " in result.output
+
+
+@pytest.mark.parametrize("name", MAIN_TABLES)
+def test_the_page_and_the_tables_show_the_same(name: str, external: Runs) -> None:
+    """The HTML page shows what sections say, a paper what LaTeX says: no figure may differ."""
+    found = report_of(external, name)
+    signs = {"best": "**", "second": "*", "": ""}
     expected = []
-    for section in shown["sections"]:
-        expected.append([column["head"] for column in section["columns"]])
-        expected += [
-            [f"{signs[c['mark']]}{c['text']}{signs[c['mark']]}" for c in row["cells"]] for row in section["rows"]
-        ]
-    lines = [line for line in markdown(external, table).splitlines() if line.startswith("| ")]
+    for section in found.sections:
+        expected.append([head.text for head in section.heads])
+        expected += [[f"{signs[mark]}{text}{signs[mark]}" for text, _, mark in cells] for *_, cells in section.lines]
+    lines = [line for line in markdown(external, name).splitlines() if line.startswith("| ")]
     rows = [[cell.strip().replace("\\", "") for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
     assert rows == expected
-    in_latex = [line for line in as_latex(report, table).splitlines() if line.endswith(r"\\")]
+    in_latex = [line for line in as_latex(found, name).splitlines() if line.endswith(r"\\")]
     assert [line.count(" & ") + 1 for line in in_latex] == [len(row) for row in expected]
 
 
-def test_no_name_of_the_users_breaks_a_table(external: dict[str, Any]) -> None:
+def test_no_name_of_the_users_breaks_a_table(external: Runs) -> None:
     """Folders may have any name."""
     scene, method = "_a_ | b\\|c\n<img> *d* `e` & [f](g) #1 ~~h~~", 'x,"y"; | 50 % $z^2$ {\\end}'
     found = renamed(external, {"mine": scene, "SPO": method})
@@ -99,8 +100,8 @@ def test_no_name_of_the_users_breaks_a_table(external: dict[str, Any]) -> None:
                 bare = re.sub(r"\\.", "", line).replace("**", "").replace("*", "")
                 assert not re.search(r"[<>`\[\]&~\\]|(?<!\w)_|_(?!\w)", bare), line
                 if not bare.strip("| -:"):
-                    assert bare.count("|") == len(next(sections).columns) + 1
+                    assert bare.count("|") == len(next(sections).heads) + 1
         assert next(sections, None) is None
         rows = list(csv.reader(as_csv(report).splitlines(keepends=True)))
-        assert {len(row) for row in rows} == {len(report.heads)}
+        assert {len(row) for row in rows} == {len(report.rows.columns)}
     assert only(csv_rows(found, "table1_mse"), scene=scene)[method] == NO_FILE

@@ -3,10 +3,12 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from sepi.io.pfm import read_pfm
-from sepi.report.tabular.edges import edge_budget
+from sepi.io.scores import Scores
+from sepi.report.tabular.scores import edge_budget
 from sepi.scoring.edges import LEAST_DISCONTINUITY, REACH, edges_of, fattening_and_thinning
 from sepi.scoring.scores import score
 
@@ -82,6 +84,10 @@ def test_equals_a_plain_twin() -> None:
     assert (scores["fattening"], scores["thinning"]) == pytest.approx(found)
 
 
+def budget(whole: Scores, there: Scores) -> pd.Series:
+    return edge_budget(*(pd.DataFrame([one]) for one in (whole, there))).iloc[0]
+
+
 def test_the_budget_adds_up() -> None:
     """What lies there and what lies away are the whole, or the table's shares mislead."""
     random = np.random.default_rng(5)
@@ -89,7 +95,7 @@ def test_the_budget_adds_up() -> None:
     estimate[2, 3] = estimate[10, 15] = np.nan
     region = edges_of(SQUARE).region
     there, away = score(estimate, SQUARE, region=region), score(estimate, SQUARE, region=~region)
-    found = edge_budget(score(estimate, SQUARE), there)
+    found = budget(score(estimate, SQUARE), there)
     assert found["area"] == pytest.approx(100 * region.mean())
     assert found["mse100_away"] == pytest.approx(away["mse100"])
     assert found["badpix007_away"] == pytest.approx(away["badpix007"])
@@ -103,7 +109,7 @@ def test_a_budget_of_nothing_is_no_crash(estimate: np.ndarray) -> None:
     flat = np.zeros_like(SQUARE)
     for ground_truth in (SQUARE, flat):
         whole = score(estimate, ground_truth)
-        found = edge_budget(whole, score(estimate, ground_truth, region=edges_of(ground_truth).region))
+        found = budget(whole, score(estimate, ground_truth, region=edges_of(ground_truth).region))
         assert found["area"] == pytest.approx(100 * edges_of(ground_truth).region.mean())
         assert np.isfinite(found["squared_error"]) == (whole["mse100"] > 0)
 

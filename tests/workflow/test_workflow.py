@@ -95,13 +95,10 @@ def external(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return methods | dict.fromkeys(NAMED, methods["good"])
 
 
-# in place of Python: a stage's maps are the paper's, and the graph of the rules is empty
+# in place of Python: a stage's maps are the paper's
 STAND_IN = """#!/bin/sh
 case "$2" in
     {stages}) ;;
-    sepi.report.graph)
-        echo "<svg/>" >reports/page/rules.svg
-        exit ;;
     *) exec {python} "$@" ;;
 esac
 for word; do
@@ -118,7 +115,7 @@ done
 def finished(workflow: Workflow, external: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Workflow:
     """The workflow after ``snakemake all``, with other methods' maps; its output is in the file stdout.
 
-    The stages of the paper's variant and of ``best`` are run for real; the graph is made in the tests of modules.
+    The stages of the paper's variant and of ``best`` are run for real.
     """
     done = replace(workflow, folder=workflow.folder.with_name("finished")).with_config(external=external)
     first = done.run(*(f"results/hci/box/{name}/result.h5" for name in ("paper", "best")))

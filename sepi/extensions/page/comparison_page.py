@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from sepi.extensions.page.page import SCRIPTS, colour_scales, embedded_scenes, environment
 from sepi.extensions.page.viewer import viewer_json
 from sepi.io.scores import AllScores
 from sepi.lightfield import FloatMap, LightField
 from sepi.report.panels import Panel
-from sepi.report.tabular.layout import BEST, Column, Entry, Kind, Line, Section, entry
+from sepi.report.tabular.table import BEST, Head, Kind, Section, section
 from sepi.scoring.error_bars import ERROR_BAR_SCORES, ErrorBars
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, SCORES, region_masks, score_regions
 from sepi.stage import StageMaps
@@ -135,31 +135,32 @@ def _limits(found: Comparison) -> tuple[float, float]:
     return (low, high) if low < high else (low - 0.5, high + 0.5)
 
 
-def _score_section(found: Comparison) -> dict[str, Any] | None:
+def _score_section(found: Comparison) -> Section | None:
     """A table for the page: for each protocol and region, the scores of both maps, with the better one marked."""
     if not found.scores:
         return None
-    heads = SCORES | EDGE_SCORES | ERROR_BAR_SCORES | COUNTS
-    with_bars = any(bars is not None for bars in found.bars)
-    shown = (*_SHOWN, *_WITH_BARS) if with_bars else _SHOWN
-    columns = [Column("protocol", Kind.TEXT), Column("region", Kind.TEXT)]
-    columns += [Column(f"{heads[name]}, {title}", Kind.OURS) for name in shown for title in found.names]
-    rows = []
-    one, other = found.scores.values()
-    for protocol, regions in one.items():
+    titles = SCORES | EDGE_SCORES | ERROR_BAR_SCORES | COUNTS
+    scores = (*_SHOWN, *(_WITH_BARS if any(bars is not None for bars in found.bars) else ()))
+    heads = {"protocol": Head("protocol", Kind.TEXT), "region": Head("region", Kind.TEXT)}
+    heads |= {
+        f"{score} {name}": Head(f"{titles[score]}, {name}", Kind.OURS) for score in scores for name in found.names
+    }
+    rows, marks = [], []
+    for protocol, regions in next(iter(found.scores.values())).items():
         for region in regions:
-            cells = [entry(protocol, Kind.TEXT), entry(region, Kind.TEXT)]
-            for name in shown:
-                pair = [scores[protocol][region].get(name) for scores in (one, other)]
-                cells += [_cell(value, pair, ranked=name not in _WITH_BARS) for value in pair]
-            rows.append(Line(cells))
-    return asdict(Section("", columns, rows))
+            row = {"protocol": protocol, "region": region}
+            better: dict[str, str] = {}
+            for score in scores:
+                pair = {f"{score} {name}": of[protocol][region].get(score) for name, of in found.scores.items()}
+                row |= {key: _text(value) for key, value in pair.items()}
+                known = [value for value in pair.values() if value is not None and score not in _WITH_BARS]
+                better |= {key: BEST for key, value in pair.items() if known and value in known and value < max(known)}
+            rows.append(row)
+            marks.append(better)
+    return section("", heads, pd.DataFrame(rows), pd.DataFrame(marks))
 
 
-def _cell(value: float | None, pair: list[float | None], ranked: bool) -> Entry:
+def _text(value: float | None) -> str:
     if value is None:
-        return Entry("no interval", None, Kind.OURS)
-    known = not np.isnan(value)
-    text = "n/a" if not known else str(value) if isinstance(value, int) else f"{value:.3f}"
-    better = ranked and known and value == min(one for one in pair if one is not None) and pair[0] != pair[1]
-    return Entry(text, value if known else None, Kind.OURS, BEST if better else None)
+        return "no interval"
+    return "n/a" if np.isnan(value) else str(value) if isinstance(value, int) else f"{value:.3f}"

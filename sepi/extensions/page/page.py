@@ -19,6 +19,7 @@ from sepi.process.command import SepiCommand
 from sepi.report import page_data, published
 from sepi.report.plots.pictures import error_scale, scale_colours
 from sepi.report.runs import Runs, read_json, read_numbers
+from sepi.report.tables import table
 from sepi.workflow.rendered_scenes import DATASET
 
 SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "tables.js", "page.js")
@@ -63,22 +64,19 @@ def colour_scales() -> dict[str, str]:
 
 
 def page_of(
-    numbers: Mapping[str, Any],
+    runs: Runs,
     scenes: Sequence[Mapping[str, Any]],
-    graph: str,
-    parts: Mapping[str, Any] | None = None,
+    parts: Runs | None = None,
 ) -> str:
     """The page of a report.
 
     Parameters
     ----------
-    numbers : mapping
-        From ``sepi.report.numbers``.
+    runs : Runs
+        The numbers of the report.
     scenes : sequence of mapping
         From ``sepi.report.figures``.
-    graph : str
-        SVG of the rule graph.
-    parts : mapping, optional
+    parts : Runs, optional
         Numbers of the ablation of the best variant.
 
     Returns
@@ -86,20 +84,17 @@ def page_of(
     str
         HTML.
     """
-    runs = Runs(numbers)
     # averages over rendered scenes and levels of noise mean nothing, and no published figures exist
     averaged = runs.plan.report != DATASET
     first_title = page_data.first_scene(runs)
     shown = [scene for scene in scenes if f"{scene['dataset']}/{scene['scene']}" == first_title] or scenes
-    tables = {name: numbers["tables"][name] for name in runs.plan.tables() if name in numbers["tables"]}
-    if parts is not None:
-        tables |= {name: table for name, table in parts["tables"].items() if name not in tables}
+    tables = {name: table(name, found) for found in (runs, parts) if found is not None for name in found.plan.tables}
     return (
         environment()
         .get_template("index.html.j2")
         .render(
             title="sepi: light field depth by stitched epipolar plane images",
-            numbers=numbers,
+            numbers=runs.facts,
             report=runs.plan.report,
             variants=page_data.shown_variants(runs, parts),
             tables=tables,
@@ -107,11 +102,10 @@ def page_of(
             missing=page_data.missing_scenes(runs) if averaged else {},
             dataset_titles=published.DATASETS,
             bars=page_data.ablation_bars(runs) if averaged else [],
-            part_bars=[] if parts is None else page_data.part_bars(Runs(parts)),
+            part_bars=[] if parts is None else page_data.part_bars(parts),
             times=page_data.stage_times(runs),
-            total_seconds=page_data.total_seconds(*filter(None, (numbers, parts))),
-            parameters=page_data.parameter_rows(numbers),
-            graph=Markup(graph),
+            total_seconds=page_data.total_seconds(*filter(None, (runs, parts))),
+            parameters=page_data.parameter_rows(runs),
             scenes=embedded_scenes(scenes),
             first=shown[0] if shown else None,
             first_title=first_title,
@@ -146,16 +140,14 @@ _FILE = click.Path(path_type=Path)
 @click.command(name="python -m sepi.extensions.page.page", cls=SepiCommand)
 @click.option("--numbers", "numbers_path", type=_FILE, required=True, help="Numbers of the report (JSON).")
 @click.option("--parts", "parts_path", type=_FILE, help="Numbers of the best variant's parts (JSON).")
-@click.option("--graph", "graph_path", type=_FILE, required=True, help="Rule graph (SVG).")
 @click.option("--output", type=_FILE, required=True, help="Page to write.")
 @click.option("--scenes", type=_FILE, required=True, help="Folder of DATASET/SCENE.json, from sepi.report.figures.")
-def command(numbers_path: Path, parts_path: Path | None, graph_path: Path, output: Path, scenes: Path) -> None:
+def command(numbers_path: Path, parts_path: Path | None, output: Path, scenes: Path) -> None:
     """Write the page of a report, with the scenes of its numbers."""
-    numbers = read_numbers(numbers_path)
+    runs = read_numbers(numbers_path)
     html = page_of(
-        numbers,
-        [read_scene(scenes / dataset / f"{scene}.json") for dataset, scene in Runs(numbers).plan.pictured],
-        graph_path.read_text(encoding="utf-8"),
+        runs,
+        [read_scene(scenes / dataset / f"{scene}.json") for dataset, scene in runs.plan.pictured],
         None if parts_path is None else read_numbers(parts_path),
     )
     with atomic_path(output) as temporary:

@@ -5,9 +5,9 @@ TEMPLATES = sorted(Path(find_spec("sepi.extensions.page").origin).with_name("tem
 # Page of a report: all numbers, tables and scenes in one file
 rule page:
     input:
-        numbers=lambda wildcards: f"reports/report{report_of(wildcards).ending()}.json",
-        parts=lambda wildcards: [] if wildcards.report else PARTS,
-        graph="reports/page/rules.svg",
+        numbers=lambda wildcards: multiext(f"reports/report{report_of(wildcards).ending}", ".json", ".csv"),
+        published=sorted(PUBLISHED.glob("*.csv")),
+        parts=lambda wildcards: [] if wildcards.report else PARTS_OF_BEST,
         scenes=pages_of_scenes,
         templates=TEMPLATES,
     output:
@@ -21,13 +21,13 @@ rule page:
     resources:
         mem_mb=1000,
     params:
-        parts=lambda wildcards, input: ["--parts", input.parts] if input.parts else [],
+        parts=lambda wildcards, input: ["--parts", input.parts[0]] if input.parts else [],
         scenes=folder_of_scenes,
         code=code_digest("sepi.extensions.page.page"),
     message:
         "page of the report"
     shell:
         command(
-            "sepi.extensions.page.page --numbers {input.numbers:q} {params.parts:q} --graph {input.graph:q} "
+            "sepi.extensions.page.page --numbers {input.numbers[0]:q} {params.parts:q} "
             "--scenes {params.scenes:q} --output {output:q} 2> {log:q}"
         )

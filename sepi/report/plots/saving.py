@@ -30,6 +30,13 @@ def new_figure(width: float, height: float, layout: Literal["constrained"] | Non
     return figure
 
 
+def save_sentence(folder: Path, name: str, text: str) -> None:
+    """Write a figure of words alone, in place of a chart that has nothing to show."""
+    figure = new_figure(4.2, 1)
+    figure.text(0.5, 0.5, text, ha="center", va="center", fontsize=8)
+    save(figure, folder, name)
+
+
 def save(figure: Figure, folder: Path, name: str, endings: Sequence[str] = BOTH) -> None:
     """Write a figure as ``NAME.ENDING`` for each ending, each file whole or not at all."""
     if figure.get_layout_engine() is not None:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
-from statistics import mean, stdev
+import itertools
+from collections.abc import Mapping
 
-from sepi.io.scores import Scores
+import pandas as pd
+
 from sepi.report.pooled import level_of
-from sepi.report.runs import Runs
+from sepi.report.runs import Runs, weighted_means
 from sepi.report.tabular import methods
-from sepi.report.tabular.layout import Cell, Column, Kind, Record, Report, line, ranks, section
-from sepi.report.tabular.methods import Method
+from sepi.report.tabular.table import Head, Kind, Table, ranks, section, shown
 from sepi.scoring.scores import DISCONTINUITIES, SCORES, WHOLE_MAP
-from sepi.workflow.rendered_scenes import DATASET, RenderedScene, rendered_scene
+from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 
 PROPERTIES = {
     "textured": "textured",
@@ -26,88 +25,79 @@ PROPERTIES = {
 }
 """Region to its name in the tables, in their order."""
 
-_Figure = Callable[[Method, str, str, int], Cell]
-"""Figure of a method, for a column's key, a level of noise and a seed."""
+
+_LEVEL = ["noise", "seed", "method"]
 
 
-def property_table(runs: Runs, score: str) -> Report:
+def property_table(runs: Runs, score: str) -> Table:
     """A section per level of noise, a row per method, a column per property, over the pixels of all scenes."""
-    pixels = _pixels(runs)
-    shown = {region: title for region, title in PROPERTIES.items() if pixels.get(region)}
-
-    def figure(method: Method, region: str, noise: str, seed: int) -> Cell:
-        scenes = [scene.name for scene in _scenes(runs) if (scene.noise, scene.seed) == (noise, seed)]
-        scores = [_scores(runs, method, scene) for scene in scenes]
-        if not all(scores):
-            problems = {runs.external_problem(DATASET, scene, method.name) for scene in scenes}
-            known = sum(map(bool, scores))
-            return problems.pop() if len(problems) == 1 else f"{known} of {len(scenes)} scenes"
-        if score == "q25":
-            return runs.pooled_q25(method.name, level_of(noise, seed), region)
-        return _pooled([found[region] for found in scores if region in found], score)
-
-    shares = ", ".join(f"{title} {100 * pixels[region] / pixels[WHOLE_MAP]:.1f} %" for region, title in shown.items())
-    return _report(
+    found = _final(runs)
+    scenes, together = found[found["world"] != ""], found[found["world"] == ""]
+    first = scenes[(scenes[_LEVEL] == scenes[_LEVEL].iloc[0]).all(axis=1)]
+    pixels = first.groupby("region")["pixels"].sum()
+    titles = {region: title for region, title in PROPERTIES.items() if pixels.get(region)}
+    # the squared error counts finite estimates only
+    counted = scenes["pixels"] - (scenes["non_finite"] if score == "mse100" else 0)
+    by = [scenes[name] for name in (*_LEVEL, "region")]
+    figures = (
+        together.set_index([*_LEVEL, "region"]) if score == "q25" else weighted_means(scenes[[score]], counted, by)
+    )
+    shares = ", ".join(f"{title} {100 * pixels[region] / pixels[WHOLE_MAP]:.1f} %" for region, title in titles.items())
+    return _table(
         runs,
         f"{SCORES[score]} by property",
         f"Of the pixels of all scenes together, not an average of scenes. Part of all pixels: {shares}; properties "
         "overlap. Depth steps: beside discontinuities of the ground truth; occluded: some view does not see it; alone: "
         "no other view sees it. ",
-        shown,
-        figure,
+        titles,
+        figures[score].unstack("region"),
     )
 
 
-def scene_table(runs: Runs, score: str) -> Report:
+def scene_table(runs: Runs, score: str) -> Table:
     """A section per level of noise, a row per method, a column per scene."""
-    worlds = dict.fromkeys(scene.world for scene in _scenes(runs))
-    heads = {world: world if world in runs.plan.choosing else f"{world} (held out)" for world in worlds}
-
-    def figure(method: Method, world: str, noise: str, seed: int) -> Cell:
-        scene = RenderedScene(world, noise, seed)
-        if scene not in _scenes(runs):
-            return None
-        found = _scores(runs, method, scene.name)
-        return found[WHOLE_MAP][score] if found else runs.external_problem(DATASET, scene.name, method.name)
-
-    return _report(runs, f"{SCORES[score]} by scene", "", heads, figure)
+    found = _final(runs)
+    heads = {name: name if name in runs.plan.choosing else f"{name} (held out)" for name in _worlds(runs)}
+    found = found[(found["region"] == WHOLE_MAP) & (found["world"] != "")]
+    figures = found.set_index([*_LEVEL, "world"])[score].unstack("world")
+    return _table(runs, f"{SCORES[score]} by scene", "", heads, figures, by_scene=True)
 
 
-def _report(runs: Runs, title: str, caption: str, heads: Mapping[str, str], figure: _Figure) -> Report:
-    every = [m for m in methods.compared_methods(runs.plan) if m.is_here]
-    rows = [m for m in every if m.kind == Kind.OURS or methods.has_column(runs, DATASET, m.name)]
-    levels: dict[str, set[int]] = {}
-    for scene in _scenes(runs):
-        levels.setdefault(scene.noise, set()).add(scene.seed)
-    columns = {"method": Column("method", Kind.TEXT), **{key: Column(head, Kind.OURS) for key, head in heads.items()}}
-    records: list[Record] = []
-    sections = []
-    for noise, seeds in levels.items():
-        cells = {
-            m.key: {key: _over_seeds([figure(m, key, noise, s) for s in sorted(seeds)]) for key in heads} for m in rows
-        }
-        marks = {
-            key: ranks({m.key: value for m in rows if isinstance(value := cells[m.key][key][0], float) and m.learning})
-            for key in heads
-        }
-        lines = []
-        for m in rows:
-            record: dict[str, Cell] = {"noise": noise, "seeds": len(seeds), "method": m.name}
-            for key, (value, spread) in cells[m.key].items():
-                record |= {key: value, f"{key}_sd": spread}
-            records.append(record)
-            notes = {key: f"± {spread:.2f}" for key, (_, spread) in cells[m.key].items() if spread is not None}
-            own_marks = {key: marks[key].get(m.key) for key in heads}
-            lines.append(line(columns, {**record, "method": m.head}, m.kind, marks=own_marks, notes=notes))
+def _table(
+    runs: Runs, title: str, caption: str, titles: Mapping[str, str], figures: pd.DataFrame, by_scene: bool = False
+) -> Table:
+    """The table of figures with rows noise, seed and method, and columns that have these titles."""
+    known = runs.methods[runs.methods["kind"].isin([Kind.OURS, Kind.EXTERNAL])]
+    shows = [kind == Kind.OURS or runs.has_column(DATASET, name) for name, kind in known[["name", "kind"]].to_numpy()]
+    known = known[shows]
+    scenes = {name: rendered_scene(name) for name in runs.plan.scenes[DATASET]}
+    heads = {"method": Head("method", Kind.TEXT), **{key: Head(head, Kind.OURS) for key, head in titles.items()}}
+    rows, sections = [], []
+    for noise in dict.fromkeys(scene.noise for scene in scenes.values()):
+        seeds = sorted({scene.seed for scene in scenes.values() if scene.noise == noise})
+        every = pd.MultiIndex.from_product([[noise], seeds, known.index], names=_LEVEL)
+        of_seeds = figures.reindex(index=every, columns=[*titles]).groupby("method", sort=False)
+        means = of_seeds.agg(lambda column: column.mean(skipna=False))
+        problems = pd.DataFrame("", means.index, means.columns)
+        for column, seed in itertools.product(titles, reversed(seeds)):
+            alike = [name for name, one in scenes.items() if one[1:] == (noise, seed)]
+            told = runs.problems(DATASET, [one for one in alike if not by_scene or scenes[one].world == column])
+            problems[column] = problems[column].mask(told[known.index] != "", told)
+        spreads = of_seeds.std().where((problems == "") & means.notna())
+        texts, precise = (shown(means, n, "" if by_scene else "n/a").where(problems == "", problems) for n in (2, 4))
+        rows.append(precise.join(spreads.add_suffix("_sd")).assign(noise=noise, seeds=len(seeds), method=known["name"]))
         over = f", {len(seeds)} seeds: mean (± standard deviation)" if len(seeds) > 1 else ""
-        sections.append(section(f"Noise {noise}{over}", columns, lines))
-    spreads = [f"{key}_sd" for key in heads] if any(len(seeds) > 1 for seeds in levels.values()) else []
-    return Report(
+        cells, marks = texts.assign(method=known["head"]), ranks(texts[known["learning"] != ""])
+        notes = shown(spreads).map(lambda text: text and f"± {text}")
+        sections.append(section(f"Noise {noise}{over}", heads, cells, marks, notes, list(known["kind"])))
+    # one seed has no spread
+    table = pd.concat(rows)[["noise", "seeds", "method", *titles, *(f"{key}_sd" for key in titles)]]
+    table = table if (table["seeds"] > 1).any() else table.drop(columns=[f"{key}_sd" for key in titles])
+    return Table(
         title,
         f"{methods.PROTOCOL_NOTE} {caption}{split_note(runs)}"
         + (f" {methods.EXTERNAL_NOTE}" if runs.plan.external else ""),
-        ["noise", "seeds", "method", *heads, *spreads],
-        records,
+        table,
         sections,
         "Marked: best and second best in a column, of what is computed here",
     )
@@ -115,43 +105,22 @@ def _report(runs: Runs, title: str, caption: str, heads: Mapping[str, str], figu
 
 def split_note(runs: Runs) -> str:
     """Sentence on the scenes on which parameters may be chosen."""
-    worlds = dict.fromkeys(scene.world for scene in _scenes(runs))
     parts = (("For choosing parameters", True), ("held out from that", False))
-    named = [(title, [world for world in worlds if (world in runs.plan.choosing) == chosen]) for title, chosen in parts]
+    named = [
+        (title, [one for one in _worlds(runs) if (one in runs.plan.choosing) == chosen]) for title, chosen in parts
+    ]
     return "; ".join(f"{title}: {', '.join(names)}" for title, names in named if names) + "."
 
 
-def _scenes(runs: Runs) -> list[RenderedScene]:
-    return [rendered_scene(name) for name in runs.plan.scenes[DATASET]]
+def _worlds(runs: Runs) -> list[str]:
+    """Rendered scenes, without their noise."""
+    return list(dict.fromkeys(rendered_scene(name).world for name in runs.plan.scenes[DATASET]))
 
 
-def _scores(runs: Runs, method: Method, scene: str) -> Mapping[str, Scores]:
-    """Region to scores of a method's final map; empty without a map."""
-    of = runs.scores if method.kind == Kind.OURS else runs.external_scores
-    return of(DATASET, scene, method.name).get("paper", {})
-
-
-def _pixels(runs: Runs) -> dict[str, float]:
-    """Number of pixels of each region in all scenes of one level of noise."""
-    found: dict[str, float] = {}
-    first = _scenes(runs)[0]
-    for scene in _scenes(runs):
-        if (scene.noise, scene.seed) == (first.noise, first.seed):
-            for region, scores in runs.scores(DATASET, scene.name, runs.plan.compared[0])["paper"].items():
-                found[region] = found.get(region, 0) + scores["pixels"]
-    return found
-
-
-def _pooled(scores: Sequence[Scores], score: str) -> float:
-    """Mean of a score over the pixels of several maps; the squared error counts finite estimates only."""
-    weights = [one["pixels"] - (one["non_finite"] if score == "mse100" else 0) for one in scores]
-    known = [(one[score], weight) for one, weight in zip(scores, weights, strict=True) if weight]
-    return sum(value * weight for value, weight in known) / sum(weights) if known else math.nan
-
-
-def _over_seeds(figures: Sequence[Cell]) -> tuple[Cell, float | None]:
-    """Mean and standard deviation over seeds (None for one seed); a text in place of a missing figure."""
-    known = [figure for figure in figures if isinstance(figure, float)]
-    if len(known) < len(figures):
-        return next((figure for figure in figures if not isinstance(figure, float)), None), None
-    return mean(known), stdev(known) if len(known) > 1 else None
+def _final(runs: Runs) -> pd.DataFrame:
+    """Scores of the final maps of each scene, and of all of the same noise together, which have no world."""
+    names = {name: rendered_scene(name) for name in runs.plan.scenes[DATASET]}
+    names |= {level_of(name): scene._replace(world="") for name, scene in names.items()}
+    found = runs.final.loc[[DATASET]].reset_index()
+    parsed = pd.DataFrame(found["scene"].map(names).tolist(), columns=["world", "noise", "seed"])
+    return pd.concat([found, parsed], axis=1)

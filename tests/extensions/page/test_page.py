@@ -12,9 +12,10 @@ from typing import Any
 import cv2
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 import pytest
 from click.testing import CliRunner
-from page_example import COTTON, DOTS, EDGES, PICTURE, SIZE, Example
+from page_example import COTTON, DOTS, PICTURE, SIZE, Example
 
 from sepi.errors import SepiError
 from sepi.extensions.page import page
@@ -24,7 +25,6 @@ from sepi.extensions.page.viewer import CONFIDENCE, OTHER, PRECISE, STEPS, viewe
 from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
 from sepi.report import charts, figures, page_data, published
-from sepi.report.graph import drawn
 from sepi.report.panels import Kind, Panel, SceneResults, note_of, panels_of
 from sepi.report.plots.error_bars import write_error_bars
 from sepi.report.runs import Runs
@@ -239,10 +239,10 @@ def test_the_page_is_one_file(example: Example) -> None:
 def test_the_page_says_what_it_is_about(example: Example) -> None:
     """Datasets, variants, protocols, versions, machine, date, and total time; inputs with checksums, parameters."""
     text = re.sub(r"<wbr>", "", example.page.read_text(encoding="utf-8"))
-    made = example.numbers["made"]
+    made = example.numbers.facts["made"]
     for expected in (made["date"], *(made["machines"][0][key] for key in ("sepi", "processor", "numpy"))):
         assert str(expected) in text
-    for scene in example.numbers["scenes"]:
+    for scene in example.numbers.facts["scenes"]:
         assert scene["light_field"]["sha256"] in text
         assert f"{scene['dataset']}/{scene['scene']}" in text
     # two variants of four stages of 1.5 to 4.5 s on three scenes
@@ -265,17 +265,8 @@ def test_json_in_the_page_cannot_end_its_script() -> None:
     assert str(prose("a `b` <c> `d<e`")) == "a <code>b</code> &lt;c&gt; <code>d&lt;e</code>"
 
 
-def numbers_file(folder: Path, content: Any) -> Path:
-    path = folder / "numbers.json"
-    path.write_text(content if isinstance(content, str) else json.dumps(content))
-    return path
-
-
-def run_page(folder: Path, example: Example, numbers: Path | None = None) -> Any:
-    graph = folder / "rules.svg"
-    graph.write_text(drawn(EDGES))
-    numbers = numbers or numbers_file(folder, example.numbers)
-    words = ["--numbers", numbers, "--graph", graph, "--output", folder / "index.html", "--scenes", folder]
+def run_page(folder: Path, example: Example) -> Any:
+    words = ["--numbers", example.page.with_name("report.json"), "--output", folder / "index.html", "--scenes", folder]
     return CliRunner().invoke(page.command, list(map(str, words)), catch_exceptions=False)
 
 
@@ -326,16 +317,18 @@ def test_pictures_and_the_scene_for_the_page_come_from_one_command(example: Exam
 
 @pytest.fixture
 def runs(example: Example) -> Runs:
-    return Runs(example.numbers)
+    return example.numbers
 
 
 def score_of(
     example: Example, scene: tuple[str, str], variant: str, region: str = "all", name: str = "mse100"
 ) -> float:
     """A score of a final map, looked up in the numbers by hand."""
-    (found,) = [one for one in example.numbers["scenes"] if (one["dataset"], one["scene"]) == scene]
-    value = found["stages"]["/".join(example.plan.variants[variant].values())]["scores"]["paper"][region][name]
-    return float(value)
+    keys = {"dataset": scene[0], "scene": scene[1], "variant": variant, "stage": "optimize", "protocol": "paper"}
+    found = example.numbers.numbers
+    for key, text in (keys | {"region": region, "score": name}).items():
+        found = found[found[key] == text]
+    return float(found["value"].item())
 
 
 def test_headline_figures(runs: Runs, example: Example) -> None:
@@ -365,7 +358,7 @@ def test_ablation_bars(runs: Runs, example: Example) -> None:
     whole = groups["hci", "whole map"]
     bars = {bar.variant: bar for bar in whole.rows}
     assert (whole.scenes, whole.over) == (1, "")
-    assert bars["paper"].published == published.table4()["hci"]["paper"]["all"] == 4.34
+    assert bars["paper"].published == published.table4().at[("hci", "paper"), "all"] == 4.34
     assert bars["best"].published is None
     assert bars["paper"].ours == score_of(example, COTTON, "paper")
     assert whole.largest == max(score_of(example, COTTON, "paper"), score_of(example, COTTON, "best"), 4.34)
@@ -378,19 +371,15 @@ def test_ablation_bars(runs: Runs, example: Example) -> None:
 
 def test_averages_name_the_scenes_that_have_no_such_region(runs: Runs) -> None:
     """One scene's figure is not shown as the average of all."""
-    numbers = copy.deepcopy(dict(runs.numbers))
-    (dots,) = [scene for scene in numbers["scenes"] if scene["scene"] == "dots"]
-    numbers["plan"]["scenes"]["builtin"] = ["dots", "wall"]
-    wall = copy.deepcopy(dots) | {"scene": "wall"}
-    numbers["scenes"].append(wall)
-    for stage in wall["stages"].values():
-        stage["scores"]["paper"]["occluded"]["mse100"] = None
-    changed = Runs(numbers)
+    facts = copy.deepcopy(runs.facts) | {"plan": runs.facts["plan"] | {"scenes": {"builtin": ["dots", "wall"]}}}
+    wall = runs.numbers[runs.numbers["scene"] == "dots"].assign(scene="wall")
+    wall.loc[(wall["region"] == "occluded") & (wall["score"] == "mse100"), "value"] = np.nan
+    changed = Runs(facts, pd.concat([runs.numbers, wall]))
     groups = {group.region: group for group in page_data.ablation_bars(changed) if group.dataset == "builtin"}
     assert (groups["whole map"].over, groups["occluded"].over) == ("2 scenes", "1 of 2 scenes")
-    for stage in wall["stages"].values():
-        stage["scores"]["paper"]["all"]["mse100"] = None
-    assert page_data.headline(Runs(numbers))[-1]["notes"]["paper"] == "1/2 scenes"
+    wall.loc[wall["score"] == "mse100", "value"] = np.nan
+    changed = Runs(facts, pd.concat([runs.numbers, wall]))
+    assert page_data.headline(changed)[-1]["notes"]["paper"] == "1/2 scenes"
 
 
 def test_times(runs: Runs, example: Example) -> None:
@@ -404,18 +393,23 @@ def test_times(runs: Runs, example: Example) -> None:
 
 def test_the_first_scene(example: Example) -> None:
     """One that the paper has; else the last, the built-in ones being ordered from easy to hard."""
-    assert page_data.first_scene(Runs(example.numbers)) == "hci/cotton"
-    plan = example.numbers["plan"] | {"scenes": {"builtin": ["dots", "wall"]}}
-    assert page_data.first_scene(Runs(example.numbers | {"plan": plan})) == "builtin/wall"
+    assert page_data.first_scene(example.numbers) == "hci/cotton"
+    plan = example.numbers.facts["plan"] | {"scenes": {"builtin": ["dots", "wall"]}}
+    assert page_data.first_scene(replace(example.numbers, facts={"plan": plan})) == "builtin/wall"
 
 
 def test_charts_are_written_twice_the_same(example: Example, tmp_path: Path) -> None:
     """Each as a picture to look at and as one for a paper."""
-    numbers = numbers_file(tmp_path, example.numbers)
     wanted = ("ablation", "time_and_memory", "error_bars")
     # all are saved in one way
     for name, some in (("one", wanted), ("two", wanted[1:2])):
-        words = ["--numbers", numbers, *(f"--chart={chart}" for chart in some), "--output", tmp_path / name]
+        words = [
+            "--numbers",
+            example.page.with_name("report.json"),
+            *(f"--chart={chart}" for chart in some),
+            "--output",
+            tmp_path / name,
+        ]
         result = CliRunner().invoke(charts.command, list(map(str, words)), catch_exceptions=False)
         assert result.exit_code == 0, result.output
     one = tmp_path / "one"
@@ -437,6 +431,6 @@ def test_charts_are_written_twice_the_same(example: Example, tmp_path: Path) -> 
 def test_a_chart_without_a_scene_with_truth(example: Example, tmp_path: Path) -> None:
     """The rule promises the files: they come, and say why they are empty."""
     charts.write_bars(tmp_path, "ablation", [])
-    write_error_bars(tmp_path, "error_bars", [], [])
+    write_error_bars(tmp_path, "error_bars", replace(example.numbers, numbers=example.numbers.numbers.iloc[:0]))
     for name in ("ablation", "error_bars"):
         assert (cv2.imread(str(tmp_path / f"{name}.png")) < 128).any()

@@ -1,6 +1,5 @@
 """The report's page as a whole in a real browser: it opens from disk, can be read by everyone, and its tables sort."""
 
-import json
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -8,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import CLOUD, WIPE, canvas_pixels, choose, complains, opened, part, place_of, point_at, settled, show_scene
-from page_example import COTTON_TITLE, DOTS_TITLE, EDGES, PICTURE_TITLE, Example
+from page_example import COTTON_TITLE, DOTS_TITLE, PICTURE_TITLE, Example
 
 from sepi.extensions.page.page import page_of
-from sepi.report.graph import drawn
+from sepi.report.runs import Runs
+from sepi.report.tables import table
 
 
 def test_the_page_opens_from_disk_and_asks_for_nothing(page: Any) -> None:
@@ -264,11 +264,12 @@ def test_no_name_breaks_the_page_or_runs_as_code(browser: Any, example: Example,
     """Scenes, methods and labels may have any name."""
     attack = "<img src=x onerror=hacked()></script><script>hacked()</script> &amp; \"q\" 'r' ${x} {{ 7*7 }} \\u003c"
     names = {"cotton": f"c {attack}", "SPO": f"m {attack}", "asked for": f"l {attack}", "wrong_size": f"w {attack}"}
-    numbers = renamed(example.numbers, names)
-    numbers["parameters"]["initial"][attack] = [{attack: attack}]
+    facts = renamed(example.numbers.facts, names)
+    facts["parameters"]["initial"][attack] = [{attack: attack}]
+    numbers = Runs(facts, example.numbers.numbers.replace(names))
     scenes = renamed(example.scenes, names)
     page_file = tmp_path / "index.html"
-    page_file.write_text(page_of(numbers, scenes, drawn([*EDGES, ("page", "<b&\"'")])), encoding="utf-8")
+    page_file.write_text(page_of(numbers, scenes), encoding="utf-8")
     with opened(browser, page_file) as page:
         show_scene(page, f"hci/{names['cotton']}")
         choose(page, b=f"external/{names['SPO']}/disparity")
@@ -298,7 +299,7 @@ def test_external_maps_are_told_apart(same_page: Any) -> None:
 def test_a_page_without_scenes_opens(browser: Any, example: Example, tmp_path: Path) -> None:
     """Tables alone: nothing to draw, and no error."""
     page_file = tmp_path / "index.html"
-    page_file.write_text(page_of(example.numbers, [], drawn(EDGES)), encoding="utf-8")
+    page_file.write_text(page_of(example.numbers, []), encoding="utf-8")
     told: list[str] = []
     context = browser.new_context(offline=True)
     page = context.new_page()
@@ -321,13 +322,16 @@ def test_what_the_page_says_without_scripts(browser: Any, example: Example) -> N
     context.close()
 
 
-def test_the_page_prints_the_numbers_of_the_json(same_page: Any, example: Example) -> None:
-    """Every cell of every table stands in the page as the JSON has it."""
-    for name, table in example.numbers["tables"].items():
-        expected = [[cell["text"] for cell in row["cells"]] for section in table["sections"] for row in section["rows"]]
+def test_the_page_prints_the_numbers_of_the_tables(same_page: Any, example: Example) -> None:
+    """Every cell of every table stands in the page as it does in the table's files."""
+    best = 0
+    for name in example.plan.tables:
+        lines = [cells for section in table(name, example.numbers).sections for _, _, cells in section.lines]
         shown = same_page.eval_on_selector_all(
             f"#{name} tbody tr", "(rows) => rows.map((row) => [...row.cells].map((cell) => cell.textContent))"
         )
-        assert shown == expected, name
-    marks = json.dumps(example.numbers["tables"]["table1_mse"]).count('"best"')
-    assert same_page.locator("#table1_mse td .best").count() == marks > 5
+        assert shown == [[text for text, *_ in cells] for cells in lines], name
+        marks = sum(mark == "best" for cells in lines for *_, mark in cells)
+        assert same_page.locator(f"#{name} td .best").count() == marks
+        best += marks
+    assert best > 5

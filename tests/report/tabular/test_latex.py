@@ -1,14 +1,16 @@
 """LaTeX tables: no TeX system is needed here, so what one would stumble over is looked for in the text."""
 
 import re
+from pathlib import Path
 
+import pandas as pd
 import pytest
 
-from sepi.report.plan import PARTS_TABLES, TABLES
-from sepi.report.runs import Runs
-from sepi.report.tables import BUILDERS
-from sepi.report.tabular.latex import as_latex, escaped
-from sepi.report.tabular.layout import BEST, SECOND, Column, Kind, Line, Report, Section, entry
+from sepi.report.numbers import collect
+from sepi.report.plan import TABLES, Plan
+from sepi.report.tables import table
+from sepi.report.tabular.formats import as_latex
+from sepi.report.tabular.table import BEST, SECOND, Head, Kind, Section, Table, section
 
 SPECIALS = "\\ { } $ & # % _ ~ ^ < > | \" ' ` [ ] * -- ---"
 
@@ -16,17 +18,21 @@ SPECIALS = "\\ { } $ & # % _ ~ ^ < > | \" ' ` [ ] * -- ---"
 _COMMAND = re.compile(r"\\(begin|end)\{[a-z]+\*?\}|\\[a-zA-Z]+|\\[{}$&#%_]|\\\\$|\$\\(times|pm)\$")
 
 
-def report(sections: list[Section], caption: str = "All of it.", marked: str = "") -> Report:
-    return Report("Errors", caption, [], [], sections, marked)
+def in_latex(*sections: Section, caption: str = "All of it.", marked: str = "", name: str = "t") -> str:
+    text = as_latex(Table("Errors", caption, pd.DataFrame(), sections, marked), name)
+    require_sound(text)
+    return text
 
 
-def section(*lines: Line, heading: str = "", columns: int = 3) -> Section:
-    heads = [Column("scene", Kind.TEXT), *(Column(f"figure {i}") for i in range(1, columns))]
-    return Section(heading, heads, lines)
-
-
-def line(*cells: str | float | None, kind: str = "") -> Line:
-    return Line([entry(cell, Kind.OURS if index else Kind.TEXT) for index, cell in enumerate(cells)], kind)
+def rows(
+    *lines: list[str], heading: str = "", marks: dict[str, list[str]] | None = None, kinds: tuple[str, ...] = ()
+) -> Section:
+    """A section of scenes and figures."""
+    cells = pd.DataFrame(
+        lines or None, columns=["scene", *(f"figure {i}" for i in range(1, len(lines[0]) if lines else 3))]
+    )
+    heads = {name: Head(name, Kind.TEXT if name == "scene" else Kind.FIGURE) for name in cells}
+    return section(heading, heads, cells, marks=pd.DataFrame(marks), rows=kinds)
 
 
 def require_sound(text: str) -> None:
@@ -65,14 +71,15 @@ def body_of(text: str) -> list[str]:
 
 
 def test_a_table_with_its_rules_and_marks() -> None:
-    lines = [
-        Line([entry("cotton", Kind.TEXT), entry(0.5, Kind.OURS, BEST), entry("0.70", Kind.PUBLISHED, SECOND)], "scene"),
-        line("wall", float("nan"), None, kind="scene"),
-        line("Average of 2 scenes", 0.5, None, kind="average"),
-        line("Average as printed", None, 4.34, kind="average printed"),
-    ]
-    text = as_latex(report([section(*lines)], marked="Marked: the least"), "table1_mse")
-    require_sound(text)
+    lines = (
+        ["cotton", "0.50", "0.70"],
+        ["wall", "n/a", ""],
+        ["Average of 2 scenes", "0.50", ""],
+        ["As printed", "", "4.34"],
+    )
+    marks = {"figure 1": [BEST, "", "", ""], "figure 2": [SECOND, "", "", ""]}
+    kinds = ("scene", "scene", "average", "average printed")
+    text = in_latex(rows(*lines, marks=marks, kinds=kinds), marked="Marked: the least", name="table1_mse")
     assert body_of(text) == [
         r"scene & figure 1 & figure 2 \\",
         r"\midrule",
@@ -80,7 +87,7 @@ def test_a_table_with_its_rules_and_marks() -> None:
         r"wall & n/a &  \\",
         r"\midrule",
         r"Average of 2 scenes & 0.50 &  \\",
-        r"Average as printed &  & 4.34 \\",
+        r"As printed &  & 4.34 \\",
     ]
     assert r"\usepackage{booktabs}" in text.splitlines()[1]
     assert r"\begin{tabular}{@{}lrr@{}}" in text
@@ -89,9 +96,8 @@ def test_a_table_with_its_rules_and_marks() -> None:
 
 
 def test_each_section_is_a_table_with_a_label_of_its_own() -> None:
-    sections = [section(line("a", 1.0, 2.0), heading=heading) for heading in ("hci: HCI", "own", "own", "Own!")]
-    text = as_latex(report(sections), "stages")
-    require_sound(text)
+    sections = [rows(["a", "1.00", "2.00"], heading=heading) for heading in ("hci: HCI", "own", "own", "Own!")]
+    text = in_latex(*sections, name="stages")
     labels = re.findall(r"\\label\{(.*)\}", text)
     assert labels[:2] == ["tab:stages-hci-hci", "tab:stages-own"]
     assert len(set(labels)) == 4
@@ -100,8 +106,7 @@ def test_each_section_is_a_table_with_a_label_of_its_own() -> None:
 
 def test_wide_tables_take_both_columns_of_the_page() -> None:
     """Heads of 18 methods side by side fit only upright."""
-    text = as_latex(report([section(line("a", *map(float, range(17))), columns=18)]), "wide")
-    require_sound(text)
+    text = in_latex(rows(["a", *map(str, range(17))]))
     assert r"\begin{table*}" in text
     assert r"scene & \rotatebox{90}{figure 1} & " in text
     assert r"\usepackage{booktabs,graphicx}" in text
@@ -109,32 +114,32 @@ def test_wide_tables_take_both_columns_of_the_page() -> None:
 
 @pytest.mark.parametrize("name", ["[1]", "*a", "a_b & c", "50 % #1", r"\end{table}", "a\nb", "a--b---c", SPECIALS])
 def test_names_are_set_as_they_are(name: str) -> None:
-    text = as_latex(report([section(line(name, 1.0, None), heading=name)], caption=f"Of {name} and `{name}`."), "t")
-    require_sound(text)
+    text = in_latex(rows([name, "1.00", ""], heading=name), caption=f"Of {name} and `{name}`.")
     assert len(body_of(text)) == 3
 
 
-def test_escapes() -> None:
-    assert escaped("a_b & 5 % of #2") == r"a\_b \& 5 \% of \#2"
-    assert escaped("\\{}^~") == r"\textbackslash{}\{\}\textasciicircum{}\textasciitilde{}"
-    assert escaped("x × 2 ± 1") == r"x $\times$ 2 $\pm$ 1"
-    assert escaped("[a]*") == "{[}a{]}{*}"
-    assert escaped("a---b") == "a-{}-{}-b"
-    assert escaped("two\nlines") == "two lines"
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a_b & 5 % of #2", r"a\_b \& 5 \% of \#2"),
+        ("\\{}^~", r"\textbackslash{}\{\}\textasciicircum{}\textasciitilde{}"),
+        ("x × 2 ± 1", r"x $\times$ 2 $\pm$ 1"),
+        ("[a]*", "{[}a{]}{*}"),
+        ("a---b", "a-{}-{}-b"),
+        ("two\nlines", "two lines"),
+        ("variant `no_sepi`, 5 %", r"variant \texttt{no\_sepi}, 5 \%"),
+    ],
+)
+def test_escapes(text: str, expected: str) -> None:
+    assert rf"\caption{{Errors. {expected}}}" in in_latex(caption=text) + in_latex(rows(), caption=text)
 
 
-def test_names_of_the_program_are_in_typewriter_type() -> None:
-    text = as_latex(report([section()], caption="Variant `no_sepi`, 5 %."), "t")
-    assert r"\caption{Errors. Variant \texttt{no\_sepi}, 5 \%.}" in text
-
-
-@pytest.mark.parametrize("table", [name for name in TABLES if name not in PARTS_TABLES])
-def test_tables_of_a_report_without_any_scene_are_sound(table: str) -> None:
+@pytest.mark.parametrize("name", TABLES[""])
+def test_tables_of_a_report_without_any_scene_are_sound(name: str, tmp_path: Path) -> None:
     """The published figures alone, and tables that have no section at all."""
     choices = {"initial": "sepi", "occlusion": "half_sepi", "textureless": "lti", "optimize": "wls"}
-    numbers = {"plan": {"scenes": {}, "variants": {"paper": choices}}, "scenes": []}
-    text = as_latex(BUILDERS[table](Runs(numbers)), table)
+    text = as_latex(table(name, collect(Plan(tmp_path, {}, {"paper": choices}))), name)
     require_sound(text)
     assert text.endswith("\n")
-    if table == "table1_mse":
+    if name == "table1_mse":
         assert r"Boxes &  & \textbf{5.20} & \underline{6.70} & 10.93 &" in text

@@ -1,8 +1,9 @@
 """Marks of the best and second best figures."""
 
+import pandas as pd
 import pytest
 
-from sepi.report.tabular.layout import BEST, SECOND, ranks
+from sepi.report.tabular.table import BEST, SECOND, ranks, shown
 
 
 @pytest.mark.parametrize(
@@ -20,5 +21,5 @@ from sepi.report.tabular.layout import BEST, SECOND, ranks
 )
 def test_marks_follow_the_printed_figures(values: list[float | None], expected: list[str | None]) -> None:
     """What looks equal is marked alike, and a lone figure not at all."""
-    marks = ranks(dict(zip("abcd", values, strict=False)))
-    assert [marks.get(key) for key in "abcd"[: len(values)]] == expected
+    marks = ranks(shown(pd.DataFrame({"figure": values}, dtype=float), missing="n/a"))
+    assert [mark or None for mark in marks["figure"]] == expected
