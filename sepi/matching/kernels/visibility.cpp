@@ -46,6 +46,7 @@ constexpr float ROUNDING = 1.0f / 512;  // largest rounding error of a position 
 constexpr float LEAST_MARGIN = 1e-6f;   // least margin of an occluder
 constexpr float COLOUR_STEPS = 20000;   // steps from black to white of colours as 16-bit integers
 constexpr std::int64_t ONE = 1 << 14;   // sum of a sample's weights, which are 16-bit integers
+constexpr float LEAST_BEND = 0.03f;     // second difference of a colour that is interpolated well; colours in 0..1
 
 // z-buffer of a view: a pixel covers the positions around the point where it falls, two along either axis, or a single
 // one along an axis on which it falls exactly. Squares are stored by their first position, also outside the view.
@@ -138,6 +139,10 @@ struct VisibleRow {
     // rows of the view; missing detail is 0, and matches
     const Scratch<std::int32_t, 3> view_pairs = zeros<std::int32_t, 3>(height(), 4, width);
     const Scratch<float, 2> own = zeros<float, 2>(6, width);  // colours, detail, and the first and the last likely candidate
+    // second differences of colours beyond the least, a quarter of them, across and down in one number; whether a pixel or
+    // the next ones that a vector takes have any
+    const Scratch<std::int32_t, 2> bends = zeros<std::int32_t, 2>(3, width);
+    const Scratch<bool, 1> bent = zeros<bool, 1>(width);
     const Scratch<float, 3> sums = zeros<float, 3>(K, 2, width);  // of the costs, and of their weights
 
     // Cost of every candidate in row y, into row n of the costs.
@@ -147,6 +152,7 @@ struct VisibleRow {
         load_rows<float>(views.guide, y, reference, [](auto colour) { return whole(colour * COLOUR_STEPS) * float(ONE); });
         for (Index x = 0; x < W && views.reference_detail.shape[0] > 0; ++x)
             reference(3, 0, x) = float(views.reference_detail(y - views.low, x) * ONE);
+        load_bends(y);
         const std::vector<Columns> everywhere(K, {{0, W}}), likely = likely_columns(y);
         for (Index t = 0; t < views.present.shape[0]; ++t) {
             for (Index s = 0; s < views.present.shape[1]; ++s) {
@@ -163,6 +169,23 @@ struct VisibleRow {
             float *out = cost.at(k, n);
             for (Index x = 0; x < W; ++x) out[x] = weight[x] > 0 ? sum[x] / weight[x] : 1.0f;
         }
+    }
+
+    // Second differences of the reference view in row y; 0 at the picture's border.
+    void load_bends(Index y) {
+        std::fill_n(bent.array().data, width, false);
+        for (Index x = 0; x < W; ++x)
+            for (Index c = 0; c < 3; ++c) {
+                const auto excess = [&](Index dy, Index dx) {
+                    const Index above = y - dy, below = y + dy, left = x - dx, right = x + dx;
+                    if (above < 0 || below >= H || left < 0 || right >= W) return std::int32_t(0);
+                    const float bend = views.guide(above, left, c) + views.guide(below, right, c) - 2 * views.guide(y, x, c);
+                    return std::int32_t(std::copysign(std::max(std::abs(bend) - LEAST_BEND, 0.0f), bend) * (COLOUR_STEPS / 4));
+                };
+                const std::int32_t across = excess(0, 1), down = excess(1, 0);
+                bends.array()(c, x) = (across & 0xFFFF) | down << 16;
+                if (across != 0 || down != 0) std::fill(bent.array().data + std::max<Index>(0, x - LANES + 1), bent.array().data + x + 1, true);
+            }
     }
 
     // Intervals of row y, for each candidate, that contain all pixels for which it is likely.
@@ -214,6 +237,10 @@ struct VisibleRow {
             const auto below = std::int64_t(double(fy) * ONE + 0.5), right = std::int64_t((ONE - below) * double(fx) + 0.5);
             const auto lower_right = std::int64_t(below * double(fx) + 0.5);
             const Int8 upper = pair_of(ONE - below - right, right), lower = pair_of(below - lower_right, lower_right);
+            // between two pixels a straight line is off from a curve through them by its second difference, times
+            // f (1 - f) / 2
+            const auto bow = [](std::int64_t weight) { return 2 * weight * (ONE - weight) / ONE; };
+            const Int8 bows = pair_of(bow(std::int64_t(double(fx) * ONE + 0.5)), bow(below));
             // occlusion grows from half a margin to one and a half, since disparities are uncertain
             const Float8 limit = spread(candidates.disparities(k) + 1.5f * margin), number = spread(float(k));
             const Index lower_row = top - views.low + is_nearer_next(candidates.down(r, k), fy);
@@ -222,8 +249,10 @@ struct VisibleRow {
                 const float *before = some_hide ? nearest.at(lower_row, first + left + is_nearer_next(left, fx)) : nullptr;
                 const std::int32_t *pairs = view_pairs.array().at(top - low, 0, first + left);
                 const float *reference = own.array().data + first;
+                const std::int32_t *bend = bends.array().data + first;
+                const bool *is_bent = bent.array().data + first;
                 float *sum = sums.array().at(k, 0, first);
-                for (Index rest = last - first; rest > 0; rest -= LANES, pairs += LANES, reference += LANES, sum += LANES) {
+                for (Index rest = last - first; rest > 0; rest -= LANES, pairs += LANES, reference += LANES, bend += LANES, is_bent += LANES, sum += LANES) {
                     Float8 seen = spread(1);
                     if (some_hide) {
                         const Float8 found = load(before);
@@ -240,7 +269,18 @@ struct VisibleRow {
                         const Int8 sample = dot_of_pairs(above, upper) + dot_of_pairs(under, lower);
                         return __builtin_convertvector(sample, Float8) - load(reference + channel * pitch);
                     };
-                    const Float8 red = residual(0), green = residual(1), blue = residual(2), detail = residual(3);
+                    Float8 red = residual(0), green = residual(1), blue = residual(2);
+                    const Float8 detail = residual(3);
+                    if (*is_bent) {
+                        // no mismatch that interpolation explains
+                        const auto unexplained = [&](Float8 off, Index channel) {
+                            Int8 both;
+                            std::memcpy(&both, bend + channel * pitch, sizeof both);
+                            const Float8 most = __builtin_convertvector(dot_of_pairs(both, bows), Float8);
+                            return off - smaller(larger(off, smaller(most, Float8{})), larger(most, Float8{}));
+                        };
+                        red = unexplained(red, 0), green = unexplained(green, 1), blue = unexplained(blue, 2);
+                    }
                     const Float8 colours2 = fma(blue, blue, fma(green, green, red * red)), detail2 = detail * detail;
                     // z / (z + scale) of colours and detail, with one division
                     const Float8 of_colours = colours2 + scale2[0], of_detail = detail2 + scale2[1];
