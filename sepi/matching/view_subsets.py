@@ -38,9 +38,13 @@ SIDES = {"left": (0, -1), "right": (0, 1), "up": (-1, 0), "down": (1, 0)}
 QUARTERS = (("left", "up"), ("left", "down"), ("right", "up"), ("right", "down"))
 
 # most views, as a multiple of the number asked for
-_HARDLY_MORE = 1.1
-# reach from the reference view up to which no view is left out
-_SHORT = 2
+_HARDLY_MORE = 1.2
+# reach from the reference view up to which no view is left out, and up to which far views matter more than aliases
+_SHORT, _MODERATE = 2, 4
+# least mean squared distance of a lattice's views from the reference view, as a multiple of that of all views
+_WIDE = 0.99
+# frequencies along each axis at which repetitions are searched
+_FREQUENCIES = 48
 
 HALVES_AND_QUARTERS = ("full", *SIDES, *(f"{a}-{b}" for a, b in QUARTERS))
 """Names of the subsets of :func:`halves_and_quarters`."""
@@ -132,35 +136,64 @@ def spread_views(light_field: LightField, at_least: int | None) -> BoolMap:
         step *= 2
 
 
-def views_without_aliases(light_field: LightField, at_least: int) -> BoolMap:
+def views_without_aliases(light_field: LightField, at_least: int, *, far: bool = False) -> BoolMap:
     """About as many views as :func:`spread_views`, arranged so that a regular texture has fewer aliases.
 
-    Views of every second row and column give twice as many aliases as all views. Two arrangements avoid this: a third
-    of the views, with ``s + t`` divisible by three, and 13 views: the reference view, the corners, and eight that stand
-    one step from the border along one axis and one step from the reference view along the other.
+    Views of every second row and column give twice as many aliases as all views, and a chess board does so for a
+    checkered texture. Three arrangements avoid this, with ``s`` and ``t`` counted from the reference view: a third of
+    the views, with ``s + t`` divisible by three; 13 views: the reference view, the corners, and eight that stand one
+    step from the border along one axis and one step from the reference view along the other; and three fifths of the
+    views, with ``|s| + |t|`` within one of a multiple of five. Grids beyond 9x9 have a mirrored lattice: views with
+    ``|s| + a |t|`` divisible by ``k``, for the ``a`` and ``k`` with which the views repeat least.
 
     Parameters
     ----------
     light_field : LightField
     at_least : int
         Least number of views.
+    far : bool
+        Whether up to 9x9 views keep far ones, which tell depth best, rather than every row and column.
 
     Returns
     -------
     ndarray, shape (T, S), bool
-        Present views, the reference view among them. :func:`spread_views` where neither arrangement fits.
+        Present views, the reference view among them. :func:`spread_views` where no arrangement fits.
     """
     t0, s0 = light_field.reference_position
     reach = min(t0, s0, light_field.grid[0] - 1 - t0, light_field.grid[1] - 1 - s0)
     down, across = np.indices(light_field.grid) - np.array([t0, s0])[:, None, None]
-    near, far = np.sort(np.abs([down, across]), axis=0)
+    near, distant = np.sort(np.abs([down, across]), axis=0)
     third = (down + across) % 3 == 0
-    star = (far == 0) | ((near == 1) & (far == reach - 1)) | ((near == reach) & (far == reach))
-    for views in (third, star):
+    star = (distant == 0) | ((near == 1) & (distant == reach - 1)) | ((near == reach) & (distant == reach))
+    fifths = (near + distant + 1) % 5 <= 2
+    for views in (fifths,) if far else (third, star, fifths):
         few: BoolMap = light_field.present & views
         if reach > _SHORT and at_least <= few.sum() <= _HARDLY_MORE * at_least:
             return few
-    return spread_views(light_field, at_least)
+    lattices = _mirrored_lattices(light_field, at_least) if reach > _MODERATE else []
+    return min(lattices, key=_repetition) if lattices else spread_views(light_field, at_least)
+
+
+def _mirrored_lattices(light_field: LightField, at_least: int) -> list[BoolMap]:
+    """Lattices of about ``at_least`` views that are mirrored at the reference view, and as wide as the grid."""
+    t0, s0 = light_field.reference_position
+    down, across = np.abs(np.indices(light_field.grid) - np.array([t0, s0])[:, None, None])
+    present, distance2 = light_field.present, down**2 + across**2
+    found = []
+    for k in range(2, 2 * int(present.sum()) // at_least):
+        for a in range(1, k):
+            views = present & ((across + a * down) % k == 0)
+            enough = at_least <= views.sum() <= _HARDLY_MORE * at_least
+            if enough and distance2[views].mean() >= _WIDE * distance2[present].mean():
+                found.append(views)
+    return found
+
+
+def _repetition(views: BoolMap) -> float:
+    """Largest share of the views that some texture's alias agrees with."""
+    spectrum = np.abs(np.fft.fft2(views, (_FREQUENCIES, _FREQUENCIES)))
+    down, across = np.abs(np.fft.fftfreq(_FREQUENCIES)) * np.array(views.shape)[:, None]
+    return float(spectrum[np.hypot(down[:, None], across) > 1].max() / views.sum())
 
 
 def grid_steps(light_field: LightField) -> npt.NDArray[np.float64]:

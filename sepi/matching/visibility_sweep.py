@@ -190,7 +190,7 @@ def depth_from_visible_views(
     confidence = np.ones(light_field.shape, np.float32)
     for i in range(n):
         last = i == n - 1
-        present = spread_views(light_field, parameters.views) if last else few
+        present = views_without_aliases(light_field, parameters.views, far=True) if last else few
         mean = None
         if mean_of and isinstance(light_field, DenoisedLightField) and light_field.of_views.usual >= noise:
             mean = mean_of(light_field, disparity, present, parameters, parameters.occlusion_margin)
