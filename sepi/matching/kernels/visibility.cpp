@@ -46,7 +46,7 @@ constexpr float ROUNDING = 1.0f / 512;  // largest rounding error of a position 
 constexpr float LEAST_MARGIN = 1e-6f;   // least margin of an occluder
 constexpr float COLOUR_STEPS = 20000;   // steps from black to white of colours as 16-bit integers
 constexpr std::int64_t ONE = 1 << 14;   // sum of a sample's weights, which are 16-bit integers
-constexpr float LEAST_BEND = 0.03f;     // second difference of a colour that is interpolated well; colours in 0..1
+constexpr float LEAST_BEND = 0.05f;     // second difference of a colour that is interpolated well; colours in 0..1
 
 // z-buffer of a view: a pixel covers the positions around the point where it falls, two along either axis, or a single
 // one along an axis on which it falls exactly. Squares are stored by their first position, also outside the view.
