@@ -27,7 +27,7 @@ rule numbers:
         plan="reports/page/plan{which}.json",
         measured=lambda wildcards: measured_files(wildcards.which),
     output:
-        multiext("reports/report{which}", ".json", ".csv"),
+        numbers=multiext("reports/report{which}", ".json", ".csv"),
     log:
         "logs/report{which}.log",
     benchmark:
@@ -45,7 +45,7 @@ rule numbers:
     shell:
         command(
             "sepi.report.numbers --results {params.results:q} --plan {input.plan:q} "
-            "--output {output[0]:q} 2> {log:q}"
+            "--output {output.numbers[0]:q} 2> {log:q}"
         )
 
 
@@ -116,7 +116,7 @@ rule charts:
 # Chart of the parts of variant best
 rule parts_chart:
     input:
-        multiext("reports/report_parts", ".json", ".csv"),
+        numbers=multiext("reports/report_parts", ".json", ".csv"),
     output:
         report(
             multiext("reports/figures/ablation_best", ".png", ".pdf"),
@@ -135,7 +135,9 @@ rule parts_chart:
     message:
         "chart of the parts of best"
     shell:
-        command("sepi.report.charts --numbers {input[0]:q} --chart ablation_best --output {params.folder:q} 2> {log:q}")
+        command(
+            "sepi.report.charts --numbers {input.numbers[0]:q} --chart ablation_best --output {params.folder:q} 2> {log:q}"
+        )
 
 
 # Images of a scene: reference view, ground truth, each stage and variant, errors, masks, external methods' maps, and
