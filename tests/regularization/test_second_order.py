@@ -295,7 +295,7 @@ def test_what_is_a_step_follows_from_how_rough_a_map_is() -> None:
     along = [np.abs(d @ values.ravel().astype(float)) for d in second_differences(values.shape)[:2]]
     assert upper_quartile(values) == pytest.approx(np.quantile(np.concatenate(along), 0.75, method="higher"), abs=1e-6)
     assert upper_quartile(values[:2, :2]) == 0
-    light_field = render("pyramids", size=96, views=5)
+    light_field = render("pyramids", size=96)
     bad = [
         np.mean(np.abs(estimate_depth(light_field, "best", own).disparity - light_field.ground_truth) > 0.07)
         for own in ({}, {"optimize": {"roughness_factor": 0.0}})
