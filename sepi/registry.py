@@ -82,6 +82,8 @@ def extensions() -> dict[str, Extension]:
 
     found: dict[str, Extension] = {}
     for point in entry_points(group=GROUP):
+        if point.name in found:
+            raise SepiError(f"extension {point.name}: two installed packages have one of this name; remove one of them")
         try:
             found[point.name] = point.load()
         except Exception as error:

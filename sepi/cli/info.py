@@ -108,10 +108,12 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
     interpolated, and warns if a part of the scene lies outside the disparity range. The exit code is 1 if another order
     fits clearly better, the views fit in no order, or some match none of the others; 2 if INPUT cannot be read.
     """
+    from sepi.inspection.coded_views import without_blocks
     from sepi.inspection.disparity_range import settle_range
     from sepi.inspection.odd_views import odd_views
     from sepi.inspection.row_spacing import settle_row_spacing
     from sepi.inspection.view_order import check_order
+    from sepi.matching.exposure import equally_bright
     from sepi.matching.softening import LEAST_SHARE, share_too_sharp
 
     try:
@@ -121,11 +123,11 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
     except SepiError as error:
         click.echo(f"sepi: {error}", err=True)
         context.exit(2)
-    found, odd, sharp = check_order(light_field, reading.options.order), odd_views(light_field), 0.0
+    found, odd, sharp = check_order(light_field, reading.options.order), odd_views(light_field), None
     if not odd and found.warning() is None:
         # views without texture have no range; this is no failure here
         with suppress(SepiError):
-            sharp = share_too_sharp(settle_range(light_field))
+            sharp = share_too_sharp(without_blocks(equally_bright(settle_range(light_field))))
     if as_json:
         known = {
             **_described(light_field),
@@ -148,7 +150,7 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
         click.echo("order, and how well the views match in it (matching cost, 0 to 1; less is better):")
         for order, cost in found.fits.items():
             click.echo(f"  {order:24}{cost:8.4f}{'  best' if order == found.best and found.clear else ''}")
-        if sharp >= LEAST_SHARE:
+        if sharp is not None and sharp >= LEAST_SHARE:
             click.echo(
                 f"{100 * sharp:.0f} % of the picture has texture above 0.3 cycles a pixel, as downscaling without "
                 "smoothing leaves it; depth compares slightly blurred views there"

@@ -19,6 +19,8 @@ _FEWEST_BLOCKS = 6
 # least excess of differences across block borders over those at the other seven places: relative, and in standard
 # deviations
 _MORE, _ERRORS = 0.12, 6.0
+# largest difference of neighbours that counts, as a multiple of the mean
+_EDGE = 8.0
 # errors at block borders up to which matching does better without noise, colours in 0..1; strength of the noise
 # relative to the errors beyond them, since a border shows only what differs between blocks, in the mean of the channels
 _BORNE, _STRENGTH = 1.9 / 255, 2.0
@@ -40,6 +42,8 @@ def coding_error(light_field: LightField) -> float:
     grey, squares = light_field.reference_view.mean(axis=2), []
     for axis in (0, 1):
         steps = np.abs(np.diff(grey, axis=axis))
+        # edges and highlights say nothing of a coder's errors
+        steps = np.minimum(steps, _EDGE * steps.mean())
         blocks = len(steps) // _BLOCK if axis == 0 else steps.shape[1] // _BLOCK
         if blocks < _FEWEST_BLOCKS:
             return 0.0
@@ -53,7 +57,7 @@ def coding_error(light_field: LightField) -> float:
             return 0.0
         # a step has the errors of two pixels
         squares.append((squared[border] - np.delete(squared, border).mean()) / 2)
-    return float(np.sqrt(np.mean(squares)))
+    return float(np.sqrt(max(np.mean(squares), 0)))
 
 
 def told_of_coding(light_field: LightField) -> str | None:
@@ -91,6 +95,8 @@ def without_blocks(light_field: LightField) -> LightField:
     for place in map(tuple, np.argwhere(light_field.present).tolist()):
         view = views[place] + strength * random.standard_normal(views.shape[2:], np.float32)
         noisy[place] = np.clip(view, LOWEST, HIGHEST) if views.dtype == np.float32 else np.clip(np.rint(view), 0, scale)
+    if light_field.missing is not None:
+        noisy[light_field.missing] = views[light_field.missing]
     return replace(light_field, views=noisy)
 
 

@@ -155,13 +155,15 @@ def sharpness(picture: FloatMap, variance: FloatMap) -> FloatMap:
 
 
 def share_too_sharp(light_field: LightField) -> float:
-    """Share of the reference view, 0..1, whose texture is too sharp for interpolation.
+    """Share of the reference view, 0..1, whose texture is too sharp for interpolation; 0 if views miss pixels.
 
     Raises
     ------
     SepiError
         If the disparity range is unknown.
     """
+    if light_field.missing is not None:
+        return 0.0
     return _share_too_sharp(light_field, _grey_variance(light_field, measured_noise(light_field)))
 
 

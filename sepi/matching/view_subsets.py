@@ -43,7 +43,7 @@ _HARDLY_MORE = 1.2
 _SHORT, _MODERATE = 2, 4
 # least mean squared distance of a lattice's views from the reference view, as a multiple of that of all views
 _WIDE = 0.99
-# frequencies along each axis at which repetitions are searched
+# least number of frequencies along each axis at which repetitions are searched
 _FREQUENCIES = 48
 
 HALVES_AND_QUARTERS = ("full", *SIDES, *(f"{a}-{b}" for a, b in QUARTERS))
@@ -191,8 +191,9 @@ def _mirrored_lattices(light_field: LightField, at_least: int) -> list[BoolMap]:
 
 def _repetition(views: BoolMap) -> float:
     """Largest share of the views that some texture's alias agrees with."""
-    spectrum = np.abs(np.fft.fft2(views, (_FREQUENCIES, _FREQUENCIES)))
-    down, across = np.abs(np.fft.fftfreq(_FREQUENCIES)) * np.array(views.shape)[:, None]
+    size = max(_FREQUENCIES, *views.shape)
+    spectrum = np.abs(np.fft.fft2(views, (size, size)))
+    down, across = np.abs(np.fft.fftfreq(size)) * np.array(views.shape)[:, None]
     return float(spectrum[np.hypot(down[:, None], across) > 1].max() / views.sum())
 
 

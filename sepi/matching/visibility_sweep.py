@@ -45,7 +45,7 @@ from sepi.matching.semi_global import (
     SmoothingParameters,
 )
 from sepi.matching.sweep_arrays import Visibility, sampled_candidates
-from sepi.matching.view_subsets import spread_views, views_without_aliases
+from sepi.matching.view_subsets import views_without_aliases
 from sepi.stage import Needs, Progress
 
 CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**30)
@@ -317,10 +317,7 @@ def _searched_views(light_field: LightField, present: BoolMap, parameters: Visib
     """The views that compare all candidates with a map."""
     # in noise, the mean of fewer views is the lowest of many candidates' by chance
     if isinstance(parameters, VisibleViewsParameters) and not isinstance(light_field, DenoisedLightField):
-        for chosen_by in (views_without_aliases, spread_views):
-            few = present & chosen_by(light_field, parameters.searched_views)
-            if few.sum() >= parameters.searched_views:
-                return few
+        return views_without_aliases(replace(light_field, present=present), parameters.searched_views)
     return present
 
 

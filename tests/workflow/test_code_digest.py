@@ -142,7 +142,7 @@ def test_a_stage_is_run_again_for_what_can_change_its_maps_alone(stage: str) -> 
     choice = next(iter(STAGES[stage].values()))
     found = {name.removeprefix("sepi.") for name in imported_modules(*stage_modules(stage, choice))}
     needed, needless = COVERED[stage]
-    assert {needed, stage, "matching.exposure", "io.hdf5", "lightfield"} <= found
+    assert {needed, stage, "matching.exposure", "inspection.coded_views", "io.hdf5", "lightfield"} <= found
     assert not found & {needless, *NEVER, *(set(STAGES) - {stage})}
     assert not any(name.startswith(("extensions", "workflow", "cli", "report", "scenes")) for name in found)
 

@@ -29,8 +29,8 @@ from sepi.validation.models import validated
 from sepi.workflow.rendered_scenes import NOISE_LEVELS, WITHOUT_NOISE, exposed_name
 
 _TEXT = """
-Scenes of --rendered are path-traced, with plain walls, gloss, mirrors and glass; a file NAME.h5 beside the folder has
-their light, and disparity, normals and masks of every view.
+Scenes of --rendered are path-traced, with plain walls, gloss, mirrors and glass, of 512 pixels unless --size says
+otherwise; a file NAME.h5 beside the folder has their light, and disparity, normals and masks of every view.
 
 \b
 Example:

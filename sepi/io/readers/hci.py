@@ -35,6 +35,8 @@ from sepi.lightfield import DisparityRange, LightField, Truth
 from sepi.validation.models import validated
 
 PARAMETERS = "parameters.cfg"
+# beside them, pictures are those of calibrated cameras
+CALIBRATED = ("cameras.csv", "cameras.yaml", "cameras.yml", "transforms.json", "transforms_train.json", "sparse")
 TRUTH = "gt_disp_lowres.pfm"
 
 _CAMERA = ("focal_length_mm", "baseline_mm", "focus_distance_m", "sensor_size_mm")
@@ -68,8 +70,9 @@ class _Parameters(BaseModel, defer_build=True):
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a folder with views or parameters named as in the benchmark."""
-    return path.is_dir() and ((path / PARAMETERS).is_file() or any(path.glob("input_Cam*.png")))
+    """Whether ``path`` is a folder named as in the benchmark, without calibrated cameras."""
+    named = path.is_dir() and ((path / PARAMETERS).is_file() or any(path.glob("input_Cam*.png")))
+    return named and not any((path / name).exists() for name in CALIBRATED)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
