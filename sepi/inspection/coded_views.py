@@ -23,7 +23,7 @@ _MORE, _ERRORS = 0.12, 6.0
 _EDGE = 8.0
 # errors at block borders up to which matching does better without noise, colours in 0..1; strength of the noise
 # relative to the errors beyond them, since a border shows only what differs between blocks, in the mean of the channels
-_BORNE, _STRENGTH = 1.9 / 255, 2.0
+_BORNE, _STRENGTH = 1.5 / 255, 2.2
 
 
 def coding_error(light_field: LightField) -> float:

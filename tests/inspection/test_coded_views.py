@@ -32,7 +32,7 @@ def test_blocks_do_not_draw_surfaces_to_disparity_0(name: str, most: float) -> N
 def test_highlights_hide_no_blocks_and_make_none() -> None:
     """Their edges are larger than the errors: what was left of these was below 0, and views became black."""
     scene = render("pyramids", size=160, views=3)
-    views = np.reshape([coded(view, 60) for view in scene.views.reshape(9, 160, 160, 3)], scene.views.shape).copy()
+    views = np.reshape([coded(view, 50) for view in scene.views.reshape(9, 160, 160, 3)], scene.views.shape).copy()
     plain = coding_error(replace(scene, views=views))
     for y, x in ((20, 30), (70, 101), (90, 45), (120, 77), (139, 21)):
         views[:, :, y : y + 2, x : x + 2] = 255
