@@ -74,7 +74,7 @@ def smoothness_coefficient(reference_view: FloatMap, confidence: FloatMap, param
 def solve(disparity: FloatMap, weight: FloatMap, smoothness: FloatMap, alpha: float, rtol: float) -> FloatMap:
     """Disparity of least energy, Eq. 8; shape (H, W), float32.
 
-    The solver stops at a residual of ``rtol`` times the right side.
+    The solver stops at a residual of ``rtol``, relative to the data's weighted deviations from their mean.
     """
     stencil = _smoothness_stencil(smoothness, alpha)
     return solve_smooth(stencil, weight, disparity, disparity, rtol, MOST_ITERATIONS)
