@@ -70,7 +70,7 @@ test-system: $(READY)
 
 # by g++, whose libraries have what the checks need, for this very processor; in place of the built kernels of any, which the
 # next `make` puts back. Python does not free all at its end
-KERNEL_TESTS := tests/matching tests/boundaries tests/regularization tests/error_bars tests/inspection tests/extensions
+KERNEL_TESTS := tests/matching tests/boundaries tests/regularization tests/error_bars tests/inspection tests/extensions/methods tests/extensions/views
 sanitize: $(READY)
 	mkdir -p build
 	CXX=g++ $(BUILD) -G Ninja -S . -B build/sanitized -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O1 \
