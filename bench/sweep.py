@@ -13,10 +13,10 @@ from tabulate import tabulate
 
 from sepi.errors import SepiError
 from sepi.extensions.rendered.catalogue import RENDERED
+from sepi.inspection.coded_views import comparable
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import has_dataset
 from sepi.lightfield import LightField
-from sepi.matching.exposure import equally_bright
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
 from sepi.scoring.scores import score
@@ -53,7 +53,7 @@ def scene_for_choosing(given: str, noise: str) -> LightField:
     if light_field.ground_truth is None:
         raise SepiError(f"{given}: has no ground truth to score against")
     # as in the stages
-    return equally_bright(settle_range(light_field))
+    return comparable(settle_range(light_field))
 
 
 def settings_of(variant: Variant, target: str, texts: Sequence[str]) -> tuple[str, list[dict[str, Parameters]]]:

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from sepi.inspection.coded_views import without_blocks
+from sepi.inspection.coded_views import comparable
 from sepi.lightfield import LightField, require_light_field
-from sepi.matching.exposure import equally_bright
 from sepi.matching.memory_limit import bytes_of_bands, bytes_of_volumes, require_memory_of
 from sepi.matching.unknown import with_unknown
 from sepi.process.memory import give_back_memory
@@ -89,7 +88,7 @@ def estimate_depth(
     # kernels need contiguous views
     views, workspace = np.ascontiguousarray(light_field.views), light_field.workspace or Workspace()
     light_field = replace(light_field, views=views, workspace=workspace)
-    compared = without_blocks(equally_bright(light_field))
+    compared = comparable(light_field)
     require_memory_of(compared, settings.values())
     # the workspace keeps the noise that require_memory_of measured
     workspace = replace(workspace, detail_bytes=bytes_of_volumes(compared, settings.values()))

@@ -108,12 +108,11 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
     interpolated, and warns if a part of the scene lies outside the disparity range. The exit code is 1 if another order
     fits clearly better, the views fit in no order, or some match none of the others; 2 if INPUT cannot be read.
     """
-    from sepi.inspection.coded_views import without_blocks
+    from sepi.inspection.coded_views import comparable
     from sepi.inspection.disparity_range import settle_range
     from sepi.inspection.odd_views import odd_views
     from sepi.inspection.row_spacing import settle_row_spacing
     from sepi.inspection.view_order import check_order
-    from sepi.matching.exposure import equally_bright
     from sepi.matching.softening import LEAST_SHARE, share_too_sharp
 
     try:
@@ -127,7 +126,7 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
     if not odd and found.warning() is None:
         # views without texture have no range; this is no failure here
         with suppress(SepiError):
-            sharp = share_too_sharp(without_blocks(equally_bright(settle_range(light_field))))
+            sharp = share_too_sharp(comparable(settle_range(light_field)))
     if as_json:
         known = {
             **_described(light_field),

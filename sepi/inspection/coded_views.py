@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from sepi.lightfield import HIGHEST, LOWEST, LightField, full_scale
+from sepi.matching.exposure import equally_bright
 
 _BLOCK = 8
 _FEWEST_BLOCKS = 6
@@ -44,7 +45,7 @@ def coding_error(light_field: LightField) -> float:
         steps = np.abs(np.diff(grey, axis=axis))
         # edges and highlights say nothing of a coder's errors
         steps = np.minimum(steps, _EDGE * steps.mean())
-        blocks = len(steps) // _BLOCK if axis == 0 else steps.shape[1] // _BLOCK
+        blocks = steps.shape[axis] // _BLOCK
         if blocks < _FEWEST_BLOCKS:
             return 0.0
         of_place, squared = (
@@ -72,6 +73,11 @@ def told_of_coding(light_field: LightField) -> str | None:
         f"place in all views, and draw regions of little texture to disparity 0{hidden}; use less compressed views if "
         "possible"
     )
+
+
+def comparable(light_field: LightField) -> LightField:
+    """The light field whose views all stages compare: equally bright, and without a coder's blocks."""
+    return without_blocks(equally_bright(light_field))
 
 
 def without_blocks(light_field: LightField) -> LightField:

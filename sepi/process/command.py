@@ -245,10 +245,9 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     """
     from dataclasses import replace
 
-    from sepi.inspection.coded_views import without_blocks
+    from sepi.inspection.coded_views import comparable
     from sepi.io.hdf5 import read_light_field, read_stage, write_stage
     from sepi.io.provenance import history_of, stage_attributes
-    from sepi.matching.exposure import equally_bright
     from sepi.process.threads import use_threads
     from sepi.process.workspace import Workspace
     from sepi.registry import stage_choices
@@ -288,7 +287,7 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
                 f"{previous}: maps have shape {maps.disparity.shape}; expected {light_field.shape}, that of "
                 f"{light_field_path}"
             )
-        compared = replace(without_blocks(equally_bright(light_field)), workspace=Workspace())
+        compared = replace(comparable(light_field), workspace=Workspace())
         with progress_bar(f"{light_field.name} {stage}") as progress:
             result = chosen.run(compared, maps, settings, progress)
         history = [*history_of(previous), entry(stage, choice, settings, light_field)]

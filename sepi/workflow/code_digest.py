@@ -71,8 +71,8 @@ _read: dict[str, tuple[str, *_Code]] = {}
 
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
     """Modules whose code, with imports, determines a stage's file: stage, choice, preparation of views, file format."""
-    prepared = "sepi.matching.exposure", "sepi.inspection.coded_views"
-    return (f"sepi.{stage}", choice.function.__module__, *prepared, "sepi.io.hdf5", "sepi.io.provenance")
+    prepared = "sepi.inspection.coded_views"
+    return (f"sepi.{stage}", choice.function.__module__, prepared, "sepi.io.hdf5", "sepi.io.provenance")
 
 
 def ingest_modules(reader: str) -> tuple[str, ...]:

@@ -9,9 +9,8 @@ import numpy as np
 
 from sepi.extensions.page.probes.pixels import InterestingPixel, interesting_pixels
 from sepi.extensions.page.probes.probe import Probe, probe
-from sepi.inspection.coded_views import without_blocks
+from sepi.inspection.coded_views import comparable
 from sepi.io.provenance import history_of
-from sepi.matching.exposure import equally_bright
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.report.panels import SceneResults
 from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
@@ -35,7 +34,7 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
     """
     maps = results.final(MAIN_VARIANT)
     # as in the stages
-    light_field = without_blocks(equally_bright(results.light_field))
+    light_field = comparable(results.light_field)
     pixels = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
     parameters = sweep_parameters(final_file)
     return [
