@@ -133,15 +133,7 @@ def test_a_border_most_of_which_lies_elsewhere_tells_less_than_the_wall(share: f
     ]
     before, grey = np.ones((60, 60), np.float32), np.full((60, 60, 3), 0.5, np.float32)
     _, plane = _planes_of(found, {}, before, grey, False, PARAMETERS.model_copy(update={"growth": 3}))
-    assert plane is not None
     assert plane.plane[0] == pytest.approx(expected)
-
-
-def test_small_regions_are_left_alone() -> None:
-    light_field, maps = scene(SMALL)
-    disparity, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
-    assert not filled.any()
-    np.testing.assert_array_equal(disparity, maps.disparity)
 
 
 def test_planes_stay_within_the_range() -> None:

@@ -41,15 +41,10 @@ HEADS = ",".join([*KEYS, "score", "value"])
     ("name", "content", "message"),
     [
         ("a.json", None, "cannot be read"),
-        ("a.json", "{", "not JSON"),
         ("a.json", '{"plan": {}}', "not the numbers of a report"),
         ("a.csv", None, "cannot be read"),
-        ("a.csv", "", "not the numbers of a report"),
-        ("a.csv", "[]", "not the numbers of a report"),
-        ("a.csv", "a,b\n1,2\n", "not the numbers of a report"),
         ("a.csv", "\xff", "not the numbers of a report"),
         ("a.csv", f"{HEADS}\n1,2,3,4,5,6,7,8,words\n", "not the numbers of a report"),
-        ("a.csv", f"{HEADS}\n1,2,3,4,5,6,7,8,\n", "not the numbers of a report"),
     ],
 )
 def test_wrong_numbers_are_one_line(name: str, content: str | None, message: str, found: Runs, tmp_path: Path) -> None:
@@ -63,12 +58,6 @@ def test_wrong_numbers_are_one_line(name: str, content: str | None, message: str
     assert result.output.startswith(f"sepi: {tmp_path / name}: {message}")
     assert len(result.output.splitlines()) == 1
     assert not (tmp_path / "out").exists()
-
-
-def test_a_table_of_another_report_is_told(found: Runs, tmp_path: Path) -> None:
-    numbers.write_numbers(found, tmp_path / "a.json")
-    result = run_tables(tmp_path, tmp_path, "--table", "ablation_best")
-    assert "a.json: tables: unknown 'ablation_best'; " in result.output
 
 
 @pytest.mark.parametrize("name", MAIN_TABLES)

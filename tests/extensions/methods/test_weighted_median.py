@@ -36,10 +36,6 @@ def test_each_pixel_is_the_weighted_median_of_its_window(radius: int, sigma: flo
     np.testing.assert_array_equal(found, twin(VALUES, GUIDE, radius, sigma, WEIGHT))
 
 
-def test_radius_0_changes_nothing() -> None:
-    np.testing.assert_array_equal(weighted_median(VALUES, GUIDE, 0, 0.1, WEIGHT), VALUES)
-
-
 def test_windows_without_weight_keep_their_value() -> None:
     """Where no pixel around is trusted, the map stays as it is, finite."""
     weight = ONES.copy()
