@@ -8,8 +8,7 @@ from geometries import GEOMETRIES, standing
 
 from sepi.camera import Camera, camera_from
 from sepi.errors import SepiError
-from sepi.extensions.cameras.camera_poses import CameraPoses, camera_poses, nominal_camera
-from sepi.extensions.cameras.posed_views import posed_views
+from sepi.extensions.cameras.posed_views import CameraPoses, camera_poses, nominal_camera, posed_views
 from sepi.lightfield import LightField
 from sepi.matching.carried_map import carried_map
 from sepi.scenes import render

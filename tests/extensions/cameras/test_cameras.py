@@ -19,10 +19,10 @@ from sepi.camera.rig import Lens, Rig, Shot
 from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.extensions.cameras import rectification
-from sepi.extensions.cameras.camera_poses import camera_poses
-from sepi.extensions.cameras.files import read_model
+from sepi.extensions.cameras.files import rotation_of
+from sepi.extensions.cameras.posed_views import camera_poses
+from sepi.extensions.cameras.reader import read_model
 from sepi.extensions.cameras.rectification import light_field_of, rectification_of
-from sepi.extensions.cameras.table import rotation_of
 from sepi.io.all_views import read_result_at, write_all_views
 from sepi.io.pfm import read_pfm
 from sepi.io.point_cloud import point_cloud
@@ -222,8 +222,7 @@ def test_poses_that_were_written_give_their_light_field_again(tmp_path: Path, ki
     """Views, positions, camera and map come back as they were, whichever program they were written for."""
     if kind == "colmap":
         pytest.importorskip("pycolmap")
-    from sepi.extensions.cameras.colmap import write_colmap
-    from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+    from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = replace(render("pyramids", size=SIZE, views=3), camera=CAMERA)
@@ -251,8 +250,7 @@ def test_rectified_cameras_are_written_in_the_world_that_they_were_calibrated_in
     """Another program's map of the same room would lie elsewhere, turned."""
     if kind == "colmap":
         pytest.importorskip("pycolmap")
-    from sepi.extensions.cameras.colmap import write_colmap
-    from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+    from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = sepi.read_cameras(folder)
@@ -286,7 +284,7 @@ def test_rectified_cameras_are_written_in_the_world_that_they_were_calibrated_in
 
 def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path: Path) -> None:
     """Their lengths would be those of the calibrated one, beside metres of the other."""
-    from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+    from sepi.extensions.cameras.data_sets import write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)
@@ -302,7 +300,7 @@ def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path:
 
 def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> None:
     """A hand before the lens, or the gantry itself, becomes part of the scene."""
-    from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+    from sepi.extensions.cameras.data_sets import write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)

@@ -10,14 +10,16 @@ from sepi.extensions.methods import acc
 from sepi.extensions.methods.acc import (
     AccParameters,
     ConfidentLabelsParameters,
+    PhaseShift,
+    agreed,
     confident_labels,
+    features_of,
+    matched_disparities,
+    mutual_matches,
     phase_shift_costs,
     truncated_difference,
 )
-from sepi.extensions.methods.acc_features import agreed, features_of, matched_disparities, mutual_matches
-from sepi.extensions.methods.acc_phase_shift import PhaseShift
-from sepi.extensions.methods.cost_volumes import disparity_of, least_costs
-from sepi.extensions.methods.guided_filter import GuidedFilter
+from sepi.extensions.methods.costs import GuidedFilter, disparity_of, least_costs
 from sepi.lightfield import DisparityRange, LightField
 from sepi.scenes import render
 from sepi.stage import CostVolume, no_progress

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from sepi.extensions.methods.guided_filter import GuidedFilter
+from sepi.extensions.methods.costs import GuidedFilter
 from sepi.extensions.methods.mishiba import (
     LatticeFit,
     MedianDescentParameters,

@@ -7,9 +7,15 @@ import pytest
 from geometries import GEOMETRIES, standing
 
 from sepi.extensions.methods.occ import (
+    LEAST_SHARE,
+    ORIENTATIONS,
+    Edges,
     OccFieldParameters,
     OccParameters,
     OccSplitParameters,
+    colours_beside,
+    edges_to_split,
+    halves_of_views,
     least_cost,
     occ,
     occ_field,
@@ -17,14 +23,6 @@ from sepi.extensions.methods.occ import (
     smoothness_weights,
     split_patch_costs,
     whole_patch_costs,
-)
-from sepi.extensions.methods.occ_patches import (
-    LEAST_SHARE,
-    ORIENTATIONS,
-    Edges,
-    colours_beside,
-    edges_to_split,
-    halves_of_views,
 )
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.scenes import render
