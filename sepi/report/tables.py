@@ -11,14 +11,12 @@ import click
 from sepi.io.files import atomic_path
 from sepi.process.command import SepiCommand
 from sepi.report import published
+from sepi.report.comparison import ablation_table, region_table, scene_table
+from sepi.report.properties import error_bar_table, property_table
+from sepi.report.properties import scene_table as rendered_scene_table
 from sepi.report.runs import Runs, read_numbers
-from sepi.report.tabular.comparison import ablation_table, region_table, scene_table
-from sepi.report.tabular.error_bars import error_bar_table
-from sepi.report.tabular.formats import as_csv, as_latex, as_markdown
-from sepi.report.tabular.properties import property_table
-from sepi.report.tabular.properties import scene_table as rendered_scene_table
-from sepi.report.tabular.scores import computed_methods_table, edge_table, parts_table, runtime_table, stage_table
-from sepi.report.tabular.table import Table
+from sepi.report.scores import computed_methods_table, edge_table, parts_table, runtime_table, stage_table
+from sepi.report.table import Table, as_csv, as_latex, as_markdown
 from sepi.validation import require_known
 
 BUILDERS: dict[str, Callable[[Runs], Table]] = {

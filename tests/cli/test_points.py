@@ -12,7 +12,7 @@ from error_lines import error_of
 from plyfile import PlyData
 
 from sepi.camera import Camera
-from sepi.cli.points import points
+from sepi.cli.convert import points
 from sepi.errors import SepiError
 from sepi.io.point_cloud import point_cloud
 from sepi.io.result_folder import write_result

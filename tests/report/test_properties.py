@@ -11,8 +11,8 @@ from sepi.evaluate import evaluations_of
 from sepi.io.scores import write_scores
 from sepi.lightfield import LightField
 from sepi.report import numbers
+from sepi.report.numbers import pooled_q25
 from sepi.report.plan import Plan
-from sepi.report.pooled import pooled_q25
 from sepi.report.runs import Runs
 
 

@@ -12,7 +12,7 @@ from sepi.external import NO_FILE
 from sepi.report import numbers, tables
 from sepi.report.plan import TABLES
 from sepi.report.runs import KEYS, Runs
-from sepi.report.tabular.formats import as_csv, as_latex
+from sepi.report.table import as_csv, as_latex
 
 MAIN_TABLES = TABLES[""]
 

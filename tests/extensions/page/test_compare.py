@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from error_lines import error_of
 
 from sepi.cli.main import main
-from sepi.extensions.page.comparison_page import Comparison, comparison_page
+from sepi.extensions.page.compare import Comparison, comparison_page
 from sepi.io.hdf5 import write_stage
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import FloatMap

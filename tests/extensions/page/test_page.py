@@ -25,8 +25,8 @@ from sepi.extensions.page.viewer import CONFIDENCE, OTHER, PRECISE, STEPS, viewe
 from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
 from sepi.report import charts, figures, page_data, published
+from sepi.report.charts import write_error_bars
 from sepi.report.panels import Kind, Panel, SceneResults, note_of, panels_of
-from sepi.report.plots.error_bars import write_error_bars
 from sepi.report.runs import Runs
 from sepi.scoring.scores import REGIONS
 from sepi.stage import StageMaps

@@ -12,11 +12,11 @@ from geometries import GEOMETRIES, standing
 
 from bench.noisy import with_noise
 from sepi.errors import SepiError
-from sepi.extensions.page.probes import scene_probes
-from sepi.extensions.page.probes.curves import cost_curves
-from sepi.extensions.page.probes.figure import write_probes
-from sepi.extensions.page.probes.pixels import APART, BORDER, InterestingPixel, interesting_pixels
-from sepi.extensions.page.probes.probe import GREY, HALF_WIDTH, probe, sepi_picture, to_json
+from sepi.extensions.page import scene
+from sepi.extensions.page.curves import cost_curves
+from sepi.extensions.page.pixels import APART, BORDER, InterestingPixel, interesting_pixels
+from sepi.extensions.page.probe import GREY, HALF_WIDTH, probe, sepi_picture, to_json
+from sepi.extensions.page.probe_figure import write_probes
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.denoising import sure_noise
 from sepi.matching.exposure import equally_bright
@@ -25,8 +25,8 @@ from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.view_subsets import half_planes, halves_and_quarters
 from sepi.pipeline import estimate_depth
 from sepi.report.panels import SceneResults
+from sepi.report.pictures import reference_picture
 from sepi.report.plan import MAIN_VARIANT
-from sepi.report.plots.pictures import reference_picture
 from sepi.scenes import render
 from sepi.stage import StageMaps
 
@@ -111,9 +111,9 @@ def test_curves_of_a_scene_are_of_views_as_bright_as_the_stages_had_them(monkeyp
     light_field = replace(light_field, views=views)
     maps = estimate_depth(light_field, "no_occlusion_no_textureless")
     parameters = SweepParameters(num_disparities=41)
-    monkeypatch.setattr(scene_probes, "sweep_parameters", lambda file: parameters)
+    monkeypatch.setattr(scene, "sweep_parameters", lambda file: parameters)
     results = SceneResults(light_field, {MAIN_VARIANT: {"optimize": maps}}, {}, [])
-    found = scene_probes.scene_probes(results, Path("unread"), [InterestingPixel(20, 31, "a pixel")])[0]
+    found = scene.scene_probes(results, Path("unread"), [InterestingPixel(20, 31, "a pixel")])[0]
     result = sweep(equally_bright(light_field), parameters)
     assert found.curves.costs[0].min() == pytest.approx(result.cost[0, 20, 31], abs=2e-5)
     assert cost_curves(light_field, 20, 31, parameters).costs[0].min() > 2 * found.curves.costs[0].min()

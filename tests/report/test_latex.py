@@ -8,9 +8,8 @@ import pytest
 
 from sepi.report.numbers import collect
 from sepi.report.plan import TABLES, Plan
+from sepi.report.table import BEST, SECOND, Head, Kind, Section, Table, as_latex, section
 from sepi.report.tables import table
-from sepi.report.tabular.formats import as_latex
-from sepi.report.tabular.table import BEST, SECOND, Head, Kind, Section, Table, section
 
 SPECIALS = "\\ { } $ & # % _ ~ ^ < > | \" ' ` [ ] * -- ---"
 
