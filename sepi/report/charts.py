@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import click
 import numpy as np
 from matplotlib.patches import Patch
 
-from sepi.process.command import SepiCommand
 from sepi.report.drawing import new_figure, save, save_sentence
 from sepi.report.page_data import BarGroup, StageTimes, ablation_bars, part_bars, stage_times
 from sepi.report.properties import variants_with_bars
-from sepi.report.runs import Runs, own_key, read_numbers
+from sepi.report.runs import Runs, own_key
 
 INTERVAL = 90
 """Percentage of the pixels whose truth an interval should hold."""
@@ -128,18 +126,3 @@ CHARTS: dict[str, Callable[[Path, str, Runs], None]] = {
     "ablation_best": lambda folder, name, runs: write_bars(folder, name, part_bars(runs)),
 }
 """Name of each chart to the function that writes it."""
-
-
-@click.command(name="python -m sepi.report.charts", cls=SepiCommand)
-@click.option("--numbers", "numbers_path", type=click.Path(path_type=Path), required=True, help="Numbers (JSON).")
-@click.option("--chart", "names", type=click.Choice(list(CHARTS)), multiple=True, required=True, help="What to draw.")
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")
-def command(numbers_path: Path, names: tuple[str, ...], output: Path) -> None:
-    """Write charts of the report, each as PNG and PDF."""
-    runs = read_numbers(numbers_path)
-    for name in names:
-        CHARTS[name](output, name, runs)
-
-
-if __name__ == "__main__":
-    command()

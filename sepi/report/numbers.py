@@ -1,4 +1,4 @@
-"""All numbers of the report in one CSV file, facts about them in a JSON file, and the command that collects them.
+"""All numbers of the report in one CSV file, and facts about them in a JSON file.
 
 Tables and page are made from these files alone.
 """
@@ -14,7 +14,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
@@ -31,7 +30,6 @@ from sepi.io.scores import (
     without_nan,
 )
 from sepi.io.truth import read_with_truth
-from sepi.process.command import SepiCommand
 from sepi.report.plan import PARTS, Plan
 from sepi.report.runs import EXTERNAL, KEYS, TENTHS, Runs, read_json
 from sepi.scoring.scores import PROTOCOLS, SCORED_REGIONS, WHOLE_MAP
@@ -227,25 +225,3 @@ def _scores(scores: Mapping[str, Mapping[str, Scores]]) -> Iterator[tuple[str, s
         regions = scores[protocol]
         for region in dict.fromkeys([*SCORED_REGIONS, *sorted(regions)]):
             yield from ((protocol, region, name, value) for name, value in regions[region].items())
-
-
-@click.command(name="python -m sepi.report.numbers", cls=SepiCommand)
-@click.option("--results", type=click.Path(path_type=Path), required=True, help="Folder of the results.")
-@click.option(
-    "--plan",
-    "path",
-    type=click.Path(path_type=Path),
-    required=True,
-    help="JSON file: scenes per dataset, choices per variant and stage.",
-)
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="JSON file to write, a CSV beside it.")
-def command(results: Path, path: Path, output: Path) -> None:
-    """Collect all numbers of the report in a CSV file, and facts about them in a JSON file of that name."""
-    plan = Plan.from_json(
-        results, json.dumps(read_json(path, {"scenes", "variants"}, "the plan of a report", "snakemake"))
-    )
-    write_numbers(collect(plan), output)
-
-
-if __name__ == "__main__":
-    command()

@@ -4,11 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from report_results import SCENES, VARIANTS, cells_of, choices
 
 from sepi import variants as built_in
-from sepi.report import numbers, published, tables
+from sepi.report import published, tables
 from sepi.report.plan import COMPARISON, TABLES, Plan
 from sepi.report.runs import Runs
 from sepi.variants import compared_methods, needing_files
@@ -45,11 +44,8 @@ def test_every_compared_method_has_a_published_counterpart() -> None:
 
 
 def test_tables_are_those_of_the_comparison(compared: Runs, tmp_path: Path) -> None:
-    path = tmp_path / "numbers.json"
-    numbers.write_numbers(compared, path)
-    words = ["--numbers", str(path), "--output", str(tmp_path / "out")]
-    assert CliRunner().invoke(tables.command, words).exit_code == 0
-    assert {file.stem for file in (tmp_path / "out").iterdir()} == set(TABLES[COMPARISON])
+    tables.write_tables(compared, tmp_path)
+    assert {file.stem for file in tmp_path.iterdir()} == set(TABLES[COMPARISON])
     cells = cells_of(compared, "methods", "hci/cotton", "best")
     assert (cells["MSE x100"][2], cells["MSE x100, published"][3]) == ("best", "published")
 

@@ -13,7 +13,7 @@ from report_results import MACHINE, SIZE, cells_of, light_field, linked, renamed
 
 from sepi.errors import SepiError
 from sepi.io.scores import read_evaluations, write_scores
-from sepi.report import numbers
+from sepi.report import numbers, tables
 from sepi.report.numbers import collect
 from sepi.report.plan import Plan
 from sepi.report.runs import TENTHS, Runs, read_numbers
@@ -43,8 +43,8 @@ def test_a_missing_or_broken_file_is_one_line(
         path.write_bytes(content)
     about = tmp_path / "plan.json"
     about.write_text(there.to_json())
-    arguments = ["--results", str(there.results), "--plan", str(about), "--output", str(tmp_path / "out.json")]
-    result = CliRunner().invoke(numbers.command, arguments)
+    places = [word for to in ("output", "tables", "charts") for word in (f"--{to}", str(tmp_path / "out.json"))]
+    result = CliRunner().invoke(tables.command, ["--results", str(there.results), "--plan", str(about), *places])
     assert result.exit_code == 1
     assert result.output.startswith(f"sepi: {path}: ")
     assert len(result.output.splitlines()) == 1
