@@ -15,6 +15,7 @@ from sepi.boundaries.decision import assigned_to_surfaces
 from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.rim import Rim, rim_of
 from sepi.boundaries.surface_shares import _views_alike as views_alike
+from sepi.boundaries.surface_shares import view_brightness
 from sepi.boundaries.surroundings import surroundings
 from sepi.kernels import background as background_kernels
 from sepi.kernels import surface_shares as kernels
@@ -364,14 +365,8 @@ def test_brightness_is_told_view_by_view() -> None:
     views = np.clip(picture * factors[..., None, None, None], 0, 1)
     field = LightField(views, "bright")
     still = np.zeros((40, 48), np.float32)
-    rim_views = RimViews(
-        views.reshape(*views.shape[:3], -1), 3, np.ones(3, np.float32), np.argwhere(field.present),
-        field.baselines[field.present], np.empty((0, 0, 0, 48), np.float32), 0, np.float32(0),
-    )  # fmt: skip
     sides = Sides(still, field.reference_view, still == 0, 4)
-    brightness, residual = np.empty((2, 3))
-    nothing = np.zeros((*field.grid, 0, 0), bool)
-    background_kernels.brightness_of_views(rim_views, sides, nothing, brightness, residual)
+    brightness, residual = view_brightness(field, sides, np.argwhere(field.present))
     np.testing.assert_allclose(brightness, factors[0], rtol=0.02)
     assert (residual < 0.01).all()
 
