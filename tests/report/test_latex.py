@@ -5,8 +5,7 @@ import re
 import pandas as pd
 import pytest
 
-from sepi.report.tabular.formats import as_latex
-from sepi.report.tabular.table import BEST, SECOND, Head, Kind, Section, Table, section
+from sepi.report.table import BEST, SECOND, Head, Kind, Section, Table, as_latex, section
 
 
 def in_latex(*sections: Section, caption: str = "All of it.", marked: str = "", name: str = "t") -> str:

@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from sepi.errors import SepiError
-from sepi.extensions.page.probes.probe import Probe
-from sepi.report.plots.pictures import Picture
-from sepi.report.plots.saving import new_figure, save
+from sepi.extensions.page.probe import Probe
+from sepi.report.drawing import new_figure, save
+from sepi.report.pictures import Picture
 
 # colours that colour-blind people can distinguish: Okabe and Ito, https://jfly.uni-koeln.de/color/
 _CURVES = {"full": "#000000", "left": "#E69F00", "right": "#56B4E9", "up": "#009E73", "down": "#D55E00"}

@@ -7,7 +7,7 @@ from report_results import cells_of, csv_rows, only, renamed, report_of
 
 from sepi.external import NO_FILE
 from sepi.report.runs import Runs
-from sepi.report.tabular.table import BEST, SECOND
+from sepi.report.table import BEST, SECOND
 
 
 @pytest.mark.parametrize("table", ["table1_mse", "table2_q25", "table4_ablation", "stages", "edges", "error_bars"])

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 from report_results import SIZE, csv_rows, markdown, only, report_of
 
+from sepi.report.properties import variants_with_bars
 from sepi.report.runs import Runs
-from sepi.report.tabular.error_bars import variants_with_bars
 from sepi.scoring.scores import SCORED_REGIONS
 
 

@@ -18,14 +18,13 @@ import cv2
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.extensions.page.probes.curves import Curves, cost_curves, require_inside
-from sepi.extensions.page.probes.pixels import InterestingPixel, kept_subsets
+from sepi.extensions.page.curves import Curves, cost_curves, require_inside
+from sepi.extensions.page.pixels import InterestingPixel, kept_subsets
 from sepi.lightfield import BoolMap, LightField
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.view_subsets import halves_and_quarters
-from sepi.report.plots.contrast import contrast_of, stretched
-from sepi.report.plots.pictures import Picture, as_rgb, picture_uri
+from sepi.report.pictures import Picture, as_rgb, contrast_of, picture_uri, stretched
 from sepi.stage import StageMaps
 
 GREY = 128

@@ -10,9 +10,24 @@ import pandas as pd
 from sepi.report import published
 from sepi.report.plan import BEST_VARIANT, Plan
 from sepi.report.published import PAPERS_METHOD
-from sepi.report.runs import Runs
-from sepi.report.tabular import methods
-from sepi.report.tabular.table import Head, Kind, Section, Table, ranks, section, shown
+from sepi.report.runs import (
+    AVERAGE,
+    EXTERNAL_NOTE,
+    LEARNED_NOTE,
+    PRINTED_AVERAGE,
+    PROTOCOL_NOTE,
+    REGIONS_NOTE,
+    SCENE,
+    Runs,
+    average_label,
+    count_note,
+    dataset_title,
+    datasets_of,
+    own_key,
+    own_names,
+    printed_label,
+)
+from sepi.report.table import Head, Kind, Section, Table, ranks, section, shown
 from sepi.scoring.scores import REGIONS
 
 
@@ -32,15 +47,15 @@ def scene_table(runs: Runs, score: str, paper: pd.DataFrame, title: str) -> Tabl
     """
     plan = runs.plan
     elsewhere = published.methods().index.difference(paper.columns)
-    parts = [_dataset_section(runs, dataset, score, paper, elsewhere) for dataset in methods.datasets_of(plan)]
+    parts = [_dataset_section(runs, dataset, score, paper, elsewhere) for dataset in datasets_of(plan)]
     return Table(
         title,
-        f"{methods.PROTOCOL_NOTE} This code: variants {methods.own_names(plan)}; then each figure of these divided by "
+        f"{PROTOCOL_NOTE} This code: variants {own_names(plan)}; then each figure of these divided by "
         f"the published one of {_counterparts(plan)}. Other columns: as the "
-        f"paper prints them; empty where the scene was in the method's training set. {methods.LEARNED_NOTE} A scene "
+        f"paper prints them; empty where the scene was in the method's training set. {LEARNED_NOTE} A scene "
         "without a figure of this code is not available or has no ground truth here; one without published figures is "
         "not in the paper. The average of the scenes available is empty where a method has no figure for one of them."
-        + (f" {methods.EXTERNAL_NOTE}" if plan.external else ""),
+        + (f" {EXTERNAL_NOTE}" if plan.external else ""),
         pd.concat([rows for rows, _ in parts]),
         [found for rows, found in parts if len(rows)],
         "Marked: best and second best in a row, of this code and the published methods that are not learned",
@@ -71,25 +86,25 @@ def _dataset_section(
     every = dict.fromkeys([*published.scenes(dataset), *names])
     of_scenes = theirs.drop(index=published.AVERAGE, errors="ignore")
     figures = of_scenes.reindex([*every]).join(here).reindex(columns=known.index)
-    kinds = [methods.SCENE] * len(figures)
+    kinds = [SCENE] * len(figures)
     counts: dict[str, tuple[dict[str, int], int]] = {}
     if names:
         available = figures.loc[names]
-        label = methods.average_label(len(names))
+        label = average_label(len(names))
         figures.loc[label] = available.mean().where(ours | available.notna().all())
         counts[label] = available.count().where(ours, 0).to_dict(), len(names)
-        kinds.append(methods.AVERAGE)
+        kinds.append(AVERAGE)
     if dataset in published.DATASETS:
-        label = methods.printed_label(dataset)
+        label = printed_label(dataset)
         figures.loc[label] = theirs.loc[published.AVERAGE].reindex(known.index)
         counts[label] = published.averaged(paper, dataset), len(published.scenes(dataset))
-        kinds.append(methods.PRINTED_AVERAGE)
+        kinds.append(PRINTED_AVERAGE)
     ratios = known.loc[known["kind"] == Kind.RATIO, "name"]
     divided = figures.reindex(columns=map(published.counterpart, ratios))
-    figures[ratios.index] = figures[[methods.own_key(name) for name in ratios]].to_numpy() / divided.to_numpy()
+    figures[ratios.index] = figures[[own_key(name) for name in ratios]].to_numpy() / divided.to_numpy()
     notes = pd.DataFrame("", figures.index, figures.columns)
     for label, (found, most) in counts.items():
-        notes.loc[label] = [methods.count_note([found.get(key, 0)], most) for key in known.index]
+        notes.loc[label] = [count_note([found.get(key, 0)], most) for key in known.index]
     told = {name: runs.problems(dataset, [scene]) for name, scene in zip(names, scenes, strict=True)}
     problems = shown(pd.DataFrame(told).T.reindex_like(figures))
     unknown = (100 * runs.of("non_finite", dataset) / runs.of("pixels", dataset)).set_axis(names)
@@ -109,7 +124,7 @@ def _dataset_section(
     rows = _texts(figures, known["kind"], 4).where(problems == "", problems).reset_index(names="scene")
     rows.insert(0, "dataset", dataset)
     rows.insert(2, "row", kinds)
-    return rows, section(methods.dataset_title(dataset), heads, texts, marks, notes, kinds)
+    return rows, section(dataset_title(dataset), heads, texts, marks, notes, kinds)
 
 
 def _texts(figures: pd.DataFrame, kinds: pd.Series, decimals: int) -> pd.DataFrame:
@@ -121,7 +136,7 @@ def _texts(figures: pd.DataFrame, kinds: pd.Series, decimals: int) -> pd.DataFra
 def region_table(runs: Runs) -> Table:
     """Table 3: average MSE x100 in occluded and textureless regions: ours, published, and of external methods' maps."""
     plan, paper = runs.plan, published.table3()
-    datasets = [one for one in methods.datasets_of(plan) if one in published.DATASETS or runs.scored(one)]
+    datasets = [one for one in datasets_of(plan) if one in published.DATASETS or runs.scored(one)]
     known = runs.methods
     known = known[known["kind"].isin([Kind.OURS, Kind.EXTERNAL]) | known.index.isin(paper.index)]
     here = known["kind"] != Kind.PUBLISHED
@@ -140,7 +155,7 @@ def region_table(runs: Runs) -> Table:
         figures[column] = means.astype(object).where(means.notna(), problems)
         counts[f"{column}_scenes"] = found.where(found > 0).astype("Int64")
         most = here.map({True: len(scenes), False: len(of_paper)})
-        notes[column] = [methods.count_note([n], m) for n, m in zip(found.fillna(0).astype(int), most, strict=True)]
+        notes[column] = [count_note([n], m) for n, m in zip(found.fillna(0).astype(int), most, strict=True)]
         # ours rank among published averages only if the scenes are the same
         compares = not of_paper or sorted(of_paper) == sorted(
             filter(None, map(partial(published.paper_scene, dataset), scenes))
@@ -152,10 +167,10 @@ def region_table(runs: Runs) -> Table:
     available = "; ".join(f"{dataset}: {', '.join(runs.scored(dataset)) or 'none'}" for dataset in datasets)
     return Table(
         "Table 3: MSE x100 in occluded and textureless regions",
-        f"{methods.PROTOCOL_NOTE} This code: variants {methods.own_names(plan)}, average of the scenes available that "
+        f"{PROTOCOL_NOTE} This code: variants {own_names(plan)}, average of the scenes available that "
         f"have such a region ({available}). Other rows: as the paper prints them, over all scenes of the dataset "
         "where none or fewer are named. "
-        f"{methods.REGIONS_NOTE} {methods.LEARNED_NOTE}" + (f" {methods.EXTERNAL_NOTE}" if plan.external else ""),
+        f"{REGIONS_NOTE} {LEARNED_NOTE}" + (f" {EXTERNAL_NOTE}" if plan.external else ""),
         rows.reset_index(names="method"),
         [
             section(
@@ -170,12 +185,12 @@ def region_table(runs: Runs) -> Table:
 def ablation_table(runs: Runs) -> Table:
     """Table 4: MSE of every variant over the map and both regions, per scene, averaged, and published."""
     variants = list(runs.plan.variants)
-    parts = [_ablation_section(runs, dataset, variants) for dataset in methods.datasets_of(runs.plan)]
+    parts = [_ablation_section(runs, dataset, variants) for dataset in datasets_of(runs.plan)]
     return Table(
         "Table 4: ablation, MSE x100 (whole map / occluded / textureless)",
-        f"{methods.PROTOCOL_NOTE} The first five variants are the columns of the paper's table 4 in its order; `wang` "
+        f"{PROTOCOL_NOTE} The first five variants are the columns of the paper's table 4 in its order; `wang` "
         f"is the comparison in its text (published for the whole map only), `{BEST_VARIANT}` this project's own. "
-        f"{methods.REGIONS_NOTE}",
+        f"{REGIONS_NOTE}",
         pd.concat([rows for rows, _ in parts]),
         [found for rows, found in parts if len(rows)],
     )
@@ -190,7 +205,7 @@ def mean_by_region(runs: Runs, dataset: str, variants: list[str]) -> tuple[pd.Da
 
 def _of(runs: Runs, dataset: str, region: str, variants: list[str]) -> pd.DataFrame:
     found = runs.of("mse100", dataset, region)
-    return found.reindex(columns=map(methods.own_key, variants)).set_axis(variants, axis=1)
+    return found.reindex(columns=map(own_key, variants)).set_axis(variants, axis=1)
 
 
 def _ablation_section(runs: Runs, dataset: str, variants: list[str]) -> tuple[pd.DataFrame, Section]:
@@ -206,20 +221,18 @@ def _ablation_section(runs: Runs, dataset: str, variants: list[str]) -> tuple[pd
         kinds.append(kind)
 
     for scene in scenes:
-        add(scene, methods.SCENE, pd.DataFrame({r: of_regions[r].loc[scene] for r in REGIONS}).T, [scene] * 3, "n/a")
+        add(scene, SCENE, pd.DataFrame({r: of_regions[r].loc[scene] for r in REGIONS}).T, [scene] * 3, "n/a")
     if scenes:
         means, counts = mean_by_region(runs, dataset, variants)
-        label = methods.average_label(len(scenes))
-        add(label, methods.AVERAGE, means, list(map(methods.average_label, counts.max(axis=1))), "n/a")
-        notes.loc[label] = [methods.count_note(list(counts[variant]), len(scenes)) for variant in variants]
+        label = average_label(len(scenes))
+        add(label, AVERAGE, means, list(map(average_label, counts.max(axis=1))), "n/a")
+        notes.loc[label] = [count_note(list(counts[variant]), len(scenes)) for variant in variants]
     if dataset in published.DATASETS:
-        label = methods.printed_label(dataset)
+        label = printed_label(dataset)
         paper = shown(published.table4().loc[dataset].T).reindex(index=REGIONS, columns=variants)
-        add(label, methods.PRINTED_AVERAGE, paper, [label] * 3, "")
+        add(label, PRINTED_AVERAGE, paper, [label] * 3, "")
     heads = {"scene": Head("scene", Kind.TEXT), **{variant: Head(variant, Kind.OURS) for variant in variants}}
     texts = pd.DataFrame(cells).T.reindex(columns=variants)
     order = ["dataset", "scene", "row", "region", *variants]
     every = pd.concat(rows)[order] if rows else pd.DataFrame(columns=order)
-    return every, section(
-        methods.dataset_title(dataset), heads, texts.assign(scene=texts.index), notes=notes, rows=kinds
-    )
+    return every, section(dataset_title(dataset), heads, texts.assign(scene=texts.index), notes=notes, rows=kinds)

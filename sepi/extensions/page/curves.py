@@ -44,7 +44,7 @@ class Curves:
     An occluder on the right of a pixel hides it from views on the right; views on the left see it well:
 
     >>> from sepi import initial
-    >>> from sepi.extensions.page.probes.curves import Curves, cost_curves
+    >>> from sepi.extensions.page.curves import Curves, cost_curves
     >>> from sepi.scenes import render
     >>> light_field = render("curved_occluders", size=96, views=5)
     >>> found = cost_curves(light_field, 24, 6, initial.CHOICES["sepi"].parameters(num_disparities=61))
@@ -124,7 +124,7 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     Examples
     --------
     >>> from sepi import initial
-    >>> from sepi.extensions.page.probes.curves import cost_curves
+    >>> from sepi.extensions.page.curves import cost_curves
     >>> from sepi.scenes import render
     >>> light_field = render("fronto_parallel", size=64, views=3)
     >>> found = cost_curves(light_field, 32, 32, initial.CHOICES["sepi"].parameters(num_disparities=41))

@@ -3,7 +3,7 @@
 import numpy as np
 from report_results import light_field
 
-from sepi.report.plots import pictures
+from sepi.report import pictures
 
 
 def test_error_picture_shows_sign_and_unknown() -> None:

@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from sepi.report.tabular.table import BEST, SECOND, ranks, shown
+from sepi.report.table import BEST, SECOND, ranks, shown
 
 
 @pytest.mark.parametrize(
