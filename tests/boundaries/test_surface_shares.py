@@ -9,13 +9,11 @@ import numpy.typing as npt
 import pytest
 from geometries import GEOMETRIES, standing
 
-from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.decision import assigned_to_surfaces
 from sepi.boundaries.parameters import BoundaryParameters
-from sepi.boundaries.rim import Rim, rim_of
+from sepi.boundaries.rim import Rim, RimViews, Sides, rim_of, surroundings
 from sepi.boundaries.surface_shares import _views_alike as views_alike
 from sepi.boundaries.surface_shares import view_brightness
-from sepi.boundaries.surroundings import surroundings
 from sepi.kernels import background as background_kernels
 from sepi.kernels import surface_shares as kernels
 from sepi.lightfield import LightField

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from sepi.matching.aligned_views import mean_reference
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, compared_with
 from sepi.matching.denoising import DenoisedLightField, denoised
-from sepi.matching.mean_reference import mean_reference
 from sepi.matching.row_bands import Rows
 from sepi.matching.view_subsets import spread_views
 from sepi.scenes import render

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sepi.matching.surface_windows import ANY_SURFACE, BESIDE_NEARER, OF_OTHER_COLOUR, Surfaces, windowed_step
+from sepi.matching.gauss_newton import ANY_SURFACE, BESIDE_NEARER, OF_OTHER_COLOUR, Surfaces, windowed_step
 
 MARGIN, COLOUR_WIDTH = 0.15, 0.1
 

@@ -12,11 +12,10 @@ from scipy.sparse.linalg import spsolve
 from sepi.kernels import gauss_newton
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
-from sepi.matching.gauss_newton import GaussNewton, spline_derivatives
+from sepi.matching.gauss_newton import GaussNewton, Surfaces, spline_derivatives, windowed_step
 from sepi.matching.nearest_surfaces import z_buffers
 from sepi.matching.row_bands import Rows
 from sepi.matching.spline_views import MARGIN, SPLINE_UNIT, spline_views
-from sepi.matching.surface_windows import Surfaces, windowed_step
 from sepi.matching.view_subsets import spread_views
 from sepi.optimize import SecondOrderParameters, second_order
 from sepi.pipeline import estimate_depth

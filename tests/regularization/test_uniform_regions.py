@@ -5,8 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from sepi.lightfield import DisparityRange, LightField
-from sepi.regularization.border_planes import BorderPlane
-from sepi.regularization.plane_search import support
+from sepi.regularization.border_planes import BorderPlane, support
 from sepi.regularization.regions import Region
 from sepi.regularization.uniform_regions import UniformPlanesParameters, _planes_of, fill_uniform_regions
 from sepi.stage import StageMaps
