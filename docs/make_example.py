@@ -15,9 +15,9 @@ from sepi.extensions.rendered.catalogue import RENDERED
 from sepi.io.hdf5 import read_stage
 from sepi.io.truth import read_with_truth
 from sepi.lightfield import FloatMap, LightField
+from sepi.report.drawing import write_overview
+from sepi.report.pictures import Picture, disparity_limits, error_picture, map_picture, reference_picture
 from sepi.report.plan import TABLES
-from sepi.report.plots.overview import write_overview
-from sepi.report.plots.pictures import Picture, disparity_limits, error_picture, map_picture, reference_picture
 from sepi.variants import VARIANTS
 from sepi.workflow.rendered_scenes import DATASET
 from sepi.workflow.result_paths import RESULTS, scene_files

@@ -18,8 +18,8 @@ from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of, compared_metho
 from sepi.report.plan import PARTS, Plan
 from sepi.validation import require_known
 from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, keep, remember, stage_modules
-from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
+from sepi.workflow.needs import stage_needs
 from sepi.workflow.result_paths import RESULTS, key_of, scene_files
 
 # the folder of the Snakefile, and whether another workflow uses it as a module
@@ -159,20 +159,13 @@ def stage_message(stage, title):
     return f"{{wildcards.dataset}}/{{wildcards.scene}}: {title} ({choices})"
 
 
-# the command of every stage, after its inputs
-STAGE_FLAGS = (
-    "--choice {params.choice} --parameters {params.parameters:q} --threads {threads} "
-    "--output {output.maps:q} --timing {output.timing:q} 2> {log:q}"
-)
-
-
 def file_before(stage):
-    """Function of wildcards: the stage file that a stage reads, of the last stage that ran before it."""
+    """Function of wildcards: the stage file that a stage reads, of the last stage that ran before it, if any."""
     before = list(STAGES)[: list(STAGES).index(stage)]
 
     def file(wildcards):
         labels = {name: wildcards[name] for name in before}
-        return scene_files(wildcards.dataset, wildcards.scene).stage(labels, before[-1])
+        return scene_files(wildcards.dataset, wildcards.scene).stage(labels, before[-1]) if before else []
 
     return file
 
@@ -302,33 +295,18 @@ def threads_for(wildcards):
     return min(1 + scene_of(wildcards).samples // 8_000_000, 8)
 
 
-def stage_memory_for(stage, bytes_per_sample, bytes_per_pixel):
-    """Function of wildcards: memory of a stage's job in MB, the stage's usual or what its choice needs.
+def stage_resources(stage):
+    """Resources of a stage's rule: memory in MB and minutes of a job, as functions of wildcards."""
 
-    Candidates beyond the usual number add to it.
-    """
-
-    def memory(wildcards, attempt):
+    def asked(wildcards):
         scene, parameters = scene_of(wildcards), SETTINGS.parameters[stage][wildcards[stage]]
-        usual = scene.memory_mb(bytes_per_sample, bytes_per_pixel)
-        own = scene.memory_mb(parameters.needs.bytes_per_sample, parameters.needs.bytes_per_pixel)
-        return attempt * (max(usual, own) + candidates_mb(scene, *sweep_of(stage, wildcards), threads_for(wildcards)))
+        light_field = scene_files(wildcards.dataset, wildcards.scene, Path(placed(RESULTS))).light_field
+        return stage_needs(scene, light_field, stage, parameters, threads_for(wildcards))
 
-    return memory
-
-
-def stage_minutes_for(stage, seconds_per_megasample):
-    """Function of wildcards: time of a stage's job in minutes, the stage's usual or what its choice needs.
-
-    Candidates beyond the usual number add to it.
-    """
-
-    def minutes(wildcards, attempt):
-        scene, parameters = scene_of(wildcards), SETTINGS.parameters[stage][wildcards[stage]]
-        seconds = max(seconds_per_megasample, parameters.needs.seconds_per_megasample)
-        return attempt * scene.minutes(candidates_factor(scene, *sweep_of(stage, wildcards)) * seconds)
-
-    return minutes
+    return {
+        "mem_mb": lambda wildcards, attempt: attempt * asked(wildcards)[0],
+        "runtime": lambda wildcards, attempt: attempt * asked(wildcards)[1],
+    }
 
 
 def memory_for(*needs, **more):
@@ -359,9 +337,3 @@ def of_source(read, of_module):
         return (read if scene_of(wildcards).module is None else of_module)(wildcards, attempt)
 
     return ask
-
-
-def sweep_of(stage, wildcards):
-    """File of a scene's light field, and the parameters of a stage's choice."""
-    light_field = scene_files(wildcards.dataset, wildcards.scene, Path(placed(RESULTS))).light_field
-    return light_field, SETTINGS.parameters[stage][wildcards[stage]]

@@ -20,124 +20,43 @@ rule plan:
         "jinja2"
 
 
-# All numbers of the report in one table, and facts about the scenes beside it. The parts of variant best have files of
-# their own (report_parts), since `all` does not run those variants.
-rule numbers:
-    input:
-        plan="reports/page/plan{which}.json",
-        measured=lambda wildcards: measured_files(wildcards.which),
-    output:
-        numbers=multiext("reports/report{which}", ".json", ".csv"),
-    log:
-        "logs/report{which}.log",
-    benchmark:
-        "benchmarks/report{which}.tsv"
-    threads: 1
-    resources:
-        # light fields are read one by one
-        mem_mb=lambda wildcards: 500 + max(scene.samples for scene in scenes_of(wildcards.which)) * 8 // 2**20,
-        runtime=lambda wildcards: 5 + sum(scene.minutes(0.1) for scene in scenes_of(wildcards.which)) // 5,
-    params:
-        results=results_folder,
-        code=code_digest("sepi.report.numbers"),
-    message:
-        "numbers of the report"
-    shell:
-        command(
-            "sepi.report.numbers --results {params.results:q} --plan {input.plan:q} "
-            "--output {output.numbers[0]:q} 2> {log:q}"
-        )
-
-
-# Tables of each report, and of the parts of variant best, which have their own file of numbers
-for which in TABLES:
+# All numbers of a report in one table with facts about the scenes beside it, and what is made of them alone: tables, and
+# charts in print quality. The parts of variant best have files of their own, since `all` does not run those variants.
+for which, (folder, plan) in NUMBERS.items():
 
     rule:
         name:
-            f"tables{which}"
+            f"numbers{which}"
         input:
-            numbers=multiext(f"reports/report{which}", ".json", ".csv"),
+            plan=f"reports/page/plan{which}.json",
+            measured=measured_files(which),
             published=sorted(PUBLISHED.glob("*.csv")),
         output:
-            report(
-                [file for file in table_files(which) if file.endswith(".csv")],
-                caption="captions/tables.rst",
-                category="Tables",
-            ),
-            [file for file in table_files(which) if not file.endswith(".csv")],
+            report(table_files(which, ["csv"]), caption="captions/tables.rst", category="Tables"),
+            table_files(which, ["md", "tex"]),
+            *map(as_chart, plan.charts),
+            numbers=multiext(f"reports/report{which}", ".json", ".csv"),
         log:
-            f"logs/tables{which}.log",
+            f"logs/report{which}.log",
         benchmark:
-            f"benchmarks/tables{which}.tsv"
-        localrule: True
+            f"benchmarks/report{which}.tsv"
         threads: 1
+        resources:
+            # light fields are read one by one
+            mem_mb=600 + max((scene.samples for scene in scenes_of(which)), default=0) * 8 // 2**20,
+            runtime=5 + sum(scene.minutes(0.1) for scene in scenes_of(which)) // 5,
         params:
-            folder=folder_of_output,
+            results=placed(RESULTS),
+            tables=placed(folder),
+            charts=placed(CHARTS),
             code=code_digest("sepi.report.tables"),
         message:
-            "tables"
+            "numbers, tables and charts of the report"
         shell:
-            command("sepi.report.tables --numbers {input.numbers[0]:q} --output {params.folder:q} 2> {log:q}")
-
-
-# Charts of the numbers, in print quality
-rule charts:
-    input:
-        numbers=multiext("reports/report", ".json", ".csv"),
-        published=sorted(PUBLISHED.glob("*.csv")),
-    output:
-        report(multiext("reports/figures/ablation", ".png", ".pdf"), caption="captions/ablation.rst", category="Charts"),
-        report(
-            multiext("reports/figures/time_and_memory", ".png", ".pdf"), caption="captions/time.rst", category="Charts"
-        ),
-        report(
-            multiext("reports/figures/error_bars", ".png", ".pdf"),
-            caption="captions/error_bars.rst",
-            category="Charts",
-        ),
-    log:
-        "logs/charts.log",
-    benchmark:
-        "benchmarks/charts.tsv"
-    localrule: True
-    threads: 1
-    params:
-        folder=folder_of_output,
-        code=code_digest("sepi.report.charts"),
-    message:
-        "charts"
-    shell:
-        command(
-            "sepi.report.charts --numbers {input.numbers[0]:q} --chart ablation --chart time_and_memory --chart error_bars "
-            "--output {params.folder:q} 2> {log:q}"
-        )
-
-
-# Chart of the parts of variant best
-rule parts_chart:
-    input:
-        numbers=multiext("reports/report_parts", ".json", ".csv"),
-    output:
-        report(
-            multiext("reports/figures/ablation_best", ".png", ".pdf"),
-            caption="captions/ablation.rst",
-            category="Charts",
-        ),
-    log:
-        "logs/parts_chart.log",
-    benchmark:
-        "benchmarks/parts_chart.tsv"
-    localrule: True
-    threads: 1
-    params:
-        folder=folder_of_output,
-        code=code_digest("sepi.report.charts"),
-    message:
-        "chart of the parts of best"
-    shell:
-        command(
-            "sepi.report.charts --numbers {input.numbers[0]:q} --chart ablation_best --output {params.folder:q} 2> {log:q}"
-        )
+            command(
+                "sepi.report.tables --results {params.results:q} --plan {input.plan:q} --output {output.numbers[0]:q} "
+                "--tables {params.tables:q} --charts {params.charts:q} 2> {log:q}"
+            )
 
 
 # Images of a scene: reference view, ground truth, each stage and variant, errors, masks, external methods' maps, and
@@ -165,7 +84,7 @@ rule maps:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=1000),
         runtime=minutes_for(0.05, 15),
     params:
-        results=results_folder,
+        results=placed(RESULTS),
         plan=plan_of_scene,
         pixels=pixels_of,
         page=page_flags,

@@ -3,27 +3,33 @@
 from sepi.report.plan import COMPARISON, PUBLISHED
 
 PARTS_OF_BEST = multiext("reports/report_parts", ".json", ".csv") if SETTINGS.report.parts_of_best else []
-# ending of a file of numbers to the folder and the names of its tables
-TABLES = {
-    plan.ending: (f"reports/{'' if name == PARTS else name}".rstrip("/"), plan.tables) for name, plan in PLANS.items()
-}
+# folder of the charts
+CHARTS = "reports/figures"
+# ending of a file of numbers to the folder of its tables, and its plan
+NUMBERS = {plan.ending: (f"reports/{'' if name == PARTS else name}".rstrip("/"), plan) for name, plan in PLANS.items()}
 
 
-def table_files(which):
+def table_files(which, endings=("csv", "md", "tex")):
     """Tables of a file of numbers, each as CSV, Markdown and LaTeX."""
-    folder, tables = TABLES[which]
-    return [f"{folder}/{table}.{ending}" for table in tables for ending in ("csv", "md", "tex")]
+    folder, plan = NUMBERS[which]
+    return [f"{folder}/{table}.{ending}" for table in plan.tables for ending in endings]
 
 
 def figure_files(names):
     """Charts, each as PNG and PDF."""
-    return [f"reports/figures/{name}.{ending}" for name in names for ending in ("png", "pdf")]
+    return [file for name in names for file in multiext(f"{CHARTS}/{name}", ".png", ".pdf")]
+
+
+def as_chart(name):
+    """Files of a chart for a rule's output, with their text in Snakemake's own report."""
+    caption = f"captions/{name.removesuffix('_best')}.rst"
+    return report(multiext(f"{CHARTS}/{name}", ".png", ".pdf"), caption=caption, category="Charts")
 
 
 def report_files(name=""):
     """Files of a report: page if there is one, numbers, tables, and images of every scene."""
     plan = REPORTS[name]
-    folder, _ = TABLES[plan.ending]
+    folder, _ = NUMBERS[plan.ending]
     page = [f"{folder}/index.html"] if SETTINGS.has_page else []
     pictures = [f"{folder}/maps/{dataset}/{scene}" for dataset, scene in plan.pictured]
     return [*page, *multiext(f"reports/report{plan.ending}", ".json", ".csv"), *table_files(plan.ending), *pictures]
@@ -31,14 +37,14 @@ def report_files(name=""):
 
 def all_files():
     """Files of the main report, its charts, and the parts of ``best`` if the configuration asks for them."""
-    charts = figure_files(["ablation", "time_and_memory", "error_bars"])
+    charts = figure_files(REPORTS[""].charts)
     return list(dict.fromkeys([*report_files(), *charts, *(ablation_files() if PARTS_OF_BEST else [])]))
 
 
 def ablation_files():
     """Files of the paper's table 4, and of the ablation of ``best``."""
     paper = [file for file in table_files("") if Path(file).stem == "table4_ablation"]
-    return [*paper, *table_files(f"_{PARTS}"), *figure_files(["ablation", "ablation_best"])]
+    return [*paper, *table_files(f"_{PARTS}"), *figure_files(["ablation", *PLANS[PARTS].charts])]
 
 
 def every_file():
@@ -47,8 +53,8 @@ def every_file():
 
 
 def measured_files(which):
-    """Inputs of a file of numbers."""
-    return plan_of(which).number_inputs()
+    """Function of wildcards: inputs of a file of numbers."""
+    return lambda wildcards: plan_of(which).number_inputs()
 
 
 def scenes_of(which):
@@ -97,8 +103,3 @@ def folder_of_output(wildcards, output):
 def folder_of_scenes(wildcards, output):
     """Folder beside a page with a file for each scene."""
     return os.path.join(os.path.dirname(output[0]), "page")
-
-
-def results_folder(wildcards):
-    """Folder in which commands look for results."""
-    return placed(RESULTS)

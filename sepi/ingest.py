@@ -13,6 +13,7 @@ from pathlib import Path
 import click
 
 from sepi.cli.input_options import Reading, range_to_search, reading_flags, scene_flags
+from sepi.inspection.coded_views import comparable
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import write_light_field
 from sepi.process.command import SepiCommand, write_timing
@@ -59,7 +60,9 @@ def main(
 
         assert builtin is not None  # one of them is given
         light_field = replace(render(builtin, size=size, views=views), ground_truth=None, masks={})
-    write_light_field(output, settle_range(light_field, disparity_range))
+    light_field = settle_range(light_field, disparity_range)
+    # found out here once for all stages
+    write_light_field(output, light_field, comparable(light_field) is light_field)
     if timing is not None:
         write_timing(timing, started, threads)
 

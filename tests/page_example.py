@@ -14,9 +14,8 @@ from sepi.camera import Camera
 from sepi.errors import SepiWarning
 from sepi.evaluate import evaluations_of
 from sepi.extensions.page.page import page_of
-from sepi.extensions.page.probes.pixels import InterestingPixel
-from sepi.extensions.page.probes.scene_probes import scene_probes
-from sepi.extensions.page.scene import page_json
+from sepi.extensions.page.pixels import InterestingPixel
+from sepi.extensions.page.scene import page_json, scene_probes
 from sepi.external import ExternalSource, external_maps
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.pfm import write_pfm

@@ -17,7 +17,7 @@ from sepi.reading import read_light_field
 from sepi.scoring.scores import score
 from sepi.stage import StageMaps, no_progress
 from sepi.variants import STAGES, VARIANTS, choice_of
-from sepi.workflow.parameters import stage_settings
+from sepi.workflow.settings import stage_settings
 
 SETTINGS = stage_settings({}, VARIANTS)
 # first row and column

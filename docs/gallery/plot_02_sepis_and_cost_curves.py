@@ -11,7 +11,7 @@ that gives the method its name, to the curve whose minimum is the disparity.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from sepi.extensions.page.probes.curves import cost_curves
+from sepi.extensions.page.curves import cost_curves
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.scenes import render

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 
 import sepi
-from sepi.extensions.page.probes.curves import cost_curves
+from sepi.extensions.page.curves import cost_curves
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.scenes import render

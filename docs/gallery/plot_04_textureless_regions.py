@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import sepi
-from sepi.extensions.page.probes.curves import cost_curves
+from sepi.extensions.page.curves import cost_curves
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.scenes import render
 from sepi.scoring.scores import score

@@ -16,7 +16,7 @@ from sepi.inspection.view_order import check_order
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import DisparityRange, LightField, as_unit_float
 from sepi.pipeline import estimate_depth
-from sepi.report.plots.pictures import map_picture
+from sepi.report.pictures import map_picture
 from sepi.scenes import render
 
 Views = npt.NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 
 from pictures.style import Draw, Ink, new_sheet
 from sepi.lightfield import FloatMap, LightField
-from sepi.report.plots.pictures import Picture, disparity_limits, error_picture, map_picture, reference_picture
+from sepi.report.pictures import Picture, disparity_limits, error_picture, map_picture, reference_picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

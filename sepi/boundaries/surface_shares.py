@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.parameters import BoundaryParameters
@@ -21,7 +22,7 @@ from sepi.boundaries.surroundings import Surroundings
 from sepi.image.noise import noise_of_reference_view
 from sepi.kernels import background as background_kernels
 from sepi.kernels import surface_shares as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import row_bands
 from sepi.matching.view_subsets import spread_views
@@ -31,6 +32,12 @@ _LEAST_SCALE = 0.005
 
 _MOST_DARKENING = 1.25
 """Ratio of brightness, either way, up to which a view is taken for another exposure of the same."""
+
+_ACROSS = 64
+"""Pixels along the shorter side whose colours tell the brightness of a view."""
+
+_MOST_DIFFERENCE = 0.1
+"""Of one channel in a view's residual, colours in 0..1."""
 
 BYTES_PER_PIXEL = 4
 """Of a pixel of a view: the z-buffer."""
@@ -116,22 +123,63 @@ def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryPara
     """
     present = spread_views(light_field, parameters.share_views)
     places, baselines = np.argwhere(present), light_field.baselines[present]
-    units = np.full(len(places), 1 / full_scale(light_field.views.dtype), np.float32)
+    brightness, residual = view_brightness(light_field, sides, places)
+    alike = (brightness > 1 / _MOST_DARKENING) & (brightness < _MOST_DARKENING)
+    showing = np.isfinite(residual)
+    usual = float(np.median(residual[showing])) if showing.any() else 0.0
+    alike &= showing & (residual <= 2 * usual + _LEAST_SCALE)
+    units = (1 / full_scale(light_field.views.dtype) / brightness[alike]).astype(np.float32)
     # kernels take rows whose numbers lie side by side
     pixels = np.ascontiguousarray(light_field.views)
     lines = pixels.reshape(*pixels.shape[:3], -1)
     margin = np.float32(parameters.occlusion_margin)
     nothing = np.empty((0, 0, 0, pixels.shape[3]), np.float32)
-    views = RimViews(lines, pixels.shape[4], units, places, baselines, nothing, 0, margin)
-    missing = np.zeros((*light_field.grid, 0, 0), bool) if light_field.missing is None else light_field.missing
-    brightness, residual = np.empty((2, len(places)))
-    background_kernels.brightness_of_views(views, sides, missing, brightness, residual)
-    alike = (brightness > 1 / _MOST_DARKENING) & (brightness < _MOST_DARKENING)
-    showing = np.isfinite(residual)
-    usual = float(np.median(residual[showing])) if showing.any() else 0.0
-    alike &= showing & (residual <= 2 * usual + _LEAST_SCALE)
-    units = (units[alike] / brightness[alike]).astype(np.float32)
-    return views._replace(units=units, places=places[alike], baselines=baselines[alike])
+    return RimViews(lines, pixels.shape[4], units, places[alike], baselines[alike], nothing, 0, margin)
+
+
+def view_brightness(
+    light_field: LightField, sides: Sides, places: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Brightness and residual of views relative to the reference view, over some clean pixels.
+
+    Parameters
+    ----------
+    light_field : LightField
+    sides : Sides
+    places : ndarray, shape (N, 2), int64
+        Row and column of each view in the grid.
+
+    Returns
+    -------
+    brightness, residual : ndarray, shape (N,), float64
+        Ratio of the sums of the colours that both show, and what remains: mean absolute difference of one channel,
+        0..1; NaN where they show nothing alike.
+    """
+    shape = light_field.shape
+    stride = max(1, min(shape) // _ACROSS)
+    # a flipped view has the same pixels
+    lines = [np.flatnonzero(np.minimum(at := np.arange(length), at[::-1]) % stride == 0) for length in shape]
+    asked = np.ix_(*lines)
+    here, disparity, clean = sides.guide[asked], sides.disparity[asked], sides.clean[asked]
+    brightness, residual = np.ones(len(places)), np.full(len(places), np.nan)
+    for n, (t, s) in enumerate(places.tolist()):
+        down, across = light_field.baselines[t, s]
+        y, x = (
+            (lines[0][:, None] - disparity * down).astype(np.float32),
+            (lines[1] - disparity * across).astype(np.float32),
+        )
+        shown = clean & (y >= 0) & (y <= shape[0] - 1) & (x >= 0) & (x <= shape[1] - 1)
+        if light_field.missing is not None:
+            missing = light_field.missing[t, s].astype(np.float32)
+            shown &= cv2.remap(missing, x, y, cv2.INTER_LINEAR) == 0
+        if shown.any():
+            view = np.ascontiguousarray(light_field.rgb_views[t, s])
+            there = as_unit_float(cv2.remap(view, x, y, cv2.INTER_LINEAR))[shown]
+            own, other = (max(float(colours.sum(dtype=np.float64)), 1e-9) for colours in (here[shown], there))
+            brightness[n] = other / own
+            apart = np.abs(there / brightness[n] - here[shown])
+            residual[n] = np.minimum(apart, _MOST_DIFFERENCE).mean(dtype=np.float64)
+    return brightness, residual
 
 
 def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32, moved: FloatMap) -> tuple[FloatMap, BoolMap]:

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sepi.cli.input_options import Pair, Reading, reading_flags, truth_flags
-from sepi.cli.scene_argument import read_ground_truth
+from sepi.cli.input_options import Pair, Reading, read_ground_truth, reading_flags, truth_flags
 from sepi.errors import SepiError, SepiWarning
 from sepi.process.command import SepiCommand, bad_thresholds
 

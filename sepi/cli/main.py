@@ -23,8 +23,8 @@ _MODULES = {
     "evaluate": ("evaluate", "Score a disparity map against ground truth."),
     "export": ("export", "Save the light field INPUT as read, so that it needs no flags."),
     "info": ("info", "Show what is known about the light field INPUT."),
-    "points": ("points", "Write the point cloud of a result."),
-    "scenes": ("scenes", "Write scenes with exact ground truth."),
+    "points": ("convert", "Write the point cloud of a result."),
+    "scenes": ("export", "Write scenes with exact ground truth."),
 }
 """Command to its module in this folder, and its line in the list of commands."""
 

@@ -93,11 +93,11 @@ def without_blocks(light_field: LightField) -> LightField:
         Views of the same dtype; the same noise each time.
     """
     views = light_field.views
-    scale, random = full_scale(views.dtype), np.random.default_rng(0)
+    scale = full_scale(views.dtype)
     strength = np.float32(_noise_of(coding_error(light_field)) * scale)
     if not strength:
         return light_field
-    noisy = np.array(views)
+    noisy, random = np.array(views), np.random.default_rng(0)
     for place in map(tuple, np.argwhere(light_field.present).tolist()):
         view = views[place] + strength * random.standard_normal(views.shape[2:], np.float32)
         noisy[place] = np.clip(view, LOWEST, HIGHEST) if views.dtype == np.float32 else np.clip(np.rint(view), 0, scale)

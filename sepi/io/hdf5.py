@@ -153,7 +153,11 @@ def read_attributes(path: Path, check: bool = True) -> dict[str, Any]:
         return {name: attribute(file, name) for name in file.attrs}
 
 
-def write_light_field(path: str | Path, light_field: LightField) -> None:
+COMPARABLE = "comparable"
+"""Attribute of a light field: whether stages compare its views as they are (:mod:`sepi.inspection.coded_views`)."""
+
+
+def write_light_field(path: str | Path, light_field: LightField, comparable: bool = False) -> None:
     """Write a light field with all its properties, whole or not at all; reading gives it back unchanged.
 
     Parameters
@@ -161,6 +165,8 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
     path : str or Path
         HDF5 file to write; :func:`sepi.read_light_field` reads it. Equal content gives equal bytes.
     light_field : LightField
+    comparable : bool
+        Whether its views are known to be comparable, for jobs on the file.
 
     Raises
     ------
@@ -200,6 +206,7 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
         # jobs on this file need the reach, and must not read the views for it
         numbers: dict[str, Any] = {"reach": light_field.reach, "row_spacing": light_field.row_spacing}
         numbers |= {"view": light_field.view, "camera": light_field.camera and numbers_of(light_field.camera)}
+        numbers |= {COMPARABLE: comparable or None}
         if known is not None:
             numbers["disparity_range"], texts["disparity_range_source"] = (known.minimum, known.maximum), known.source
         file.attrs.update({key: value for key, value in numbers.items() if value is not None})

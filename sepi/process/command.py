@@ -246,7 +246,7 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     from dataclasses import replace
 
     from sepi.inspection.coded_views import comparable
-    from sepi.io.hdf5 import read_light_field, read_stage, write_stage
+    from sepi.io.hdf5 import COMPARABLE, read_attributes, read_light_field, read_stage, write_stage
     from sepi.io.provenance import history_of, stage_attributes
     from sepi.process.threads import use_threads
     from sepi.process.workspace import Workspace
@@ -287,7 +287,8 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
                 f"{previous}: maps have shape {maps.disparity.shape}; expected {light_field.shape}, that of "
                 f"{light_field_path}"
             )
-        compared = replace(comparable(light_field), workspace=Workspace())
+        known = COMPARABLE in read_attributes(light_field_path, check=False)
+        compared = replace(light_field if known else comparable(light_field), workspace=Workspace())
         with progress_bar(f"{light_field.name} {stage}") as progress:
             result = chosen.run(compared, maps, settings, progress)
         history = [*history_of(previous), entry(stage, choice, settings, light_field)]

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import functools
+import os
 import platform
+import re
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
-import psutil
-
-from sepi.io.provenance import package_version
 from sepi.process.threads import available_cores
 
 LIBRARIES = (
+    "sepi",
     "numpy",
     "scipy",
     "scikit-image",
@@ -32,7 +32,7 @@ def this_machine() -> dict[str, Any]:
     return {
         "processor": _processor(),
         "cores": available_cores(),
-        "memory_gb": round(psutil.virtual_memory().total / 2**30, 1),
+        "memory_gb": round(_memory() / 2**30, 1),
         "system": platform.system(),
         "python": platform.python_version(),
         **versions(),
@@ -41,12 +41,23 @@ def this_machine() -> dict[str, Any]:
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """Versions of the package and its libraries; takes 50 ms."""
-    found = {"sepi": package_version()}
+    """Versions of the package, ``"unknown"`` if it is not installed, and of its libraries."""
+    found = {"sepi": "unknown"}
     for name in LIBRARIES:
         with suppress(PackageNotFoundError):
-            found[name] = version(name)
+            # the first lines alone: to read the others takes every job as long as a small stage
+            told = re.search(r"^Version: (.+)$", distribution(name).read_text("METADATA") or "", re.MULTILINE)
+            found |= {} if told is None else {name: told[1]}
     return found
+
+
+def _memory() -> int:
+    """Memory of the machine, bytes."""
+    if hasattr(os, "sysconf"):
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    import psutil
+
+    return int(psutil.virtual_memory().total)
 
 
 def _processor() -> str:

@@ -24,11 +24,10 @@ from sepi.io.truth import read_with_truth
 from sepi.matching.unknown import with_unknown
 from sepi.process.command import SepiCommand
 from sepi.registry import added
+from sepi.report.drawing import write_curves, write_overview
 from sepi.report.panels import Panel, SceneResults, panels_of
+from sepi.report.pictures import disparity_limits, panel_picture, reference_picture
 from sepi.report.plan import MAIN_VARIANT, Plan
-from sepi.report.plots.overview import write_overview
-from sepi.report.plots.pictures import disparity_limits, panel_picture, reference_picture
-from sepi.report.plots.sparsification import write_curves
 
 
 def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:

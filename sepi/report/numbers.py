@@ -1,4 +1,4 @@
-"""All numbers of the report in one CSV file, facts about them in a JSON file, and the command that collects them.
+"""All numbers of the report in one CSV file, and facts about them in a JSON file.
 
 Tables and page are made from these files alone.
 """
@@ -8,27 +8,75 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
 from sepi.io.files import atomic_path
-from sepi.io.scores import ExternalMap, Scores, read_external, read_reliability, read_scores, without_nan
+from sepi.io.scores import (
+    Evaluation,
+    ExternalMap,
+    Scores,
+    read_evaluations,
+    read_external,
+    read_reliability,
+    read_scores,
+    without_nan,
+)
 from sepi.io.truth import read_with_truth
-from sepi.process.command import SepiCommand
 from sepi.report.plan import PARTS, Plan
-from sepi.report.pooled import pooled_q25
 from sepi.report.runs import EXTERNAL, KEYS, TENTHS, Runs, read_json
-from sepi.scoring.scores import PROTOCOLS, SCORED_REGIONS
+from sepi.scoring.scores import PROTOCOLS, SCORED_REGIONS, WHOLE_MAP
 from sepi.validation import require_known
-from sepi.workflow.rendered_scenes import DATASET
+from sepi.workflow.rendered_scenes import DATASET, rendered_scene
+
+
+def pooled_q25(plan: Plan) -> Iterator[tuple[str, str, str, float]]:
+    """Q25 x100 over the pixels of all rendered scenes of a level of noise: :func:`level_of`, method, region, figure."""
+    levels: dict[str, list[str]] = {}
+    for scene in plan.scenes[DATASET]:
+        levels.setdefault(level_of(scene), []).append(scene)
+    for level, scenes in levels.items():
+        for variant in plan.compared:
+            key = plan.stage_key(variant, plan.stages[-1])
+            found_of = (read_evaluations(plan.scores_file(DATASET, scene), [key])[key] for scene in scenes)
+            yield from ((level, variant, *quarter) for quarter in _quarters(found_of))
+        maps = [read_external(plan.files(DATASET, scene).external) for scene in scenes] if plan.external else []
+        for method in plan.external:
+            yield from ((level, method, *quarter) for quarter in _quarters(found[method].evaluation for found in maps))
+
+
+def level_of(scene: str) -> str:
+    """Name of all rendered scenes of the noise and seed of one."""
+    found = rendered_scene(scene)
+    return f"all scenes, noise {found.noise}, seed {found.seed}"
+
+
+def _quarters(evaluations: Iterable[Evaluation]) -> list[tuple[str, float]]:
+    """Regions and Q25 x100 over the pixels of several maps."""
+    errors: dict[str, list[np.ndarray]] = {}
+    counts: dict[str, int] = {}
+    for found in evaluations:
+        for region, scores in found.scores.get("paper", {}).items():
+            assert found.error is not None
+            error = np.abs(found.error) if region == WHOLE_MAP else np.abs(found.error[found.regions[region]])
+            errors.setdefault(region, []).append(error[np.isfinite(error)])
+            counts[region] = counts.get(region, 0) + int(scores["pixels"])
+    return [(region, _quarter(parts, counts[region])) for region, parts in errors.items()]
+
+
+def _quarter(errors: Sequence[np.ndarray], pixels: int) -> float:
+    """Q25 as in :func:`sepi.scoring.scores.score`; errors that are not finite are the largest."""
+    known = np.concatenate(errors)
+    place = pixels // 4
+    return 100 * float(np.partition(known, place)[place]) if place < known.size else float("nan")
+
 
 _Number = tuple[str, str, str, str, str, str, str, str, float]
 """A row of :attr:`sepi.report.runs.Runs.numbers`."""
@@ -177,25 +225,3 @@ def _scores(scores: Mapping[str, Mapping[str, Scores]]) -> Iterator[tuple[str, s
         regions = scores[protocol]
         for region in dict.fromkeys([*SCORED_REGIONS, *sorted(regions)]):
             yield from ((protocol, region, name, value) for name, value in regions[region].items())
-
-
-@click.command(name="python -m sepi.report.numbers", cls=SepiCommand)
-@click.option("--results", type=click.Path(path_type=Path), required=True, help="Folder of the results.")
-@click.option(
-    "--plan",
-    "path",
-    type=click.Path(path_type=Path),
-    required=True,
-    help="JSON file: scenes per dataset, choices per variant and stage.",
-)
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="JSON file to write, a CSV beside it.")
-def command(results: Path, path: Path, output: Path) -> None:
-    """Collect all numbers of the report in a CSV file, and facts about them in a JSON file of that name."""
-    plan = Plan.from_json(
-        results, json.dumps(read_json(path, {"scenes", "variants"}, "the plan of a report", "snakemake"))
-    )
-    write_numbers(collect(plan), output)
-
-
-if __name__ == "__main__":
-    command()

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from sepi.report import published
-from sepi.report.runs import Runs
-from sepi.report.tabular.comparison import mean_by_region
-from sepi.report.tabular.methods import count_note, datasets_of, own_key
+from sepi.report.comparison import mean_by_region
+from sepi.report.runs import Runs, count_note, datasets_of, own_key
 from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 

@@ -46,6 +46,9 @@ TABLES: dict[str, tuple[str, ...]] = {
 }
 """Report to the names of its tables, in the order of its page."""
 
+CHARTS: dict[str, tuple[str, ...]] = {"": ("ablation", "time_and_memory", "error_bars"), PARTS: ("ablation_best",)}
+"""Report to the names of its charts."""
+
 PUBLISHED = Path(__file__).with_name("published")
 """Folder of the figures that the paper prints."""
 
@@ -146,6 +149,11 @@ class Plan:
     def tables(self) -> tuple[str, ...]:
         """Names of the tables, in the order of the page."""
         return TABLES[self.report]
+
+    @property
+    def charts(self) -> tuple[str, ...]:
+        """Names of the charts."""
+        return CHARTS.get(self.report, ())
 
     @property
     def stages(self) -> list[str]:

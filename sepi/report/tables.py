@@ -1,7 +1,8 @@
-"""The command that writes the tables of the report, each as CSV, Markdown and LaTeX."""
+"""The tables of a report, and the command that writes all numbers of one, its tables and its charts."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,15 +12,14 @@ import click
 from sepi.io.files import atomic_path
 from sepi.process.command import SepiCommand
 from sepi.report import published
-from sepi.report.runs import Runs, read_numbers
-from sepi.report.tabular.comparison import ablation_table, region_table, scene_table
-from sepi.report.tabular.error_bars import error_bar_table
-from sepi.report.tabular.formats import as_csv, as_latex, as_markdown
-from sepi.report.tabular.properties import property_table
-from sepi.report.tabular.properties import scene_table as rendered_scene_table
-from sepi.report.tabular.scores import computed_methods_table, edge_table, parts_table, runtime_table, stage_table
-from sepi.report.tabular.table import Table
-from sepi.validation import require_known
+from sepi.report.comparison import ablation_table, region_table, scene_table
+from sepi.report.numbers import collect, write_numbers
+from sepi.report.plan import Plan
+from sepi.report.properties import error_bar_table, property_table
+from sepi.report.properties import scene_table as rendered_scene_table
+from sepi.report.runs import Runs, read_json, read_numbers
+from sepi.report.scores import computed_methods_table, edge_table, parts_table, runtime_table, stage_table
+from sepi.report.table import Table, as_csv, as_latex, as_markdown
 
 BUILDERS: dict[str, Callable[[Runs], Table]] = {
     "methods": computed_methods_table,
@@ -48,19 +48,37 @@ def table(name: str, runs: Runs) -> Table:
     return replace(found, caption=f"{found.caption} Without {missing}, not computed yet.") if missing else found
 
 
-@click.command(name="python -m sepi.report.tables", cls=SepiCommand)
-@click.option("--numbers", "path", type=click.Path(path_type=Path), required=True, help="From sepi.report.numbers.")
-@click.option("--table", "names", type=click.Choice([*BUILDERS]), multiple=True, help="Table to write; default: all.")
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")
-def command(path: Path, names: tuple[str, ...], output: Path) -> None:
-    """Write the tables of a report's numbers as CSV, Markdown and LaTeX."""
-    runs = read_numbers(path)
-    require_known(f"{path}: tables", names, runs.plan.tables)
-    for name in names or runs.plan.tables:
+def write_tables(runs: Runs, folder: Path) -> None:
+    """Write the tables of a report, each as CSV, Markdown and LaTeX."""
+    for name in runs.plan.tables:
         found = table(name, runs)
         for ending, text in (("csv", as_csv(found)), ("md", as_markdown(found)), ("tex", as_latex(found, name))):
-            with atomic_path(output / f"{name}.{ending}") as temporary:
+            with atomic_path(folder / f"{name}.{ending}") as temporary:
                 temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command(name="python -m sepi.report.tables", cls=SepiCommand)
+@click.option("--results", type=_PATH, required=True, help="Folder of the results.")
+@click.option(
+    "--plan", "path", type=_PATH, required=True, help="JSON: scenes per dataset, choices per variant and stage."
+)
+@click.option("--output", type=_PATH, required=True, help="JSON file to write, a CSV beside it.")
+@click.option("--tables", "folder", type=_PATH, required=True, help="Folder for the tables.")
+@click.option("--charts", "figures", type=_PATH, required=True, help="Folder for the charts.")
+def command(results: Path, path: Path, output: Path, folder: Path, figures: Path) -> None:
+    """Write all numbers of a report, its tables, and its charts."""
+    told = read_json(path, {"scenes", "variants"}, "the plan of a report", "snakemake")
+    write_numbers(collect(Plan.from_json(results, json.dumps(told))), output)
+    # as a page reads them
+    runs = read_numbers(output)
+    write_tables(runs, folder)
+    for name in runs.plan.charts:
+        from sepi.report.charts import CHARTS
+
+        CHARTS[name](figures, name, runs)
 
 
 if __name__ == "__main__":

@@ -26,8 +26,7 @@ from sepi.validation import require_known
 from sepi.validation.models import CheckedModel, validated
 from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.workflow.datasets import LONGEST_NAME, Dataset, Scene, own_scene, require_plain_path, scenes_in
-from sepi.workflow.parameters import stage_settings
-from sepi.workflow.settings import Report, Settings
+from sepi.workflow.settings import Report, Settings, stage_settings
 
 # names already in use for folders, panels and table columns, where variants have theirs too
 _RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view", "dataset", "scene", "row", "region")

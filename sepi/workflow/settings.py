@@ -1,4 +1,4 @@
-"""A checked configuration, as the rules use it."""
+"""A checked configuration, as the rules use it, with the parameters of the stages."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pydantic import Field
 
@@ -16,10 +17,49 @@ from sepi.io.scores import ExternalSource
 from sepi.registry import added
 from sepi.stage import Parameters
 from sepi.validation import require_known
-from sepi.validation.models import CheckedModel
-from sepi.variants import VARIANTS, Variant
+from sepi.validation.models import CheckedModel, validated
+from sepi.variants import STAGES, VARIANTS, Variant
 from sepi.workflow.datasets import Dataset, Scene
 from sepi.workflow.result_paths import RESULTS
+
+Values = Mapping[str, Mapping[str, Mapping[str, Any] | None] | None]
+"""Stage to choice to field to value."""
+
+
+def stage_settings(values: Values, variants: Mapping[str, Variant]) -> dict[str, dict[str, Parameters]]:
+    """Stage to label to parameters, for every choice and for every choice with a variant's overrides.
+
+    Parameters
+    ----------
+    values : mapping
+        The configuration's ``stages``.
+    variants : mapping of str to Variant
+        By name.
+
+    Raises
+    ------
+    SepiError
+        At the first wrong stage, choice, field or value; the one-line message names it.
+    """
+    where = "config.stages"
+    require_known(where, values, STAGES)
+    found: dict[str, dict[str, Parameters]] = {}
+    for stage, choices in STAGES.items():
+        own = values.get(stage) or {}
+        require_known(f"{where}.{stage}", own, choices)
+        found[stage] = {
+            name: validated(choice.parameters, own.get(name) or {}, f"{where}.{stage}.{name}")
+            for name, choice in choices.items()
+        }
+        for variant_name, variant in variants.items():
+            choice = variant.choices[stage]
+            found[stage][variant.labels[stage]] = validated(
+                choices[choice].parameters,
+                {**(own.get(choice) or {}), **variant.overrides.get(stage, {})},
+                f"config.variants.{variant_name}.{stage}",
+            )
+    return found
+
 
 # image files and page data of a scene
 _PICTURES = re.compile(r"reports/(?:comparison/|rendered/)?(?:maps/([^/]+)/([^/]+)|page/([^/]+)/([^/]+)\.json)")

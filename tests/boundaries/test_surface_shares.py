@@ -14,6 +14,7 @@ from sepi.boundaries.decision import assigned_to_surfaces
 from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.rim import Rim, rim_of
 from sepi.boundaries.surface_shares import _views_alike as views_alike
+from sepi.boundaries.surface_shares import view_brightness
 from sepi.boundaries.surroundings import surroundings
 from sepi.kernels import background as background_kernels
 from sepi.kernels import surface_shares as kernels
@@ -325,6 +326,20 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     assert twin.went_on > 10
     np.testing.assert_allclose(costs[told], [cost for cost in expected if cost is not None], atol=2e-5)
     assert (costs[~told] == 0).all()
+
+
+def test_brightness_is_told_view_by_view() -> None:
+    """Beside the reference, over what both show."""
+    random = np.random.default_rng(3)
+    picture = cv2.GaussianBlur(random.random((40, 48, 3), np.float32), (0, 0), 3)
+    factors = np.array([[0.5, 1, 1.2]], np.float32)
+    views = np.clip(picture * factors[..., None, None, None], 0, 1)
+    field = LightField(views, "bright")
+    still = np.zeros((40, 48), np.float32)
+    sides = Sides(still, field.reference_view, still == 0, 4)
+    brightness, residual = view_brightness(field, sides, np.argwhere(field.present))
+    np.testing.assert_allclose(brightness, factors[0], rtol=0.02)
+    assert (residual < 0.01).all()
 
 
 def test_brightness_is_that_of_what_a_view_shows() -> None:

@@ -15,7 +15,7 @@ from make_tables import TABLE, filled
 from report_results import numbers_of, report_of, with_results
 
 from sepi.report.plan import Plan
-from sepi.report.tabular.properties import PROPERTIES
+from sepi.report.properties import PROPERTIES
 from sepi.scenes import SCENES
 from sepi.variants import STAGES, VARIANTS
 from sepi.workflow.rendered_scenes import NOISE_LEVELS

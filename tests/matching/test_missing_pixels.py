@@ -136,7 +136,7 @@ def test_nothing_is_compared_with_what_stands_at_missing_pixels(found_in) -> Non
 @pytest.mark.extension("cameras")
 @pytest.mark.parametrize("variant", ["best", "fast", "paper"])
 def test_depth_near_the_border_of_turned_views_is_nearly_as_good(variant: str) -> None:
-    from sepi.extensions.cameras.resampling import completed
+    from sepi.extensions.cameras.frame import completed
 
     whole = render("pyramids", size=SIZE, views=VIEWS)
     light_field = turned(whole, 16)

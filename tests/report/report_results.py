@@ -22,8 +22,7 @@ from sepi.lightfield import DisparityRange, LightField
 from sepi.report import numbers, tables
 from sepi.report.plan import Plan
 from sepi.report.runs import Runs, read_numbers
-from sepi.report.tabular.formats import as_csv, as_markdown
-from sepi.report.tabular.table import Table
+from sepi.report.table import Table, as_csv, as_markdown
 from sepi.stage import StageMaps
 
 SIZE = 40

@@ -7,7 +7,7 @@ import pytest
 from report_results import ABOVE, BELOW, cells_of, csv_rows, only
 
 from sepi.external import NO_FILE
-from sepi.report.tabular.table import BEST, SECOND
+from sepi.report.table import BEST, SECOND
 
 AVAILABLE = "Average of 2 scenes available"
 PRINTED = "Average as printed (24 scenes)"

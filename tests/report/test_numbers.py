@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from report_results import MACHINE, SIZE, cells_of, light_field, linked, renamed
 
 from sepi.errors import SepiError
-from sepi.report import numbers
+from sepi.report import numbers, tables
 from sepi.report.numbers import collect
 from sepi.report.plan import Plan
 from sepi.report.runs import TENTHS, Runs, read_numbers
@@ -40,8 +40,8 @@ def test_a_missing_or_broken_file_is_told(ending: str, content: bytes | None, co
         path.write_bytes(content)
     about = tmp_path / "plan.json"
     about.write_text(there.to_json())
-    arguments = ["--results", str(there.results), "--plan", str(about), "--output", str(tmp_path / "out.json")]
-    result = CliRunner().invoke(numbers.command, arguments)
+    places = [word for to in ("output", "tables", "charts") for word in (f"--{to}", str(tmp_path / "out.json"))]
+    result = CliRunner().invoke(tables.command, ["--results", str(there.results), "--plan", str(about), *places])
     assert result.exit_code == 1
     assert result.output.startswith(f"sepi: {path}: ")
     assert len(result.output.splitlines()) == 1

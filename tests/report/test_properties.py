@@ -9,8 +9,8 @@ from report_results import GLOSSY, VARIANTS, csv_rows, report_of
 from sepi.evaluate import evaluations_of
 from sepi.io.scores import write_scores
 from sepi.lightfield import LightField
+from sepi.report.numbers import pooled_q25
 from sepi.report.plan import Plan
-from sepi.report.pooled import pooled_q25
 from sepi.report.runs import Runs
 
 

@@ -5,31 +5,24 @@ import re
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 from report_results import csv_rows, markdown, only, renamed, report_of
 
+from sepi.errors import SepiError
 from sepi.external import NO_FILE
 from sepi.report import numbers, tables
 from sepi.report.plan import TABLES
-from sepi.report.runs import KEYS, Runs
-from sepi.report.tabular.formats import as_csv, as_latex
+from sepi.report.runs import KEYS, Runs, read_numbers
+from sepi.report.table import as_csv, as_latex
 
 MAIN_TABLES = TABLES[""]
 
 
-def run_tables(folder: Path, output: Path, *more: str) -> Result:
-    """The command, with the numbers ``a.json`` and ``a.csv`` of a folder."""
-    return CliRunner().invoke(tables.command, ["--numbers", str(folder / "a.json"), "--output", str(output), *more])
-
-
 def test_every_table_is_written_thrice_and_the_same_each_time(found: Runs, tmp_path: Path) -> None:
-    numbers.write_numbers(found, tmp_path / "a.json")
-    one, two, alone = (tmp_path / name for name in ("one", "two", "alone"))
-    for folder, words in ((one, ()), (two, ()), (alone, ("--table", "runtime"))):
-        assert run_tables(tmp_path, folder, *words).exit_code == 0
+    one, two = (tmp_path / name for name in ("one", "two"))
+    for folder in (one, two):
+        tables.write_tables(found, folder)
     endings = ("csv", "md", "tex")
     assert {file.name for file in one.iterdir()} == {f"{name}.{ending}" for name in MAIN_TABLES for ending in endings}
-    assert {file.name for file in alone.iterdir()} == {f"runtime.{ending}" for ending in endings}
     for file in one.iterdir():
         assert file.read_bytes() == (two / file.name).read_bytes()
 
@@ -53,11 +46,10 @@ def test_wrong_numbers_are_one_line(name: str, content: str | None, message: str
     (tmp_path / name).unlink()
     if content is not None:
         (tmp_path / name).write_bytes(content.encode("latin-1"))
-    result = run_tables(tmp_path, tmp_path / "out")
-    assert result.exit_code == 1
-    assert result.output.startswith(f"sepi: {tmp_path / name}: {message}")
-    assert len(result.output.splitlines()) == 1
-    assert not (tmp_path / "out").exists()
+    with pytest.raises(SepiError) as told:
+        read_numbers(tmp_path / "a.json")
+    assert str(told.value).startswith(f"{tmp_path / name}: {message}")
+    assert len(str(told.value).splitlines()) == 1
 
 
 @pytest.mark.parametrize("name", MAIN_TABLES)

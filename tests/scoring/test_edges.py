@@ -8,7 +8,7 @@ import pytest
 
 from sepi.io.pfm import read_pfm
 from sepi.io.scores import Scores
-from sepi.report.tabular.scores import edge_budget
+from sepi.report.scores import edge_budget
 from sepi.scoring.edges import LEAST_DISCONTINUITY, REACH, edges_of, fattening_and_thinning
 from sepi.scoring.scores import score
 

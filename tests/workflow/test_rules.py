@@ -78,7 +78,7 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
                 modules = ("sepi.truth", "sepi.scenes")
             given = code(scene(**{rule.name: name})) if callable(code) else code
             assert given == code_digest(*modules), f"{rule.name} {name}"
-    others = {"ingest", "truth", "evaluate", "export", "external", "numbers", "tables", "maps", "page", "render"}
+    others = {"ingest", "truth", "evaluate", "export", "external", "numbers", "maps", "page", "render"}
     assert {*STAGES, *others} <= checked
 
 
@@ -104,7 +104,7 @@ def test_every_file_that_a_job_reads_is_an_input(read: Any) -> None:
         Path(file).write_text("more")
         os.utime(file, ns=(0, 1))
         assert len({before, older, rules[rule].params.dates(of)}) == 3
-    for name in ("tables", "charts", "page"):
+    for name in ("numbers", "page"):
         assert {Path(file) for file in rules[name].input.published} == set(PUBLISHED.glob("*.csv"))
     assert {Path(file) for file in rules["page"].input.templates} == set(
         (REPOSITORY / "sepi/extensions/page/templates").iterdir()
@@ -154,7 +154,7 @@ def test_jobs_ask_for_what_their_scene_takes(tmp_path: Path) -> None:
 
 def test_no_command_grows_with_the_number_of_scenes(tmp_path: Path) -> None:
     """The system takes 128 kB for one: thousands of light fields would end with `Argument list too long`."""
-    report = {"plan", "numbers", "tables", "charts", "page"}
+    report = {"plan", "numbers", "page"}
     one, three = (
         {
             job.rule.name: job.shellcmd

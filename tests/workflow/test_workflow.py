@@ -234,7 +234,7 @@ class TestRerun:
             plan = changed.plan("all")
         assert of_stages(plan) == {}
         # what is made of scores
-        assert {"evaluate", "external", "numbers", "tables", "charts", "maps", "page"} <= plan.keys()
+        assert {"evaluate", "external", "numbers", "maps", "page"} <= plan.keys()
 
     def test_a_changed_picture_reruns_its_scene(self, finished: Workflow) -> None:
         """Also where its date is old: so unzip, rsync -a, cp -p and tar leave it."""
@@ -272,7 +272,7 @@ class TestRerun:
             file.write_bytes(before)
             os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
         # what shows the scene
-        shown = {"numbers": 1, "tables": 1, "charts": 1, "page": 1, "all": 1}
+        shown = {"numbers": 1, "page": 1, "all": 1}
         assert plan == {"truth": 1, "evaluate": 1, "external": 1, "maps": 1} | shown
 
     def test_what_is_changed_is_made_and_nothing_else(self, finished: Workflow, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-// Background behind the nearer surfaces beside depth steps, from the views that see it, and brightness of the views.
+// Background behind the nearer surfaces beside depth steps, from the views that see it.
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -15,8 +15,6 @@ constexpr float UNSEEN = -1;       // variance of a background that fewer views 
 
 constexpr float NONE = std::numeric_limits<float>::infinity();
 constexpr double MOST_DEVIATION2 = 0.01;  // largest squared residual of one view in the background's variance
-constexpr Index ACROSS = 64;              // pixels along the shorter side that are used for the brightness of a view
-constexpr double MOST_DIFFERENCE = 0.1;   // largest difference of one channel in a view's residual
 
 // Median of n numbers, NONE after them, by bisection: counting vectorises, sorting does not.
 float median(const float *values, Index n) {
@@ -42,41 +40,6 @@ float median(const float *values, Index n) {
     }
     // mean of the middle two of an even number
     return n % 2 || below < middle ? least_from(low) : (most_below(low) + least_from(low)) * 0.5f;
-}
-
-// Brightness and residual of each view relative to the reference view, over some clean pixels: ratio of the sums of the
-// colours, and remaining mean absolute difference of one channel, 0..1; NaN without pixels; (N,). missing (T, S, H, W):
-// pixels that a view lacks, none if (T, S, 0, 0).
-void brightness_of_views(const RimViews &views, const Sides &sides, Array<const bool, 4> missing, Array<double, 1> brightness,
-                         Array<double, 1> residual) {
-    const Index H = sides.disparity.shape[0], W = sides.disparity.shape[1], stride = std::max<Index>(1, std::min(H, W) / ACROSS);
-    const ViewSamples samples_of{views};
-    parallel_for(0, views.number(), [&](Index view) {
-        const auto of_view = missing[views.places(view, 0)][views.places(view, 1)];
-        const auto shows = [&](Index y, Index x) {
-            return of_view.shape[0] == 0 || !(of_view(y, x) || of_view(y, x + 1) || of_view(y + 1, x) || of_view(y + 1, x + 1));
-        };
-        // colours of the pixels that the view shows, there and in the reference view
-        std::vector<std::pair<std::array<float, 3>, std::array<float, 3>>> shown;
-        double own = 1e-9, other = 1e-9, rest = 0;
-        for (Index y = 0; y < H; ++y) {
-            if (std::min(y, H - 1 - y) % stride) continue;
-            for (Index x = 0; x < W; ++x) {
-                if (std::min(x, W - 1 - x) % stride) continue;
-                const auto place = samples_of.place_in(view, sides.disparity(y, x), y, x);
-                if (!sides.clean(y, x) || !place || !shows(place->row, place->column)) continue;
-                const auto there = samples_of.sample(view, *place);
-                const auto here = sides.colour(y, x);
-                for (Index c = 0; c < 3; ++c) other += there[c], own += here[c];
-                shown.emplace_back(there, here);
-            }
-        }
-        const double ratio = other / own;
-        for (const auto &[there, here] : shown)
-            for (Index c = 0; c < 3; ++c) rest += std::min(std::abs(there[c] / ratio - here[c]), MOST_DIFFERENCE);
-        brightness(view) = ratio;
-        residual(view) = shown.empty() ? std::numeric_limits<double>::quiet_NaN() : rest / double(3 * shown.size() + 1);
-    });
 }
 
 // Rows begin..end of the farther surfaces, of disparity layer (H, W), where wanted (H, W), also behind nearer ones:
@@ -124,7 +87,6 @@ void background_of(const RimViews &views, Array<const float, 2> layer, Array<con
 }
 
 const Submodule submodule("background", [](nb::module_ &m) {
-    m.def("brightness_of_views", &brightness_of_views, Unlocked(), "views"_a, "sides"_a, "missing"_a, "brightness"_a, "residual"_a);
     m.def("background_of", &background_of, Unlocked(), "views"_a, "layer"_a, "wanted"_a, "begin"_a, "end"_a, "background"_a);
     m.attr("FEWEST_VIEWS") = FEWEST_VIEWS;
     m.attr("UNSEEN") = UNSEEN;

@@ -17,7 +17,7 @@ from matplotlib.colors import Colormap
 from sepi.io.files import atomic_path
 from sepi.process.command import SepiCommand
 from sepi.report import page_data, published
-from sepi.report.plots.pictures import error_scale, scale_colours
+from sepi.report.pictures import error_scale, scale_colours
 from sepi.report.runs import Runs, read_json, read_numbers
 from sepi.report.tables import table
 from sepi.workflow.rendered_scenes import DATASET

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
-from sepi.cli.scene_argument import read_light_field_of
+from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, read_light_field_of, reading_flags
 from sepi.errors import SepiError
 from sepi.process.command import SepiCommand, progress_bar
 

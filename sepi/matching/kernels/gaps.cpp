@@ -9,22 +9,12 @@ namespace sepi::gaps {
 namespace {
 
 // Squared residual of a bilinear sample of a view (H, W, 3) from reference (3,), in units of its expectation by noise,
-// which interpolation averages. Products of 16 bits and a weight are exact in double precision.
-template <class Colour>
-auto squared_residual(Array<const Colour, 3> view, float unit, double row, double column, Array<const float, 1> reference) {
-    using Number = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, float>;
-    const Index top = Index(row), left = Index(column);
-    const float fy = float(row - double(top)), fx = float(column - double(left));
-    const Index down = fy > 0 ? view.strides[0] : 0, right = fx > 0 ? view.strides[1] : 0;
-    const Colour *place = view.at(top, left);
-    Number total = 0;
-    for (Index c = 0; c < 3; ++c, place += view.strides[2]) {
-        const Number above = (1 - fx) * Number(place[0]) + fx * Number(place[right]);
-        const Number below = (1 - fx) * Number(place[down]) + fx * Number(place[down + right]);
-        const Number residual = ((1 - fy) * above + fy * below) * unit - reference(c);
-        total += residual * residual;
-    }
-    return total / (1 + (fx * fx + (1 - fx) * (1 - fx)) * (fy * fy + (1 - fy) * (1 - fy)));
+// which interpolation averages.
+float squared_residual(const auto &view, float unit, const Place &at, Array<const float, 1> reference) {
+    float total = 0;
+    for (Index c = 0; c < 3; ++c) total += float(squared(bilinear(at, [&](Index i, Index j) { return float(view(i, j, c)); }) * unit - reference(c)));
+    const auto averaged = [](double f) { return float(f * f + (1 - f) * (1 - f)); };
+    return total / (1 + averaged(at.fx) * averaged(at.fy));
 }
 
 // Number of steps, up to most, from i that stay in a line of n.
@@ -63,22 +53,15 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
 // residual of one view has an upper limit.
 void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float,
                     3> reference, const AskedViews &asked, float most, Index begin, Index end, Array<float, 3> sums) {
-    const Index W = disparity.shape[1];
-    const double bottom = double(disparity.shape[0] - 1), right = double(W - 1);
+    const Index H = disparity.shape[0], W = disparity.shape[1];
     const auto add_view = [&](const auto &view, Array<const float, 2> nearest, double down, double across, Index y, const std::vector<Index> &columns) {
         for (const Index x : columns) {
             const float d = disparity(y, x), f = farther(y, x);
-            const double row = double(y) - f * down, column = double(x) - f * across;
-            const double own_row = double(y) - d * down, own_column = double(x) - d * across;
-            if (std::min(row, own_row) < 0 || std::min(column, own_column) < 0) continue;
-            if (std::max(row, own_row) > bottom || std::max(column, own_column) > right) continue;
-            const float *above = nearest.at(Index(row) - asked.low, Index(column));
-            const float *below = row > std::floor(row) ? above + nearest.strides[0] : above;
-            const Index beside = column > std::floor(column);
-            if (std::max(std::max(above[0], above[beside]), std::max(below[0], below[beside])) > f + asked.margin) continue;
-            const auto colour = reference[y][x];
-            sums(0, y, x) += std::min(float(squared_residual(view, unit, row, column, colour)), most);
-            sums(1, y, x) += std::min(float(squared_residual(view, unit, own_row, own_column, colour)), most);
+            const auto there = place_within(double(y) - f * down, double(x) - f * across, H, W);
+            const auto own = place_within(double(y) - d * down, double(x) - d * across, H, W);
+            if (!there || !own || !all_about(*there, [&](Index i, Index j) { return nearest(i - asked.low, j) <= f + asked.margin; })) continue;
+            sums(0, y, x) += std::min(squared_residual(view, unit, *there, reference[y][x]), most);
+            sums(1, y, x) += std::min(squared_residual(view, unit, *own, reference[y][x]), most);
             ++sums(2, y, x);
         }
     };

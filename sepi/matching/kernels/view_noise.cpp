@@ -10,12 +10,6 @@ namespace {
 // Width of a block, pixels: a vector of them.
 constexpr Index BLOCK = LANES;
 
-float in_order(Float8 lanes) {
-    float sum = 0;
-    for (int i = 0; i < LANES; ++i) sum += lanes[i];
-    return sum;
-}
-
 // Start of block i of n along an axis; blocks lie side by side from both ends.
 Index begin_of(Index i, Index n, Index size) { return 2 * i < n ? i * BLOCK : size - (n - i) * BLOCK; }
 
@@ -27,8 +21,8 @@ float energy_of(const float *own, const float *other, Index next_row) {
         squares += e * e;
         sums += e;
     }
-    const float sum = in_order(sums);
-    return in_order(squares) - sum * sum / float(BLOCK * BLOCK);
+    const float sum = sum_of(sums);
+    return sum_of(squares) - sum * sum / float(BLOCK * BLOCK);
 }
 
 // Least mean squared difference, in squared units of the colours, of each block of view (t0, s0) from blocks of other

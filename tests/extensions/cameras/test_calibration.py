@@ -15,9 +15,9 @@ from sepi.camera import Camera
 from sepi.camera.rig import Lens, Shot
 from sepi.errors import SepiError
 from sepi.extensions.cameras.calibration import calibrate, pairs_of, pictures_in
-from sepi.extensions.cameras.files import read_model
 from sepi.extensions.cameras.model import CameraModel
 from sepi.extensions.cameras.plane import plane_through
+from sepi.extensions.cameras.reader import read_model
 from sepi.scenes import render_shot
 
 pytest.importorskip("pycolmap")
@@ -158,7 +158,7 @@ def test_commands_that_use_pycolmap_can_be_ended_and_write_pictures() -> None:
     program = """
 import os, signal, sys
 signal.signal(signal.SIGTERM, lambda *_: sys.exit(7))
-from sepi.extensions.cameras.colmap_model import require_pycolmap
+from sepi.extensions.cameras.files import require_pycolmap
 require_pycolmap("model")
 import cv2, numpy
 cv2.imencode(".png", numpy.full((200, 300, 3), 257, numpy.uint16))

@@ -7,8 +7,7 @@ import pytest
 from geometries import GEOMETRIES, standing
 
 from sepi.camera import Camera
-from sepi.extensions.cameras.camera_poses import camera_poses, nominal_camera
-from sepi.extensions.cameras.posed_views import posed_views
+from sepi.extensions.cameras.posed_views import camera_poses, nominal_camera, posed_views
 from sepi.lightfield import LightField
 from sepi.matching.carried_map import carried_map
 from sepi.scenes import render

@@ -20,10 +20,10 @@ from sepi.camera import Camera
 from sepi.camera.rig import Lens, Shot
 from sepi.cli.main import main
 from sepi.errors import SepiError
-from sepi.extensions.cameras.camera_poses import camera_poses
-from sepi.extensions.cameras.files import read_model
+from sepi.extensions.cameras.files import rotation_of
+from sepi.extensions.cameras.posed_views import camera_poses
+from sepi.extensions.cameras.reader import read_model
 from sepi.extensions.cameras.rectification import light_field_of, rectification_of
-from sepi.extensions.cameras.table import rotation_of
 from sepi.io.all_views import read_result_at, write_all_views
 from sepi.io.pfm import read_pfm
 from sepi.io.point_cloud import point_cloud
@@ -211,8 +211,7 @@ def test_poses_that_were_written_give_their_light_field_again(tmp_path: Path, ki
     """Views, positions, camera and map come back as they were, whichever program they were written for."""
     if kind == "colmap":
         pytest.importorskip("pycolmap")
-    from sepi.extensions.cameras.colmap import write_colmap
-    from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+    from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = replace(render("pyramids", size=SIZE, views=3), camera=CAMERA)
@@ -236,8 +235,7 @@ def test_written_cameras_stand_in_the_calibrated_world(folder: Path, tmp_path: P
     """Another program's map of the same room would lie elsewhere, turned."""
     if kind == "colmap":
         pytest.importorskip("pycolmap")
-    from sepi.extensions.cameras.colmap import write_colmap
-    from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+    from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = sepi.read_cameras(folder)
@@ -265,9 +263,24 @@ def test_written_cameras_stand_in_the_calibrated_world(folder: Path, tmp_path: P
         np.testing.assert_allclose(np.sort(model.points, axis=0), np.sort(written, axis=0), atol=1e-9)
 
 
+def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path: Path) -> None:
+    """Their lengths would be those of the calibrated one, beside metres of the other."""
+    from sepi.extensions.cameras.data_sets import write_nerfstudio
+    from sepi.extensions.cameras.posed_views import posed_views
+
+    light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)
+    assert light_field.ground_truth is not None
+    write_nerfstudio(tmp_path / "rig", posed_views(light_field, light_field.ground_truth))
+    flags = ("--focal-length", "35", "--baseline", "2", "--focus-distance", "3", "--sensor-size", "24")
+    for name, more in (("as calibrated", ()), ("another", flags)):
+        done("depth", tmp_path / "rig", "-o", tmp_path / name, "--variant", "fast", *more)
+        assert (tmp_path / name / "depth.pfm").exists()
+        assert any((tmp_path / name).glob("original_*")) == (not more)
+
+
 def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> None:
     """A hand before the lens, or the gantry itself, becomes part of the scene."""
-    from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+    from sepi.extensions.cameras.data_sets import write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)

@@ -12,7 +12,7 @@ import pytest
 
 from sepi.camera.rig import FISHEYE, PINHOLE, Lens
 from sepi.errors import SepiError
-from sepi.extensions.cameras.files import read_model
+from sepi.extensions.cameras.reader import read_model
 from sepi.extensions.cameras.rectification import rectification_of
 
 pycolmap = pytest.importorskip("pycolmap")

@@ -11,8 +11,7 @@ from geometries import GEOMETRIES, standing
 from plyfile import PlyData
 
 from sepi.camera import Camera
-from sepi.extensions.cameras.colmap import write_colmap
-from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
 from sepi.extensions.cameras.posed_views import PosedViews, posed_views
 from sepi.lightfield import LightField
 from sepi.scenes import render

@@ -8,14 +8,14 @@ from sepi.extensions.methods import acc
 from sepi.extensions.methods.acc import (
     AccParameters,
     ConfidentLabelsParameters,
+    PhaseShift,
+    agreed,
     confident_labels,
+    matched_disparities,
     phase_shift_costs,
     truncated_difference,
 )
-from sepi.extensions.methods.acc_features import agreed, matched_disparities
-from sepi.extensions.methods.acc_phase_shift import PhaseShift
-from sepi.extensions.methods.cost_volumes import disparity_of, least_costs
-from sepi.extensions.methods.guided_filter import GuidedFilter
+from sepi.extensions.methods.costs import GuidedFilter, disparity_of, least_costs
 from sepi.lightfield import DisparityRange, LightField
 from sepi.scenes import render
 from sepi.stage import CostVolume, no_progress

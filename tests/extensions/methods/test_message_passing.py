@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from sepi.extensions.methods.message_passing import contrast_weights, energy, labels_of_least_energy
+from sepi.extensions.methods.markov_field import contrast_weights, energy, labels_of_least_energy
 from sepi.kernels import message_passing as kernels
 
 

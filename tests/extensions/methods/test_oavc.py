@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sepi.extensions.methods import oavc
-from sepi.extensions.methods.cost_volumes import least_costs
+from sepi.extensions.methods.costs import least_costs
 from sepi.extensions.methods.oavc import lower_thresholds, vote_costs
 from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.matching.sheared_views import ShearedViews

@@ -7,20 +7,18 @@ import pytest
 from geometries import GEOMETRIES, standing
 
 from sepi.extensions.methods.occ import (
+    LEAST_SHARE,
+    ORIENTATIONS,
+    Edges,
     OccFieldParameters,
     OccParameters,
     OccSplitParameters,
+    halves_of_views,
     occ,
     occ_field,
     occ_split,
     split_patch_costs,
     whole_patch_costs,
-)
-from sepi.extensions.methods.occ_patches import (
-    LEAST_SHARE,
-    ORIENTATIONS,
-    Edges,
-    halves_of_views,
 )
 from sepi.lightfield import BoolMap, DisparityRange, LightField
 from sepi.scenes import render

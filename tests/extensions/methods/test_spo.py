@@ -6,7 +6,7 @@ import numpy.typing as npt
 import pytest
 from geometries import GEOMETRIES, standing
 
-from sepi.extensions.methods.guided_costs import GuidedCostsParameters, guided_costs
+from sepi.extensions.methods.costs import GuidedCostsParameters, guided_costs
 from sepi.extensions.methods.spo import (
     SpoParameters,
     column_weights,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sepi.extensions.methods.weighted_median import weighted_median
+from sepi.extensions.methods.costs import weighted_median
 
 RANDOM = np.random.default_rng(3)
 VALUES = RANDOM.normal(0, 1, (11, 14)).astype(np.float32)

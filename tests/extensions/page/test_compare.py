@@ -10,7 +10,7 @@ import pytest
 from browser import canvas_pixels, choose, map_pixels, opened, part, point_at, read_out, settled
 from error_lines import call, done, error_of
 
-from sepi.extensions.page.comparison_page import Comparison, comparison_page
+from sepi.extensions.page.compare import Comparison, comparison_page
 from sepi.io.hdf5 import write_stage
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import FloatMap

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from sepi.extensions.page.packing import packed
 from sepi.extensions.page.viewer import STEPS as STEPS_OF_ROLES
+from sepi.extensions.page.viewer import packed
 
 STEPS = sorted({step for steps in STEPS_OF_ROLES for step in steps})
 

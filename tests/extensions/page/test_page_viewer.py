@@ -22,7 +22,7 @@ from browser import (
 from page_example import COTTON, DOTS_TITLE, PICTURE, PICTURE_TITLE, SIZE, UNKNOWN, Example
 
 from sepi.matching.unknown import with_unknown
-from sepi.report.plots.pictures import disparity_limits, error_picture, map_picture
+from sepi.report.pictures import disparity_limits, error_picture, map_picture
 
 # pixels (x, y): corners, inside
 PLACES = [(0, 0), (63, 63), (5, 50)]

@@ -5,9 +5,9 @@ import pytest
 from geometries import GEOMETRIES, standing
 
 from sepi.errors import SepiError
-from sepi.extensions.page.probes.curves import cost_curves
-from sepi.extensions.page.probes.pixels import APART, BORDER, InterestingPixel, interesting_pixels
-from sepi.extensions.page.probes.probe import GREY, HALF_WIDTH, probe, sepi_picture, to_json
+from sepi.extensions.page.curves import cost_curves
+from sepi.extensions.page.pixels import APART, BORDER, InterestingPixel, interesting_pixels
+from sepi.extensions.page.probe import GREY, HALF_WIDTH, probe, sepi_picture, to_json
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.view_subsets import halves_and_quarters

@@ -1,6 +1,6 @@
 "use strict";
 
-/* What sepi.extensions.page.packing packed: base64, deflate, differences to the row above. */
+/* What sepi.extensions.page.viewer packed: base64, deflate, differences to the row above. */
 const Sepi = {};
 
 /** The element with this id. */

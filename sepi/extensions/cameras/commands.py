@@ -1,0 +1,151 @@
+"""The commands ``sepi calibrate`` and ``sepi poses``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sepi.cli.input_options import (
+    Geometry,
+    Reading,
+    camera_flags,
+    camera_of,
+    default_folder,
+    read_light_field_of,
+    reading_flags,
+)
+from sepi.errors import SepiError
+from sepi.process.command import SepiCommand, progress_bar
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command(cls=SepiCommand)
+@click.argument("folder", type=_PATH)
+@click.option("-o", "--output", type=_PATH, help="Folder to make; default: NAME-cameras for a FOLDER called NAME.")
+@click.option(
+    "--lens",
+    default="SIMPLE_RADIAL",
+    show_default=True,
+    metavar="MODEL",
+    help="COLMAP's lens model: SIMPLE_PINHOLE, RADIAL, OPENCV, OPENCV_FISHEYE, ...",
+)
+@click.option(
+    "--cameras",
+    type=click.Choice(["one", "each"]),
+    default="one",
+    show_default=True,
+    help="Whether one camera took all pictures, or each has its own.",
+)
+@click.option("--force", is_flag=True, help="Go on even if a check of a few pictures fails.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
+def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force: bool, threads: int | None) -> None:
+    """Find the cameras that took the pictures in FOLDER, and write them as a COLMAP model for 'sepi depth'.
+
+    Move one camera sideways past a static scene, with a constant viewing direction, along a grid, a row or any path.
+    A first check of a few reduced pictures refuses a camera that hardly moved, moved forward or turned too far. The
+    last lines tell how many pictures are placed, and how far the cameras stand off a plane. The focal length comes
+    from the pictures if they determine it, else from EXIF, else it is a usual one. Needs pycolmap: pip install
+    'sepi[colmap]'.
+
+    \b
+    Examples:
+      sepi calibrate sweep
+      sepi depth sweep-cameras
+    """
+    from sepi.extensions.cameras.calibration import calibrate as calibrated
+    from sepi.io.files import name_of
+    from sepi.process.threads import available_cores, use_threads
+
+    threads = threads or available_cores()
+    use_threads(threads)
+    target = output or default_folder(folder, "cameras")
+    with progress_bar(name_of(folder).name) as progress:
+        made = calibrated(folder, target, lens=lens, cameras=cameras, force=force, threads=threads, progress=progress)
+    count = len(made.placed)
+    missing = f"; not placed: {', '.join(made.left_out)}" if made.left_out else ""
+    click.echo(f"placed: {count} of {count + len(made.left_out)} pictures{missing}")
+    click.echo(f"mean reprojection error of the points: {made.error:.2g} pixels")
+    for note in made.notes:
+        click.echo(note)
+    click.echo(f"written: {target}/")
+    if made.unusable is not None:
+        raise SepiError(f"'sepi depth' cannot use these cameras: {made.unusable}")
+    click.echo(f"next: sepi depth {target}")
+
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command(cls=SepiCommand)
+@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@click.argument("result_path", metavar="RESULT", type=_PATH)
+@click.option(
+    "--to",
+    "kind",
+    type=click.Choice(["colmap", "nerfstudio"]),
+    default="colmap",
+    show_default=True,
+    help="Program to write for.",
+)
+@click.option("-o", "--output", type=_PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
+@click.option(
+    "--min-confidence", type=float, metavar="X", help="Least confidence of points; default: the median of all pixels."
+)
+@click.option(
+    "--points", type=click.IntRange(min=0), default=10000, show_default=True, metavar="N", help="At most N points."
+)
+@camera_flags
+@reading_flags
+def poses(
+    light_field_path: Path,
+    result_path: Path,
+    kind: str,
+    output: Path | None,
+    min_confidence: float | None,
+    points: int,
+    geometry: Geometry | None,
+    reading: Reading,
+) -> None:
+    """Write the views of the light field INPUT with camera poses, depth and points, for COLMAP or nerfstudio.
+
+    RESULT is the folder that 'sepi depth' wrote for INPUT, or its result.h5; it records how INPUT was read. Poses are
+    exact and need no matching. Each view has its own principal point; a program that ignores it sees another scene.
+    Depth of other views comes from 'sepi depth --all-views', else from RESULT's map, warped to them; 0 is unknown.
+    Positions are in metres if the camera is known. If RESULT has error bars, COLMAP's points have an error, and
+    nerfstudio's depth has a standard deviation. docs/depth/other_programs.md describes the files.
+
+    \b
+    Examples:
+      sepi poses cotton cotton-depth
+      sepi poses cotton cotton-depth --to nerfstudio -o cotton-nerf
+    """
+    from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
+    from sepi.extensions.cameras.posed_views import posed_views
+    from sepi.io.all_views import read_result_at, surfaces_of
+
+    light_field = read_light_field_of(light_field_path, result_path, reading, bare=False)
+    result = read_result_at(result_path, reading.options.view)
+    folder = output or default_folder(light_field_path, kind)
+    posed = posed_views(
+        light_field,
+        result.disparity,
+        result.confidence,
+        unknown=result.unknown,
+        camera=camera_of(result_path, reading.options.view, result, geometry),
+        min_confidence=min_confidence,
+        max_points=points,
+        surfaces=surfaces_of(result_path),
+        sigma=result.sigma,
+        sigmas=surfaces_of(result_path, "sigma"),
+    )
+    with progress_bar(light_field.name) as progress:
+        {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](folder, posed, progress)
+    if not posed.metric:
+        click.echo(
+            "the camera is unknown: a nominal one sees the scene at a distance of 1 to 2; pixels fit exactly, but "
+            "positions and depth are neither in metres nor to scale"
+        )
+    units = posed.units.partition(",")[0]
+    click.echo(f"written: {folder}/ ({len(posed.poses)} views, {posed.chosen.sum()} points, {units})")

@@ -1,0 +1,278 @@
+"""Data of the method at one pixel: SEPIs, cost curves over the candidates, views kept (figures 1, 3, 4 of [1]_).
+
+References
+----------
+.. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import cv2
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.extensions.page.curves import Curves, cost_curves, require_inside
+from sepi.extensions.page.pixels import InterestingPixel, kept_subsets
+from sepi.lightfield import BoolMap, LightField
+from sepi.matching.plane_sweep import SweepParameters
+from sepi.matching.stitched_epi import stitched_epi
+from sepi.matching.view_subsets import halves_and_quarters
+from sepi.report.pictures import Picture, as_rgb, contrast_of, picture_uri, stretched
+from sepi.stage import StageMaps
+
+GREY = 128
+"""Value of all channels where a picture has no sample: outside the view, or of a missing view."""
+
+HALF_WIDTH = 24
+"""Pixels of a SEPI picture on each side of the line."""
+
+# quality of the SEPI pictures on a page
+_WEBP = [cv2.IMWRITE_WEBP_QUALITY, 60]
+_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 9]
+
+
+@dataclass(frozen=True)
+class SepiPicture:
+    """Part of a SEPI around a pixel's column, sheared so that the candidate's line is upright in the middle.
+
+    The right candidate shows upright stripes, a wrong one a saw-tooth with a tooth for each row of views.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (T * S, 2 HALF_WIDTH + 1, 3), uint8
+        A row per view, ordered by ``t``, then ``s``; grey where a view has no sample.
+    inside : ndarray, shape (T * S, 2 HALF_WIDTH + 1), bool
+        Where the views have samples.
+    disparity : float
+        Candidate, pixels per view step.
+    """
+
+    pixels: Picture
+    inside: BoolMap
+    disparity: float
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Data of one pixel to show; all disparities in pixels per view step.
+
+    Attributes
+    ----------
+    pixel : InterestingPixel
+        Pixel of the reference view, and why it was chosen.
+    curves : Curves
+    chosen : float
+        Disparity in the final map.
+    kept_subset : str
+        Subset of the views that the occlusion stage kept; ``full`` if it kept all, or did not run.
+    kept : ndarray, shape (T, S), bool
+        Views of that subset that are present.
+    best : float or None
+        Disparity in the final map of the most accurate variant, if given.
+    interval : (float, float) or None
+        Interval of that variant's error bars, which holds the disparity with a probability of 90 %, if it has some.
+    ground_truth : float or None
+        None if unknown.
+    confidence : float
+        Confidence of the final map, 0..1.
+    occluded, textureless : bool
+        Values of the stages' masks.
+    pictures : mapping of str to SepiPicture
+        SEPIs at ``minimum`` (lowest cost over all views, as in the initial stage), ``chosen``, ``wrong`` (highest cost
+        over all views) and, if known, ``ground_truth``.
+    """
+
+    pixel: InterestingPixel
+    curves: Curves
+    chosen: float
+    kept_subset: str
+    kept: BoolMap
+    best: float | None
+    interval: tuple[float, float] | None
+    ground_truth: float | None
+    confidence: float
+    occluded: bool
+    textureless: bool
+    pictures: Mapping[str, SepiPicture]
+
+    @cached_property
+    def stretched(self) -> dict[str, Picture]:
+        """The SEPIs with stretched contrast, the same in all."""
+        limits = contrast_of([(picture.pixels, picture.inside) for picture in self.pictures.values()])
+        return {name: stretched(found.pixels, found.inside, limits) for name, found in self.pictures.items()}
+
+    @property
+    def patch(self) -> Picture:
+        """Angular patch: the sample of each view at the chosen disparity, with stretched contrast; shape (T, S, 3)."""
+        return self.stretched["chosen"][:, HALF_WIDTH].reshape(*self.kept.shape, 3)
+
+
+def sepi_picture(light_field: LightField, y: int, x: int, disparity: float) -> SepiPicture:
+    """The SEPI of a pixel (Eq. 1-2 of [1]_) for one candidate.
+
+    Parameters
+    ----------
+    light_field : LightField
+    y, x : int
+        Pixel of the reference view.
+    disparity : float
+        Candidate, pixels per view step; finite.
+
+    Returns
+    -------
+    SepiPicture
+
+    Raises
+    ------
+    SepiError
+        If the pixel lies outside the reference view or the disparity is not finite.
+    """
+    require_inside(light_field, y, x)
+    if not math.isfinite(disparity):
+        raise SepiError(f"{light_field.name}: a SEPI needs a finite disparity, got {disparity:g}")
+    sepi = stitched_epi(light_field, y, disparity)
+    columns = x + np.arange(-HALF_WIDTH, HALF_WIDTH + 1)
+    position = columns + (-disparity * sepi.positions - sepi.offsets)[:, None]
+    width = sepi.rows.shape[1]
+    inside = sepi.inside[:, None] & (position >= 0) & (position <= width - 1)
+    # far outside, integers would overflow
+    position = np.clip(position, 0, width - 1)
+    left = np.minimum(np.floor(position).astype(np.int64), width - 2)
+    weight = (position - left).astype(np.float32)[:, :, None]
+    number = np.arange(len(sepi.rows))[:, None]
+    samples = (1 - weight) * sepi.rows[number, left] + weight * sepi.rows[number, left + 1]
+    return SepiPicture(np.where(inside[:, :, None], as_rgb(samples), np.uint8(GREY)), inside, float(disparity))
+
+
+def probe(
+    light_field: LightField,
+    pixel: InterestingPixel,
+    *,
+    maps: StageMaps,
+    parameters: SweepParameters,
+    best: StageMaps | None = None,
+) -> Probe:
+    """The probe of one pixel.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    pixel : InterestingPixel
+        Pixel of the reference view.
+    maps : StageMaps
+        Final maps of a variant whose occlusion stage is ``half_sepi`` or ``none``.
+    parameters : SweepParameters
+        Parameters of its initial or occlusion stage.
+    best : StageMaps, optional
+        Final maps of the most accurate variant.
+
+    Returns
+    -------
+    Probe
+
+    Raises
+    ------
+    SepiError
+        If the pixel lies outside the reference view, the disparity range is unknown, the final disparity is not
+        finite there, or the subsets of the views are not those of the half-SEPI.
+    """
+    y, x, _ = pixel
+    curves = cost_curves(light_field, y, x, parameters)
+    views = halves_and_quarters(light_field)
+    number = int(kept_subsets(maps)[y, x])
+    if maps.subset_names and maps.subset_names != views.names:
+        raise SepiError(
+            f"{light_field.name}: the subsets of the views are {', '.join(maps.subset_names[:3])}, ...; "
+            f"expected those of half_sepi, {', '.join(views.names[:3])}, ..."
+        )
+    chosen = float(maps.disparity[y, x])
+    ground_truth = None if light_field.ground_truth is None else _finite(light_field.ground_truth[y, x])
+    shown = {
+        "minimum": curves.minimum()[0],
+        "chosen": chosen,
+        "wrong": float(curves.disparities[curves.costs[0].argmax()]),
+        "ground_truth": ground_truth,
+    }
+    return Probe(
+        pixel=pixel,
+        curves=curves,
+        chosen=chosen,
+        kept_subset=views.names[number],
+        kept=views.subsets[number][views.groups] & light_field.present,
+        best=None if best is None else _finite(best.disparity[y, x]),
+        interval=None if best is None else _interval(best, y, x),
+        ground_truth=ground_truth,
+        confidence=float(maps.confidence[y, x]),
+        occluded=bool(maps.mask("occluded")[y, x]),
+        textureless=bool(maps.mask("textureless")[y, x]),
+        pictures={
+            name: sepi_picture(light_field, y, x, disparity)
+            for name, disparity in shown.items()
+            if disparity is not None
+        },
+    )
+
+
+def to_json(found: Probe) -> dict[str, Any]:
+    """A probe as compact JSON for a page.
+
+    Returns
+    -------
+    dict
+        The fields of :class:`Probe`, and ``best_subset``, the subset of lowest cost, kept or not.
+        ``range`` is the first and last candidate; ``costs`` maps the names of the subsets to base64 of little-endian
+        uint16, ``65535 * cost`` of each candidate; ``kept`` has a character per view, ``1`` or ``0``; ``sepi`` maps
+        the names of the pictures to their ``disparity`` and ``src``, a data URI (WebP), whose middle column is the
+        line; ``patch`` is a data URI (PNG) of a pixel per view. Unknown values are None.
+    """
+    curves, sources = found.curves, found.stretched
+    costs = np.rint(65535 * np.clip(curves.costs.astype(np.float64), 0, 1)).astype("<u2")
+    return {
+        **found.pixel._asdict(),
+        "range": [_short(curves.disparities[0]), _short(curves.disparities[-1])],
+        "costs": {
+            name: base64.b64encode(cost.tobytes()).decode() for name, cost in zip(curves.names, costs, strict=True)
+        },
+        "chosen": _short(found.chosen),
+        "minimum": _short(curves.minimum()[0]),
+        "best_subset": curves.best_subset(),
+        "kept_subset": found.kept_subset,
+        "kept": "".join("01"[int(view)] for view in found.kept.ravel()),
+        "best": _short(found.best),
+        "interval": None if found.interval is None else [_short(end) for end in found.interval],
+        "ground_truth": _short(found.ground_truth),
+        "confidence": _short(found.confidence),
+        "occluded": found.occluded,
+        "textureless": found.textureless,
+        "sepi": {
+            name: {"disparity": _short(picture.disparity), "src": picture_uri(sources[name], "webp", _WEBP)}
+            for name, picture in found.pictures.items()
+        },
+        "patch": picture_uri(found.patch, "png", _PNG),
+    }
+
+
+def _interval(maps: StageMaps, y: int, x: int) -> tuple[float, float] | None:
+    if maps.low is None or maps.high is None:
+        return None
+    return float(maps.low[y, x]), float(maps.high[y, x])
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _short(value: float | None) -> float | None:
+    """A value with seven decimals; None if it is not finite.
+
+    The page shows three. With four here, double rounding would differ from the tables.
+    """
+    return None if value is None or not math.isfinite(value) else round(float(value), 7)

@@ -1,1 +1,0 @@
-"""Probes: SEPIs and cost curves of single pixels."""
