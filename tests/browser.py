@@ -23,13 +23,6 @@ Pixels = npt.NDArray[np.uint8]
 # enough for the slowest machine; a page that is right takes a fraction of it
 _PATIENCE = 20_000
 
-# as WCAG 2 counts a layout's jumps: what moves by itself, without a hand on the page
-_WATCH_JUMPS = """
-window.jumped = 0;
-new PerformanceObserver((list) => {
-  for (const entry of list.getEntries()) if (!entry.hadRecentInput) window.jumped += entry.value;
-}).observe({ type: "layout-shift", buffered: true });
-"""
 
 # the pixels of a canvas, top row first, RGBA
 _READ = """(canvas) => {
@@ -94,7 +87,6 @@ def window(browser: Any, width: int = 1400, height: int = 900, **options: Any) -
     """An empty page without a network, and the context that is to be closed after it."""
     context = browser.new_context(viewport={"width": width, "height": height}, offline=True, **options)
     context.set_default_timeout(_PATIENCE)
-    context.add_init_script(_WATCH_JUMPS)
     return context, context.new_page()
 
 

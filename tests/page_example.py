@@ -79,7 +79,6 @@ class Example:
     def external(self) -> FloatMap:
         """The map of the other method for the scene cotton."""
         ground_truth = self.light_field(COTTON).ground_truth
-        assert ground_truth is not None
         return external_map(ground_truth)
 
 
@@ -88,7 +87,6 @@ def small_light_field(scene: tuple[str, str]) -> LightField:
     name = "curved_occluders" if scene == COTTON else "dots"
     found = replace(render(name, size=SIZE, views=VIEWS), name=scene[1])
     if scene == COTTON:
-        assert found.ground_truth is not None
         ground_truth = found.ground_truth.copy()
         ground_truth[:3, :3] = np.nan
         return replace(found, camera=_CAMERA, ground_truth=ground_truth)
@@ -158,7 +156,6 @@ def write_plan_scores(plan: Plan, scene: tuple[str, str], light_field: LightFiel
 
 def methods_maps(plan: Plan, light_field: LightField) -> Mapping[str, ExternalMap]:
     """One method's map with unknown pixels, and one of the wrong size."""
-    assert light_field.ground_truth is not None
     files = {"SPO": external_map(light_field.ground_truth), "wrong_size": np.zeros((5, 7), np.float32)}
     for method, values in files.items():
         write_pfm(plan.results / f"{method}.pfm", values)

@@ -41,7 +41,6 @@ def part(folder: Path, size: int = 192, corner: tuple[int, int] | None = None) -
     """A part of a scene, with the range of the whole: for what compares one map with another."""
     whole, (y, x) = scene(folder), corner or _CORNERS[folder.name]
     inside = np.s_[y : y + size, x : x + size]
-    assert whole.ground_truth is not None
     views = np.ascontiguousarray(whole.views[:, :, *inside])
     return replace(whole, views=views, ground_truth=whole.ground_truth[inside].copy(), masks={})
 

@@ -14,7 +14,6 @@ CAMERA = {"focal_length_mm": 100.0, "baseline_mm": 25.0, "focus_distance_m": 4.2
 def write_drawn(path: Path, name: str, builtin: str = "dots", size: int = 64, views: int = 3) -> None:
     """A rendered scene's file with light and truth of a built-in one; its upper quarter is called glossy."""
     drawn = render(builtin, size=size, views=views)
-    assert drawn.ground_truth is not None
     masks = {**drawn.masks, "textured": ~drawn.masks["textureless"], "glossy": np.arange(size)[:, None] < size // 4}
     bits = sum((masks[mask].astype(np.uint16) << bit for bit, mask in enumerate(MASKS) if mask in masks), np.uint16(0))
     grid = (views, views)

@@ -2,19 +2,16 @@
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 
-from sepi.lightfield import DisparityRange, LightField
+from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
 from sepi.regularization.border_planes import BorderPlaneParameters, ransac_plane
 from sepi.regularization.uniform_regions import UniformPlanesParameters, plain_pixels
 from sepi.scenes import render
 from sepi.scoring.confidence import oracle, sparsification
 from sepi.scoring.scores import score
-from sepi.variants import VARIANTS
-from sepi.variants.built_in import PARTS_OF_BEST
 
 pytestmark = pytest.mark.slow
 
@@ -73,29 +70,6 @@ def test_edges_are_sharp_and_texture_is_no_edge(name: str) -> None:
             assert best[measure] < part * paper[measure], measure
 
 
-def checked(size: int, period: float) -> LightField:
-    """A checked patch at 0.5 px per view step before a textured ground; its next aliases lie outside the range."""
-    y, x = np.mgrid[:size, :size].astype(np.float32)
-    rng = np.random.default_rng(0)
-    ground = cv2.GaussianBlur(rng.random((2 * size, 2 * size), np.float32), (0, 0), 1.2)
-    ground = (ground - ground.min()) / np.ptp(ground)
-    views = np.empty((9, 9, size, size, 1))
-    for t, s in np.ndindex(9, 9):
-        v, u = y + 0.5 * (t - 4), x + 0.5 * (s - 4)
-        checks = 0.5 + 0.3 * np.sin(2 * np.pi * u / period) * np.sin(2 * np.pi * v / period)
-        behind = cv2.remap(ground, x - 0.8 * (s - 4) + size / 2, y - 0.8 * (t - 4) + size / 2, cv2.INTER_CUBIC)
-        patch = np.maximum(abs(u - size / 2), abs(v - size / 2)) < size / 4
-        views[t, s, ..., 0] = np.where(patch, checks, behind)
-    noisy = np.clip(views + rng.normal(0, 0.008, views.shape), 0, 1)
-    return LightField(np.uint8(255 * noisy + 0.5), "checks", disparity_range=DisparityRange(-2, 2, "given"))
-
-
-def test_few_views_repeat_no_alias() -> None:
-    """Views on every second or fourth row and column fit half or a quarter of a period away, too."""
-    patch = np.s_[28:-28, 28:-28]
-    assert np.mean(np.abs(estimate_depth(checked(96, 8), "best").disparity[patch] - 0.5) > 0.3) <= 0.01
-
-
 def test_uniform_is_what_the_noise_explains() -> None:
     """Faint texture above the noise is texture, whatever its contrast; noise is not."""
     random = np.random.default_rng(0)
@@ -115,19 +89,9 @@ def test_plane_is_nowhere_nearer_than_most_of_the_border() -> None:
     border = np.zeros((30, 40), bool)
     border[[0, -1]] = border[:, [0, -1]] = True
     plane = ransac_plane(border, disparity.astype(np.float32), BorderPlaneParameters())
-    assert plane is not None
     found = plane[0] + plane[1] * (x - 19.5) + plane[2] * (y - 14.5)
     np.testing.assert_allclose(found, ground_truth, atol=1e-3)
     assert ransac_plane(np.zeros((30, 40), bool), disparity, BorderPlaneParameters()) is None
-
-
-def test_parts_of_best_differ_from_it_in_one_thing() -> None:
-    """A row of the ablation that changes more says nothing about the part."""
-    assert next(iter(PARTS_OF_BEST)) == "best"
-    assert set(PARTS_OF_BEST) == {name for name in VARIANTS if name.startswith("best")}
-    for name in PARTS_OF_BEST:
-        different = [s for s, c in VARIANTS[name].labels.items() if VARIANTS["best"].labels[s] != c]
-        assert len(different) == {"best": 0, "best_no_detail": 3, "best_no_denoising": 4}.get(name, 1)
 
 
 def test_parts_that_noise_needs_change_maps_in_noise() -> None:

@@ -38,8 +38,6 @@ def test_edited_sources_are_built_again(tmp_path: Path) -> None:
         folder.mkdir(parents=True)
     module = shutil.copy(sepi.kernels.checkout.__file__, kernels)
     spec = spec_from_file_location("checkout", module)
-    assert spec is not None
-    assert spec.loader is not None
     checkout = module_from_spec(spec)
     spec.loader.exec_module(checkout)
     assert checkout.is_current(), "an installed package has no sources to follow"

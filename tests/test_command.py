@@ -1,27 +1,23 @@
 """The command of a stage, as the workflow calls it: what it writes, and what it leaves behind when it fails."""
 
-import io
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-import click
 import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
-from error_lines import error_of
+from error_lines import call, done, error_of
 from pydantic import Field
 
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
 from sepi.io.provenance import history_of
 from sepi.lightfield import DisparityRange, LightField
-from sepi.process.command import SepiCommand, progress_bar, stage_command
+from sepi.process.command import stage_command
 from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps
 
 
@@ -56,10 +52,6 @@ def light_field(tmp_path: Path) -> Path:
     return path
 
 
-def call(command: click.Command, *words: object) -> Result:
-    return CliRunner().invoke(command, [str(word) for word in words])
-
-
 def files(folder: Path) -> list[str]:
     """Names of all files, hidden ones too."""
     return sorted(path.name for path in folder.rglob("*") if path.is_file())
@@ -69,9 +61,8 @@ class TestStageFile:
     def test_it_holds_the_maps_and_what_made_them(self, light_field: Path, tmp_path: Path) -> None:
         one, two = tmp_path / "a" / "one.h5", tmp_path / "b" / "two.h5"
         base = ["--light-field", light_field, "--choice", "constant"]
-        assert call(FIRST, *base, "--output", one).exit_code == 0
-        second = call(SECOND, *base, "--previous", one, "--parameters", '{"amount": 1.5}', "--output", two)
-        assert second.exit_code == 0
+        assert call(*base, "--output", one, of=FIRST).exit_code == 0
+        second = done(*base, "--previous", one, "--parameters", '{"amount": 1.5}', "--output", two, of=SECOND)
         assert second.output == ""
         assert np.all(read_stage(two).disparity == 2.0)
         attributes = read_attributes(two)
@@ -86,7 +77,7 @@ class TestStageFile:
     def test_seconds_memory_and_threads_are_written(self, light_field: Path, tmp_path: Path) -> None:
         """The run time table is made from them."""
         base = ["--light-field", light_field, "--choice", "constant", "--output", tmp_path / "o.h5", "--threads", 2]
-        assert call(FIRST, *base, "--timing", tmp_path / "t.json").exit_code == 0
+        assert call(*base, "--timing", tmp_path / "t.json", of=FIRST).exit_code == 0
         timing = json.loads((tmp_path / "t.json").read_text())
         assert 0 < timing["seconds"] < 60
         assert 10 < timing["peak_memory_mb"] < 100_000
@@ -96,7 +87,7 @@ class TestStageFile:
 class TestErrors:
     def test_an_error_is_one_line_and_leaves_no_file(self, light_field: Path, tmp_path: Path) -> None:
         out = tmp_path / "out" / "one.h5"
-        result = call(FIRST, "--light-field", light_field, "--choice", "failing", "--output", out)
+        result = call("--light-field", light_field, "--choice", "failing", "--output", out, of=FIRST)
         assert error_of(result) == "sepi: toy: too dark by far"
         assert files(tmp_path) == ["lightfield.h5"]
 
@@ -113,13 +104,13 @@ class TestErrors:
         self, light_field: Path, tmp_path: Path, parameters: str, expected: str
     ) -> None:
         base = ["--light-field", light_field, "--choice", "constant", "--output", tmp_path / "o.h5"]
-        assert expected in error_of(call(FIRST, *base, "--parameters", parameters))
+        assert expected in error_of(call(*base, "--parameters", parameters, of=FIRST))
 
     def test_maps_of_another_size_are_refused(self, light_field: Path, tmp_path: Path) -> None:
         with h5py.File(tmp_path / "small.h5", "w") as file:
             file["disparity"] = file["confidence"] = np.zeros((4, 4), np.float32)
         base = ["--light-field", light_field, "--choice", "constant", "--output", tmp_path / "o.h5"]
-        error = error_of(call(SECOND, *base, "--previous", tmp_path / "small.h5"))
+        error = error_of(call(*base, "--previous", tmp_path / "small.h5", of=SECOND))
         assert "small.h5: maps have shape (4, 4); expected" in error
 
 
@@ -159,7 +150,6 @@ def test_a_stopped_command_leaves_no_half_file(light_field: Path, tmp_path: Path
         text=True,
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])},
     )
-    assert process.stdout is not None
     assert process.stdout.readline() == "writing\n"
     assert len(files(tmp_path / "out")) == 1
     started = time.monotonic()
@@ -169,33 +159,3 @@ def test_a_stopped_command_leaves_no_half_file(light_field: Path, tmp_path: Path
     assert process.returncode != 0
     assert "Traceback" not in stderr
     assert files(tmp_path / "out") == []
-
-
-def test_a_progress_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Terminal(io.StringIO):
-        def isatty(self) -> bool:
-            return True
-
-    terminal = Terminal()
-    monkeypatch.setattr("sys.stderr", terminal)
-    with progress_bar("toy") as progress:
-        for fraction in (0.0, 0.5, 0.5, 1.0, 1.5):
-            progress(fraction)
-        # tqdm draws no more often than a reader sees
-        time.sleep(0.15)
-        progress(0.7)
-    shown = terminal.getvalue()
-    assert "toy   0% |" in shown
-    assert "toy  70% |" in shown
-    assert shown.endswith("\r"), "the bar is gone when the work is done"
-
-
-def test_a_closed_terminal_ends_the_command_as_a_stop_does() -> None:
-    @click.command(cls=SepiCommand)
-    def command() -> None:
-        os.kill(os.getpid(), signal.SIGHUP)
-        time.sleep(5)
-
-    before = signal.getsignal(signal.SIGHUP)
-    assert CliRunner().invoke(command).exit_code == 128 + signal.SIGHUP
-    assert signal.getsignal(signal.SIGHUP) == before

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from error_lines import done
 
 from sepi import export
-from sepi.cli.main import main
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.provenance import stage_attributes
 from sepi.lightfield import DisparityRange, LightField
@@ -30,8 +30,7 @@ def light_field(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("variant", ["best", "paper", "no_occlusion_no_textureless"])
 def test_workflow_and_command_write_the_same_bytes(light_field: Path, tmp_path: Path, variant: str) -> None:
     """Whoever goes from one to the other gets the same maps, the same unknown pixels, and the same provenance."""
-    called = CliRunner().invoke(main, ["depth", str(light_field), "-o", str(tmp_path / "a"), "--variant", variant])
-    assert called.exit_code == 0, called.output
+    called = done("depth", light_field, "-o", tmp_path / "a", "--variant", variant)
     assert "% of the pixels" in called.stdout
     assert "candidates" in called.stdout
     scene, maps, steps = read_light_field(light_field), None, []

@@ -31,7 +31,6 @@ def light_field() -> LightField:
 
 @pytest.fixture
 def estimate(light_field: LightField) -> np.ndarray:
-    assert light_field.ground_truth is not None
     return light_field.ground_truth + np.random.default_rng(2).normal(scale=0.05, size=SHAPE).astype(np.float32)
 
 
@@ -57,9 +56,7 @@ def test_a_map_is_found_by_the_name_of_its_scene(tmp_path: Path, kept: str) -> N
 
 
 class TestImport:
-    def test_scores_are_those_of_our_own_maps(
-        self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
-    ) -> None:
+    def test_scores_equal_our_own_maps(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         external = external_maps(light_field, {"SPO": saved(tmp_path / "noise.pfm", estimate)})["SPO"]
         expected = evaluation_of(light_field, estimate)
         assert external.problem == ""
@@ -73,17 +70,7 @@ class TestImport:
         for name, mask in expected.regions.items():
             np.testing.assert_array_equal(external.evaluation.regions[name], mask)
 
-    def test_methods_keep_their_order(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
-        """The report's columns come as the user wrote them."""
-        names = ["SPO", "AMNorm", "z", "CAE 2017", "m10", "m2"]
-        files = {name: saved(tmp_path / f"{name}.pfm", estimate) for name in names}
-        found = external_maps(light_field, files)
-        write_external(tmp_path / "external.h5", found)
-        assert list(read_external(tmp_path / "external.h5")) == names
-
-    def test_scale_and_offset_reach_the_map(
-        self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
-    ) -> None:
+    def test_scale_and_offset_are_used(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         file = saved(tmp_path / "noise.pfm", -2 * estimate + 3)
         external = external_maps(light_field, {"SPO": file.model_copy(update={"scale": -0.5, "offset": 1.5})})["SPO"]
         np.testing.assert_allclose(external.disparity, estimate, atol=1e-5)
@@ -95,9 +82,7 @@ class TestImport:
         assert external.disparity is not None
         assert external.evaluation.scores == {}
 
-    def test_unknown_pixels_are_counted_and_bad(
-        self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
-    ) -> None:
+    def test_unknown_pixels_count_as_bad(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         estimate[20, 20:23] = [np.nan, np.inf, -np.inf]
         file = saved(tmp_path / "noise.pfm", estimate)
         with pytest.warns(SepiWarning, match=r"external SPO, scene noise: .*noise\.pfm: 3 of 1760 values"):
@@ -160,21 +145,9 @@ class TestFile:
         write_external(tmp_path / "b.h5", maps)
         assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
-    def test_scores_alone(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
-        """Tables need no maps."""
-        external = self.external(light_field, estimate)
-        write_external(tmp_path / "a.h5", {"SPO": external, "lost": ExternalMap("x", "no file")})
-        back = read_external(tmp_path / "a.h5", with_maps=False)
-        assert list(back) == ["SPO", "lost"]
-        assert without_nan(back["SPO"].evaluation.scores) == without_nan(external.evaluation.scores)
-        assert (back["SPO"].disparity, back["SPO"].evaluation.error, back["SPO"].evaluation.regions) == (None, None, {})
-        assert back["lost"].problem == "no file"
-
 
 class TestCommand:
-    def test_writes_what_is_found_and_shows_what_is_wrong(
-        self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
-    ) -> None:
+    def test_writes_maps_and_tells_faults(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         write_pfm(tmp_path / "noise.pfm", estimate)
         maps = {
             "SPO": {"path": str(tmp_path / "noise.pfm"), "scale": None, "offset": 0.0},
@@ -197,10 +170,7 @@ class TestCommand:
         ("maps", "message"),
         [
             ("SPO", "--maps: Invalid JSON"),
-            ("[]", "--maps: "),
-            ('{"SPO": {}}', "--maps.SPO.path: Field required"),
             ('{"SPO": {"path": 5}}', "--maps.SPO.path: "),
-            ('{"SPO": {"path": "a", "scal": 5}}', "--maps.SPO.scal: "),
             ('{"SPO": {"path": "a", "scale": "5"}}', "--maps.SPO.scale: "),
         ],
     )

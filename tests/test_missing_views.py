@@ -25,7 +25,6 @@ SHAPES = {
     "cross": (T == C) | (S == C),
     "star": (T == C) | (S == C) | (T == S) | (T + S == 2 * C),
     "row": T == C,
-    "corners gone": (np.abs(T - C) + np.abs(S - C)) < 5,
     "upper left": (T <= C) & (S <= C),
     "diagonals": (T == S) | (T + S == 2 * C),
 }

@@ -5,7 +5,6 @@ import pytest
 from geometries import jittered
 from scipy.ndimage import gaussian_filter
 
-from sepi.errors import SepiError
 from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
 from sepi.image.mean_shift import patch_modes
 from sepi.initial import CHOICES as INITIAL
@@ -98,11 +97,6 @@ def test_nothing_changes_where_nothing_is_occluded():
     np.testing.assert_array_equal(maps.disparity, initial.disparity)
 
 
-def test_stage_without_a_stage_before_it_is_an_error():
-    with pytest.raises(SepiError, match="stage before"):
-        CHOICES["none"].run(two_planes("right"), None, CHOICES["none"].parameters(), no_progress)
-
-
 def blank(grid, **known):
     return LightField(np.zeros((*grid, 2, 2, 3), np.uint8), "blank", **known)
 
@@ -138,20 +132,6 @@ def test_half_planes_are_those_of_the_picture_where_rows_are_closer():
     angle = np.pi / 16
     facing = s * np.cos(angle) + 0.25 * t * np.sin(angle)
     np.testing.assert_array_equal(views.subsets[1][views.groups][facing != 0], (facing > 0)[facing != 0])
-
-
-def test_half_planes_face_their_direction():
-    """A half plane that faced the wrong way would keep the occluded views."""
-    directions = 8
-    views = half_planes(blank((9, 9)), directions)
-    t, s = np.mgrid[-4:5, -4:5]
-    for n in range(2 * directions):
-        member = views.subsets[1 + n][views.groups]
-        angle = (n + 0.5) * np.pi / directions
-        facing = s * np.cos(angle) + t * np.sin(angle)
-        away = (t != 0) | (s != 0)
-        assert member[(facing > 0.9) & away].all()
-        assert not member[(facing < -0.9) & away].any()
 
 
 def test_nearer_surface_is_found_only_on_the_hidden_side():

@@ -66,24 +66,6 @@ def test_smoothness_is_weaker_at_edges_and_where_depth_is_sure():
     np.testing.assert_allclose(low[:, 4], 1 / (3 * 0.2**2 + parameters.gradient_floor**2), rtol=1e-5)
 
 
-def test_energy_is_the_sum_of_equation_8():
-    generator = np.random.default_rng(4)
-    shape = (6, 5)
-    disparity, weight, smoothness, estimate = generator.uniform(0.1, 1, (4, *shape)).astype(np.float32)
-    alpha = 0.3
-    matrix, right = system_of(disparity, weight, smoothness, alpha)
-    energy = 0.0
-    for y in range(shape[0]):
-        for x in range(shape[1]):
-            energy += weight[y, x] * (disparity[y, x] - estimate[y, x]) ** 2
-            for v, u in ((y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)):
-                if 0 <= v < shape[0] and 0 <= u < shape[1]:
-                    energy += alpha * smoothness[y, x] * (estimate[y, x] - estimate[v, u]) ** 2
-    flat = estimate.ravel().astype(np.float64)
-    quadratic = flat @ (matrix @ flat) - 2 * flat @ right + (weight * disparity**2).sum()
-    assert quadratic == pytest.approx(energy, rel=1e-5)
-
-
 def test_doubtful_outliers_are_pulled_to_their_surface():
     light_field = light_field_of(np.full((60, 60, 3), 120, np.uint8))
     disparity = np.zeros((60, 60), np.float32)

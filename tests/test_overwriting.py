@@ -37,7 +37,6 @@ FAR, RIM = 0.1, 2
 def known(light_field: LightField) -> BoolMap:
     """Pixels of much more texture than noise, away from depth steps and from the border of the picture."""
     truth, box = light_field.ground_truth, np.ones((2 * RIM + 1,) * 2, np.uint8)
-    assert truth is not None
     down, across = np.gradient(light_field.reference_view.mean(axis=2))
     textured = (
         np.minimum(cv2.blur(down**2, (5, 5)), cv2.blur(across**2, (5, 5))) > (4 * view_noise(light_field).usual) ** 2
@@ -50,7 +49,6 @@ def known(light_field: LightField) -> BoolMap:
 def moved(light_field: LightField, step: str) -> float:
     """Percent of what is known, of a map that is the truth."""
     truth = light_field.ground_truth
-    assert truth is not None
     # doubtful, so that confidence holds nothing
     after = STEPS[step](light_field, StageMaps(truth.copy(), np.full(truth.shape, 0.5, np.float32)))
     asked = known(light_field)

@@ -1,7 +1,5 @@
 """A stage's choice that a caller adds."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from pydantic import Field
@@ -44,14 +42,6 @@ def test_added_choice_runs_with_its_parameters() -> None:
     np.testing.assert_array_equal(estimate_depth(light_field, shifted).disparity, plain + np.float32(0.5))
     with pytest.raises(SepiError, match=r"optimize\.shift\.by: .* got -1"):
         estimate_depth(light_field, shifted, {"optimize": {"by": -1}})
-
-
-def test_adding_again_replaces() -> None:
-    """A notebook's cell that runs twice fails, or keeps the function of the first run."""
-    add_choice("optimize", "shift", Choice(ShiftParameters, shift))
-    second = partial(shift)
-    add_choice("optimize", "shift", Choice(ShiftParameters, second))
-    assert variants.STAGES["optimize"]["shift"].function is second
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,7 @@
 """All stages on odd but legal light fields, and the refusal of those that hold no depth."""
 
-import os
 import re
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +10,7 @@ from several_threads import SEVERAL, threads
 import sepi
 from sepi.inspection.disparity_range import estimate_range
 from sepi.lightfield import DisparityRange, LightField
-from sepi.scenes import render, write_hci
+from sepi.scenes import render
 from sepi.variants import STAGES, VARIANTS, Variant, choice_label, choice_of, compared_methods, stage_parameters
 
 CANDIDATES = {"initial": {"num_disparities": 21}, "occlusion": {"num_disparities": 21}}
@@ -28,16 +24,12 @@ def light_field(shape, dtype=np.uint8, low=0.0, disparities=(-1.0, 1.0), **value
 
 ODD = {
     "smallest": light_field((3, 3, 2, 2, 3)),
-    "two by three pixels": light_field((3, 3, 2, 3, 3)),
     "small": light_field((3, 3, 8, 8, 3)),
     "narrow": light_field((3, 3, 30, 8, 3)),
     "one row of views": light_field((1, 9, 20, 24, 3)),
     "one column of views": light_field((9, 1, 20, 24, 3)),
-    "even grid": light_field((4, 2, 20, 24, 3)),
     "two views": light_field((1, 2, 20, 24, 3)),
     "grey": light_field((3, 3, 20, 24, 1)),
-    "16 bit": light_field((3, 3, 20, 24, 3), np.uint16),
-    "float": light_field((3, 3, 20, 24, 3), np.float32),
     "one colour": light_field((3, 3, 20, 24, 3), low=1.0),
     "black": LightField(np.zeros((3, 3, 20, 24, 3), np.uint8), "black", disparity_range=DisparityRange(-1, 1, "given")),
     "range far from zero": light_field((3, 3, 20, 24, 3), disparities=(3.0, 9.0)),
@@ -142,44 +134,21 @@ def test_light_fields_without_depth_are_refused(views, present, complaint) -> No
         LightField(views, "refused", present=present)
 
 
-# every choice of `paper`, `best` and the ablations that has loops of its own; to start Python takes longer than a map
-DEPTH = """
-import sys
-from sepi.cli.main import main
-scene, out, threads = sys.argv[1:]
-for variant in ("paper", "no_sepi", "best"):
-    words = ["depth", scene, "-o", f"{out}/{variant}", "--variant", variant, "--threads", threads]
-    main(words, standalone_mode=False)
-"""
-
-
-@pytest.mark.parametrize("variant", ["fast", "wang", *compared_methods()])
+@pytest.mark.parametrize("variant", ["fast", "wang", "paper", "no_sepi", "best", *compared_methods()])
 def test_equal_maps_for_any_number_of_threads(variant: str) -> None:
+    """A result made on another machine must be the same, byte for byte: cores are not part of the input."""
     whole = render("curved_occluders", size=64, views=3)
     scene = LightField(whole.views[:, :, 16:48, 16:48].copy(), "part", disparity_range=whole.disparity_range)
     maps = []
     for count in (1, SEVERAL):
         with threads(count):
-            maps.append(sepi.estimate_depth(scene, variant, {"initial": CANDIDATES["initial"]}))
-    np.testing.assert_array_equal(maps[0].disparity, maps[1].disparity)
-    np.testing.assert_array_equal(maps[0].confidence, maps[1].confidence)
-
-
-@pytest.mark.slow
-def test_equal_files_for_any_number_of_threads(tmp_path: Path) -> None:
-    """A result made on another machine must be the same, byte for byte: cores are not part of the input."""
-    write_hci(render("wall", size=64, views=5), tmp_path / "wall")
-    files = []
-    for count in ("1", str(SEVERAL)):
-        out = tmp_path / count
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": count, "OMP_NUM_THREADS": count}
-        environment["PYTHONPATH"] = str(Path(__file__).parents[1])
-        command = [sys.executable, "-c", DEPTH, str(tmp_path / "wall"), str(out), count]
-        subprocess.run(command, env=environment, check=True, capture_output=True)
-        files.append({file.relative_to(out): file.read_bytes() for file in out.rglob("*") if file.is_file()})
-    assert {path.parts[0] for path in files[0]} == {"paper", "no_sepi", "best"}
-    assert files[0].keys() == files[1].keys()
-    assert [str(path) for path, content in files[0].items() if files[1][path] != content] == []
+            maps.append(
+                sepi.estimate_depth(
+                    scene, variant, {} if variant == "no_sepi" else {"initial": CANDIDATES["initial"]}
+                ).all()
+            )
+    for name, values in maps[0].items():
+        np.testing.assert_array_equal(maps[1][name], values, err_msg=name)
 
 
 @pytest.mark.parametrize("variant", ["best", "paper"])

@@ -83,7 +83,7 @@ def test_the_documented_extension_adds_all_that_it_says(tmp_path: Path) -> None:
     assert planned(plan.stdout).keys() & set(STAGES) == {"optimize"}
 
 
-def test_an_extension_that_cannot_be_loaded_is_named(
+def test_an_extension_that_cannot_load_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_extensions: None
 ) -> None:
     """One whose files are gone, as after a checkout of another branch, is none at all."""
@@ -98,9 +98,7 @@ def test_an_extension_that_cannot_be_loaded_is_named(
     )
 
 
-def test_two_extensions_with_one_name_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_extensions: None
-) -> None:
+def test_two_of_one_name_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_extensions: None) -> None:
     installed(tmp_path, "one", "[sepi.extensions]\none = alike:EXTENSION\ntwo = alike:EXTENSION\n")
     (tmp_path / "alike.py").write_text(
         "from sepi.registry import Extension\nEXTENSION = Extension(variants={'mine': {'base': 'fast'}})\n"

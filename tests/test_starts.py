@@ -5,10 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import click
 import pytest
 
-from sepi.cli.main import main
 from sepi.scenes import render, write_hci
 
 # what takes longer to import than many a job takes, and is not there in a help that must come at the speed of typing
@@ -20,15 +18,6 @@ def test_help_waits_for_no_library() -> None:
     for words in (["--help"], ["depth", "--help"]):
         program = f"import sys\nfrom sepi.cli.main import main\nmain({words!r}, standalone_mode=False)\n"
         run_without_limits(f"{program}assert not {{*{SLOW!r}}} & {{*sys.modules}}")
-
-
-@pytest.mark.parametrize("name", main.commands)
-def test_commands_are_what_the_list_says(name: str) -> None:
-    """A line of `sepi --help` for a command that is another one, or none."""
-    command = main.get_command(click.Context(main), name)
-    assert command is not None
-    assert command.name == name
-    assert command.params
 
 
 # what a scheduler does, or a container
@@ -98,32 +87,3 @@ def test_commands_take_the_cores_that_they_were_given(tmp_path: Path) -> None:
         "    assert (threads_used(), cv2.getNumThreads()) == (1, 1), words"
     )
     run_without_limits(program)
-
-
-# loops of microseconds, and a rest after each that is longer than all of them
-WAITING = """
-import time
-import numpy as np
-from sepi import kernels
-from sepi.kernels import semi_global
-kernels.set_thread_count(2)
-volume, disparities = np.zeros(8 * 8 * 16, np.uint16), np.linspace(0, 1, 8, dtype=np.float32)
-first = np.zeros((8, 8), np.int32)
-places = first, first + 16, np.arange(0, 8 * 8 * 16, 16).reshape(8, 8), 16
-disparity, margin = np.empty((2, 8, 8), np.float32)
-def loop():
-    semi_global.choose(volume, volume, disparities, places, 0.1, disparity, margin)
-loop()
-begun = time.process_time()
-for _ in range(200):
-    loop()
-    time.sleep(0.002)
-print(time.process_time() - begun)
-"""
-
-
-def test_threads_that_wait_leave_the_processor_to_others() -> None:
-    """Threads that spin make every run beside other work slower, tests that run side by side above all."""
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
-    done = subprocess.run([sys.executable, "-c", WAITING], env=environment, capture_output=True, text=True, check=True)
-    assert float(done.stdout) < 0.2

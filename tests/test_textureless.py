@@ -98,11 +98,6 @@ def test_threshold_lies_where_the_sorted_lti_rises_fastest():
     assert 0.12 < threshold < 0.32
 
 
-def test_threshold_without_a_gap_stays_in_bounds():
-    assert lti_threshold(np.full(50, 0.95), 0.1, 0.4) == 0.1
-    assert lti_threshold(np.zeros(50), 0.1, 0.4) == 0.4
-
-
 def test_agreement_tells_noise_from_depth():
     columns = np.indices((40, 40))[1]
     plane = (0.02 * columns).astype(np.float32)
@@ -158,14 +153,6 @@ def test_propagation_equals_the_plane_that_its_neighbours_lie_on():
     )  # fmt: skip
     np.testing.assert_allclose(evaluate_planes(segments, solved, design), ground_truth, atol=1e-3)
     np.testing.assert_array_equal(solved[~free], planes[~free])
-
-
-def test_borders_of_tiles():
-    adjacent = adjacency(tiles((20, 20), 10))
-    pairs = list(zip(adjacent.first.tolist(), adjacent.second.tolist(), strict=True))
-    assert pairs == [(0, 1), (0, 2), (1, 3), (2, 3)]
-    assert adjacent.lengths.tolist() == [10, 10, 10, 10]
-    np.testing.assert_allclose(adjacent.midpoints[0], [9.5, 4.5])
 
 
 def test_superpixels_have_the_papers_sizes():

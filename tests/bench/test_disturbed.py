@@ -1,9 +1,7 @@
 """The bench of disturbed light fields, and what it is for: never a wrong word on the order of the views."""
 
 import pytest
-from click.testing import CliRunner
 
-from bench.__main__ import main
 from bench.disturbed import DISTURBANCES, disturbed_verdicts
 from sepi.scenes import render
 
@@ -21,9 +19,3 @@ def test_no_verdict_is_wrong(name: str) -> None:
     told = sum(verdicts.orders["right"] for verdicts in found.values())
     assert (told > 6 * len(turns)) == (name == "curved_occluders")
     assert all(verdicts.row_spacing == 1 for verdicts in found.values())
-
-
-def test_an_unknown_light_field_is_refused() -> None:
-    result = CliRunner().invoke(main, ["disturb", "nowhere/at/all"])
-    assert result.exit_code != 0
-    assert "nowhere/at/all" in result.output

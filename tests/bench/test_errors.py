@@ -1,18 +1,10 @@
 """The numbers of the error bars make the errors likeliest, and say of other scenes what they say of these."""
 
-import re
-from functools import partial
-from pathlib import Path
-
 import numpy as np
-import pytest
-from click.testing import CliRunner
 
-from bench.__main__ import main
 from bench.error_model import as_code, fitted, judged, pooled
 from bench.error_samples import Sample
 from sepi.error_bars.calibration import CONSTANT, Calibration
-from sepi.scenes import render
 
 TRUE = Calibration(
     scale={CONSTANT: 1.0, "deviation": 0.8, "second_difference": 0.0},
@@ -56,31 +48,3 @@ def test_a_fit_finds_the_numbers_that_errors_were_drawn_with() -> None:
     names = {"Calibration": Calibration, "CONSTANT": CONSTANT}
     exec(as_code("WRITTEN", found), names)
     assert names["WRITTEN"] == found
-
-
-def test_the_command_fits_and_judges_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bench.sweep.render", partial(render, size=80, views=5))
-    words = [
-        "errors",
-        "--scene",
-        "dots",
-        "--sigma",
-        "3",
-        "--variant",
-        "fast",
-        "--kept",
-        str(tmp_path),
-        "--threads",
-        "1",
-    ]
-    done, again = (CliRunner().invoke(main, words) for _ in range(2))
-    assert done.exit_code == 0, done.output
-    assert "SECOND_ORDER = Calibration(" in done.stdout
-    assert "dots + 3" in done.stdout
-    *_, head, _, row = done.stdout.splitlines()
-    assert row.startswith("| `fast`: 1 of the fit")
-    page = Path(__file__).parents[2] / "docs/method/error_bars.md"
-    assert re.sub(" +", " ", head) in page.read_text(encoding="utf-8")
-    # kept pixels are those that were computed
-    assert again.stdout == done.stdout
-    assert len(list(tmp_path.iterdir())) == 1

@@ -2,12 +2,9 @@
 
 from pathlib import Path
 
-import pytest
-from click.testing import CliRunner
+from error_lines import done
 
 from bench.__main__ import main
-from bench.estimates import jobs_below
-from sepi.errors import SepiError
 
 HEADER = "s\tmax_rss\trule_name\tresources"
 
@@ -27,14 +24,6 @@ def test_the_worst_job_of_a_rule_is_told(tmp_path: Path) -> None:
         "0.3\t9.0\tscene\t{'runtime': 1, 'mem_mb': 100}",
         "5.0\t9.0\tcharts\t{'mem_mb': 1000}",
     ]
-    result = CliRunner().invoke(main, ["estimates", str(written(tmp_path, *jobs))])
-    assert result.exit_code == 0, result.output
+    result = done("estimates", written(tmp_path, *jobs), of=main)
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in result.output.strip().splitlines()[2:]]
     assert rows == [["initial", "2", "90.0", "50%", "900", "90%"]]
-
-
-@pytest.mark.parametrize("text", ["s\tmax_rss\n3.0\t9.0", "", f"{HEADER}\n3.0\t9.0\tinitial\t{{"])
-def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
-    (tmp_path / "job.tsv").write_text(text)
-    with pytest.raises(SepiError, match="--benchmark-extended"):
-        jobs_below(tmp_path)

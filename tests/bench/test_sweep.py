@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from error_lines import done
 from rendered_files import write_drawn
 
 from bench import sweep
@@ -13,7 +13,6 @@ from bench.__main__ import main
 from sepi.errors import SepiError
 from sepi.extensions.rendered.exposure import read_scene
 from sepi.scenes import render, write_hci
-from sepi.variants import VARIANTS
 
 QUICK = ("--variant", "no_occlusion_no_textureless", "--threads", "1")
 
@@ -43,33 +42,17 @@ def test_the_command_scores_each_value_on_each_scene(tmp_path: Path) -> None:
         write_drawn(tmp_path / f"{name}.h5", name, builtin)
     scenes = [word for name in ("sticks", "wires") for word in ("--scene", str(tmp_path / f"{name}.h5"))]
     words = ["sweep", "optimize.wls.alpha", "1e-6", "1", *QUICK, "--noise", "off", *scenes]
-    result = CliRunner().invoke(main, words, catch_exceptions=False)
-    assert result.exit_code == 0, result.output
+    result = done(*words, of=main)
     assert "| left out" in result.stdout
     assert re.search(r"\| sticks +\| 1e-6 ", result.stdout)
-
-
-@pytest.mark.parametrize(
-    ("target", "values", "message"),
-    [
-        ("optimize.second_order.alpha", ["1"], "unknown 'second_order'; known: wls"),
-        ("optimise.wls.alpha", ["1"], "unknown 'optimise'; did you mean 'optimize'"),
-        ("optimize.wls.alpa", ["1"], "optimize.wls: unknown 'alpa'"),
-        ("optimize.wls.alpha", ["-1"], "optimize.wls.alpha"),
-    ],
-)
-def test_what_cannot_be_swept_is_told(target: str, values: list[str], message: str) -> None:
-    with pytest.raises(SepiError, match=message):
-        sweep.settings_of(VARIANTS["paper"], target, values)
 
 
 def test_noise_is_added_measured_and_scored(monkeypatch: pytest.MonkeyPatch) -> None:
     """If this fails, the table of noise is of something else than it says."""
     monkeypatch.setattr(sweep, "render", partial(render, size=96, views=5))
     arguments = "noise --scene pyramids --sigma 0 --sigma 12 --variant fast --allowed --threads 1"
-    done = CliRunner().invoke(main, arguments.split())
-    assert done.exit_code == 0, done.output
-    head, _, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in done.output.splitlines())
+    called = done(*arguments.split(), of=main)
+    head, _, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in called.output.splitlines())
     assert head == ["", "pyramids", "pyramids + 12"]
     assert [row[0] for row in rows] == ["`fast`", "allowed, alone", "allowed, 5x5"]
     scores, alone, together = ([[float(n) for n in cell.split(" / ")] for cell in row[1:]] for row in rows)

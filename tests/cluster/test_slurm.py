@@ -7,32 +7,22 @@ import signal
 import subprocess
 import tempfile
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
 
-import psutil
 import pytest
 from one_node import one_node_slurm, queue, why_not
 from workflow_copy import SIZE, SLOW_WRITING, TINY, Workflow, copy_of_the_project, edited, files_below, wait_for
 
-from sepi.registry import added
 from sepi.scenes import render, write_hci
-from sepi.variants import VARIANTS
 
 pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 
 CORES = 2
 SCENES = ("one", "two")
 TARGETS = tuple(f"results/hci/{scene}/paper/result.h5" for scene in SCENES)
-# of the compared methods, one with costs that go from stage to stage
-ALL_VARIANTS = tuple(
-    f"results/hci/one/{variant}/result.h5"
-    for variant in VARIANTS
-    if variant not in added("variants") or variant == "spo"
-)
 # a part of them, of two jobs
 SHORT_TARGETS = tuple(f"results/hci/{scene}/stages/sepi/initial.h5" for scene in SCENES)
 # the executor waits 10 seconds longer each time that it has looked at what was submitted: it looks after 5, 20 and 45
@@ -112,16 +102,8 @@ def seconds_until_told(workflow: Workflow, stdout: str) -> float:
     return datetime.strptime(told[1], "%a %b %d %H:%M:%S %Y").timestamp() - log.stat().st_mtime
 
 
-def is_ingest_of(workflow: Workflow, scene: str, process: psutil.Process) -> bool:
-    """Whether a process is the job that reads a light field for this workflow."""
-    with suppress(psutil.Error):
-        words = process.cmdline()
-        return words[-1:] == [f"results/hci/{scene}/lightfield.h5"] and process.cwd() == str(workflow.folder)
-    return False
-
-
 @pytest.mark.system
-def test_a_scene_is_one_submission_with_the_bytes_of_a_local_run(
+def test_a_scene_is_one_submission_with_a_local_runs_bytes(
     slurm: None, workflow: Workflow, expected: dict[str, str]
 ) -> None:
     """Submitted one by one, six jobs of a second each take minutes in a queue."""
@@ -130,43 +112,6 @@ def test_a_scene_is_one_submission_with_the_bytes_of_a_local_run(
     assert len(re.findall("has been submitted with SLURM jobid", result.stdout)) == len(SCENES)
     assert digests(workflow) == expected
     assert "Nothing to be done" in on_slurm(workflow, *TARGETS).stdout
-
-
-@pytest.mark.faults
-def test_every_variant_has_the_bytes_of_a_local_run(slurm: None, workflow: Workflow, local: Workflow) -> None:
-    """A cluster's jobs get other numbers of threads, and an environment of their own."""
-    here = replace(local, folder=local.folder.with_name("local-variants"))
-    result = here.run(*ALL_VARIANTS)
-    assert result.returncode == 0, result.stdout
-    there = replace(workflow, folder=workflow.folder.with_name("variants"))
-    result = on_slurm(there, *ALL_VARIANTS)
-    assert result.returncode == 0, result.stdout
-    assert digests(there) == digests(here)
-
-
-@pytest.mark.faults
-def test_killed_jobs_are_told_and_made_again(slurm: None, workflow: Workflow, expected: dict[str, str]) -> None:
-    """By the system, where memory is short: one of a scene's jobs, or the process on the node that runs them all."""
-    wounded = replace(workflow, folder=workflow.folder.with_name("wounded"))
-    with edited(wounded.tree / "sepi" / "io" / "files.py", "temporary.replace(path)", SLOW_WRITING):
-        process = wounded.start(*TARGETS, flags=flags(wounded), SLEEP="3")
-        for scene in SCENES:
-            wait_for(lambda of=wounded.folder / "results" / "hci" / scene: list(of.glob(".lightfield-*")))
-            job = next(one for one in psutil.process_iter() if is_ingest_of(wounded, scene, one))
-            (job if scene == "one" else job.parents()[0]).kill()
-        assert process.wait(timeout=60) != 0
-    wait_for(lambda: queue() == [])
-    result = on_slurm(wounded, *TARGETS)
-    assert result.returncode == 0, result.stdout
-    assert digests(wounded) == expected
-
-
-@pytest.mark.faults
-def test_several_scenes_are_one_submission_if_asked(slurm: None, workflow: Workflow) -> None:
-    both = replace(workflow, folder=workflow.folder.with_name("both"))
-    result = on_slurm(both, *TARGETS, more=("--group-components", "scene=2"))
-    assert result.returncode == 0, result.stdout
-    assert len(re.findall("has been submitted with SLURM jobid", result.stdout)) == 1
 
 
 @pytest.mark.system

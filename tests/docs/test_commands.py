@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib
 import json
 import re
-import shlex
 import shutil
 import subprocess
 from functools import cache
@@ -22,7 +21,7 @@ import cv2
 import numpy as np
 import pytest
 import yaml
-from click.testing import CliRunner
+from error_lines import done
 from markdown_links import FILES, REPOSITORY, blocks, spans
 from scipy.io import savemat
 from small_networks import convolution
@@ -30,7 +29,6 @@ from snakemake.cli import get_argument_parser, parse_config
 from workflow_copy import Workflow
 
 from sepi.cli.main import main
-from sepi.errors import SepiError
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import DisparityRange, LightField
 from sepi.process.command import SepiCommand
@@ -151,31 +149,6 @@ def test_commands_exist(page: str, hci: Path, tmp_path: Path) -> None:
             check(words, hci)
 
 
-@pytest.mark.workflow
-@pytest.mark.parametrize(
-    "command",
-    [
-        "sepi dept x",
-        "sepi depth x --varient best",
-        "sepi depth x --set initial.semi_global.nothing=1",
-        "for n in $(seq 3); do sepi depth $n --varient best; done",
-        "snakemake --al",
-        "snakemake -- al",
-        "snakemake -- results/builtin/dots/bast/disparity.pfm",
-        "snakemake --config 'builtn={size: 64}' -- all",
-        "make chek",
-        "python -m bench run --grup stages",
-        "python -m bench.nothing",
-    ],
-)
-def test_wrong_commands_are_found(command: str, hci: Path, tmp_path: Path) -> None:
-    """The test above would be silent."""
-    assert is_shell(command)
-    (words,) = commands(command, tmp_path)
-    with pytest.raises((AssertionError, SepiError, SystemExit)):
-        check(words, hci)
-
-
 @pytest.fixture(scope="session")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a light field ``field``, its maps ``maps``, and ``rig``, a workspace of COLMAP of both."""
@@ -183,15 +156,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_hci(render("pyramids", size=64, views=3), folder / "field")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        run(["depth", "field", "-o", "maps", "--all-views"])
-        run(["poses", "field", "maps", "-o", "rig"])
+        done("depth", "field", "-o", "maps", "--all-views")
+        done("poses", "field", "maps", "-o", "rig")
     return folder
-
-
-def run(words: list[str]) -> None:
-    """A command of ``sepi`` in the current folder."""
-    done = CliRunner().invoke(main, words)
-    assert done.exit_code == 0, f"sepi {shlex.join(words)}: {done.output}{done.exception!r}"
 
 
 def provide(given: dict[str, Any], made: Path, views: int) -> None:
@@ -228,17 +195,16 @@ def provide(given: dict[str, Any], made: Path, views: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", FILES)
-def test_commands_run(page: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_commands_run(page: str, made: Path, here: Path) -> None:
     """A user who pastes one after the other gets an error; so does one who pastes the Python that follows them."""
-    monkeypatch.chdir(tmp_path)
     found = blocks(FILES[page].read_text(encoding="utf-8"))
-    said = [words for _, block in found if is_shell(block) for words in commands(block, tmp_path)]
+    said = [words for _, block in found if is_shell(block) for words in commands(block, here)]
     called = [words for words in said if words[0] == "sepi" and not NOT_RUN & {*words}]
     given = [command.make_context("sepi", rest).params for command, rest in filter(None, map(resolved, called))]
     views = max((params.get("central") or 3 for params in given), default=3)
     for words, params in zip(called, given, strict=True):
         provide(params, made, views)
-        run([*words[1:], *(SMALL if words[1] == "scenes" else ())])
+        done(*words[1:], *(SMALL if words[1] == "scenes" else ()))
     for language, text in found:
         # a Snakefile is highlighted as Python, too
         if language == "python" and not text.startswith("configfile:"):

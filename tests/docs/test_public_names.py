@@ -40,11 +40,6 @@ def found(dotted: str) -> object:
     return getattr(importlib.import_module(module), name)
 
 
-def test_the_list_names_everything_that_sepi_exports() -> None:
-    """A name that users import from ``sepi`` has no page otherwise."""
-    assert {f"sepi.{name}" for name in sepi.__all__} <= set(NAMES)
-
-
 @pytest.mark.parametrize("dotted", [name for name in NAMES if isinstance(found(name), FunctionType | type)])
 def test_the_reference_says_what_there_is(dotted: str) -> None:
     """It names an argument or a field that there is not, or keeps quiet about one, or about what comes back."""
@@ -68,9 +63,8 @@ def test_the_reference_says_what_there_is(dotted: str) -> None:
 
 
 @pytest.fixture
-def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def own_folder(here: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A folder for what an example writes; threads and choices of the stages as they were before."""
-    monkeypatch.chdir(tmp_path)
     for stage, choices in STAGES.items():
         monkeypatch.setitem(STAGES, stage, dict(choices))
     threads = cv2.getNumThreads(), kernels.thread_count()

@@ -5,11 +5,12 @@ import re
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from markdown_links import DOCS, FILES, MADE, REPOSITORY, broken_links, site_pages
+from markdown_links import DOCS, FILES, MADE, REPOSITORY, broken_links
 
 sys.path.insert(0, str(DOCS))
 
@@ -18,12 +19,9 @@ import pictures.failures
 import pictures.stages
 from pictures.style import INKS, write_drawing
 
-from sepi.lightfield import LightField
 from sepi.scenes import render
 
 SMALL = 64
-# no map is computed for these
-QUICK = ("corresponding-epis", "grid-of-views", "points-in-views", "seen-from-above", "stitched-epi")
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -46,55 +44,17 @@ def test_named_pages_exist() -> None:
     assert gone == []
 
 
-def test_every_page_is_in_the_contents() -> None:
-    """A page that nobody finds in the navigation."""
-    listed = {"index"}
-    for page in site_pages():
-        folder = page.parent.relative_to(DOCS)
-        for block in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
-            names = [line for line in block.splitlines() if line and not line.startswith(":")]
-            listed |= {(folder / name).as_posix() for name in names}
-    pages = {page.relative_to(DOCS).with_suffix("").as_posix() for page in site_pages()}
-    assert pages - listed == set()
-    assert listed - pages <= {"examples/index", "reference/api"}
-
-
-def test_every_drawing_is_shown() -> None:
-    """A picture takes its time to be made and is on no page, or a page names one that nothing makes."""
-    shown = {
-        name for page in site_pages() for name in re.findall(r"```\{drawing\} (\S+)", page.read_text(encoding="utf-8"))
-    }
-    assert shown == set(make_pictures.drawings(SMALL))
-
-
-def _draw(name: str, folder: Path) -> None:
-    write_drawing(folder, name, make_pictures.drawings(SMALL)[name]())
-    sizes = set()
-    for ink in INKS:
-        drawing = ElementTree.parse(folder / f"{name}-{ink.name}.svg").getroot()
-        assert len(drawing.findall(".//{http://www.w3.org/2000/svg}path")) > 3
-        sizes.add((drawing.get("width"), drawing.get("height")))
-    # the page does not jump when it goes dark
-    assert len(sizes) == 1
-
-
-@pytest.mark.parametrize("name", QUICK)
-def test_drawing(name: str, tmp_path: Path) -> None:
-    """`make docs` ends at this drawing."""
-    _draw(name, tmp_path)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(set(make_pictures.drawings(SMALL)) - set(QUICK)))
-def test_drawing_of_maps(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", make_pictures.drawings(SMALL))
+def test_drawing(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """`make docs` ends at this drawing."""
-
-    def of_few_views(scene: str, size: int, views: int = 3) -> LightField:
-        return render(scene, size=size, views=views)
-
     for module in (pictures.failures, pictures.stages):
-        monkeypatch.setattr(module, "render", of_few_views)
-    _draw(name, tmp_path)
+        monkeypatch.setattr(module, "render", partial(render, views=3))
+    write_drawing(tmp_path, name, make_pictures.drawings(SMALL)[name]())
+    drawings = [ElementTree.parse(tmp_path / f"{name}-{ink.name}.svg").getroot() for ink in INKS]
+    assert all(len(drawing.findall(".//{http://www.w3.org/2000/svg}path")) > 3 for drawing in drawings)
+    # the page does not jump when it goes dark
+    assert len({(drawing.get("width"), drawing.get("height")) for drawing in drawings}) == 1
 
 
 @pytest.mark.slow

@@ -6,7 +6,6 @@ many kills; `make faults` asks for a hundred.
 
 import os
 import random
-import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -16,7 +15,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from one_scene import PART, TARGET, healed, made, unlock
+from one_scene import TARGET, healed, made, unlock
 from workflow_copy import SLOW_WRITING, Workflow, edited, files_below, wait_for
 
 from sepi.io.files import is_temporary
@@ -97,28 +96,3 @@ def test_a_job_ends_with_its_workflow(undisturbed_part: Workflow) -> None:
         process.wait()
         # what it had begun to write, it removes
         wait_for(lambda: not unfinished(), seconds=15)
-
-
-@pytest.mark.faults
-def test_a_terminal_that_closes(undisturbed: Workflow) -> None:
-    """SIGHUP and SIGTERM end a run as Ctrl-C does: nothing half written, and the next one goes on."""
-    expected = made(undisturbed)
-    for number in (signal.SIGHUP, signal.SIGTERM):
-        closed = replace(undisturbed, folder=undisturbed.folder.with_name(number.name))
-        process = closed.start(PART)
-        results = closed.folder / "results"
-        wait_for(lambda folder=results: list(folder.rglob("lightfield.h5")))
-        os.killpg(process.pid, number)
-        process.wait(timeout=60)
-        healed(closed, expected, PART)
-
-
-@pytest.mark.faults
-def test_the_same_on_one_thread_and_on_four(undisturbed: Workflow) -> None:
-    """More cores must not be another result."""
-    for cores in (1, 4):
-        other = replace(undisturbed, folder=undisturbed.folder.with_name(f"cores-{cores}"))
-        result = other.run(PART, flags=("--cores", str(cores), "--set-threads", f"initial={cores}"))
-        assert result.returncode == 0, result.stdout
-        assert PART in made(other)
-        assert made(other).items() <= made(undisturbed).items()

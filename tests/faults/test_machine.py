@@ -14,15 +14,13 @@ from pathlib import Path
 
 import pytest
 from one_scene import PART, TARGET, healed, made, nothing_half_written
-from workflow_copy import SIZE, SLOW_WRITING, Workflow, edited, files_below, wait_for
+from workflow_copy import SIZE, Workflow, edited, files_below
 
 from sepi.io.files import is_temporary
 from sepi.scenes import render, write_hci
 
 pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 
-# root may write where nobody may; without this right it is as any other user
-AS_A_USER = ("setpriv", "--bounding-set=-dac_override") if sys.platform == "linux" and os.geteuid() == 0 else ()
 # kilobytes of address space that the stages take before any of them has done anything
 IMPORTS = """
 import sepi.ingest, sepi.initial, sepi.occlusion, sepi.textureless, sepi.optimize
@@ -80,34 +78,6 @@ def test_a_disk_that_is_full(request: pytest.FixtureRequest, percent: int, run: 
         mount("-o", f"remount,size={4 * whole}k", str(full.folder))
         healed(full, expected, target)
         assert made(full) == expected
-
-
-@pytest.mark.faults
-def test_folders_that_turn_read_only(undisturbed: Workflow) -> None:
-    """As a share does of which the rights are changed."""
-    expected = made(undisturbed)
-    closed = replace(undisturbed, folder=undisturbed.folder.with_name("closed"))
-    with edited(closed.tree / "sepi" / "io" / "files.py", "temporary.replace(path)", SLOW_WRITING):
-        process = subprocess.Popen(
-            [*AS_A_USER, *closed.command(PART)],
-            cwd=closed.folder,
-            env=closed.environment | {"SLEEP": "0.5"},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        results = closed.folder / "results"
-        wait_for(lambda: list(results.rglob("initial.h5")))
-        folders = [results, *(path for path in results.rglob("*") if path.is_dir())]
-        for folder in folders:
-            folder.chmod(0o555)
-        told = process.communicate(timeout=60)[0]
-    assert process.returncode != 0
-    assert re.search(r"sepi: results/\S+: cannot be written \(Permission denied\)|Permission denied: '", told), told
-    assert nothing_half_written(closed, expected)
-    for folder in folders:
-        folder.chmod(0o755)
-    healed(closed, expected, PART)
 
 
 @pytest.mark.faults

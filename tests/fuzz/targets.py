@@ -35,7 +35,6 @@ from sepi.io.readers.formats import format_of, read, size_of
 from sepi.io.readers.options import ReadOptions
 from sepi.io.result_folder import read_result, write_result
 from sepi.lightfield import DisparityRange, LightField
-from sepi.reading import read_light_field
 from sepi.report.runs import read_numbers
 from sepi.stage import StageMaps
 from sepi.workflow.config import load_settings
@@ -236,13 +235,6 @@ def lenslets(_: Path) -> Iterable[bytes]:
     return [cv2.imencode(".png", np.tile(VIEW[:, :7], (7, 8, 1)))[1].tobytes()]
 
 
-def textured(folder: Path) -> Iterable[bytes]:
-    """Views in which something can be matched."""
-    texture = cv2.GaussianBlur(np.random.default_rng(1).uniform(0, 255, (40, 44)), (5, 5), 1).astype(np.uint8)
-    views = [texture[t : t + 24, s : s + 28] for t in range(3) for s in range(3)]
-    return npys(np.reshape(views, (3, 3, 24, 28, 1)), np.reshape(views, (9, 24, 28, 1)))(folder)
-
-
 def npzs(folder: Path) -> Iterable[bytes]:
     yield saved(folder, "a.npz", lambda path: np.savez(path, LF=VIEWS, other=MAP))
     channels = {name: VIEWS[..., number] for number, name in enumerate("rgb")}
@@ -280,11 +272,6 @@ def hci_2013(file: h5py.File) -> None:
     file.create_dataset("LF", data=VIEWS, chunks=(1, 1, H, W, 3), compression="gzip")
     file["GT_DEPTH"] = np.broadcast_to(5 + abs(MAP), (*VIEWS.shape[:2], H, W))
     file.attrs.update({"dH": np.bytes_("0.05"), "focalLength": [300.0], "shift": 1})
-
-
-def hci_2013_plain(file: h5py.File) -> None:
-    file["LF"], file["GT_DEPTH"] = VIEWS, 5 + abs(MAP)
-    file.attrs.update({"dH": 0.05, "focalLength": 300.0, "shift": 1.25})
 
 
 def open_lf(file: h5py.File) -> None:
@@ -508,10 +495,9 @@ TARGETS: dict[str, Target] = {
     "map-tiff": Target("a.tif", MAP_TIFFS, MAP_READERS),
     "map-hdf5": Target("a.h5", hdf5(lambda file: file.create_dataset("disparity", data=MAP)), read_map),
     "hci-parameters": Target("parameters.cfg", lines(PARAMETERS), read_parent, views_of_hci),
-    "hci-mask": Target("mask_occluded.png", pictures("PNG"), read_parent, hci_folder, png_closed, partly=True),
     "hci-truth": Target("gt_disp_lowres.pfm", pfms, read_parent, hci_folder),
     "exported": Target(MANIFEST, manifests, read_parent, exported_folder),
-    "hci-2013": Target("a.h5", hdf5(hci_2013, hci_2013_plain), read_field),
+    "hci-2013": Target("a.h5", hdf5(hci_2013), read_field),
     "openlf": Target("a.h5", hdf5(open_lf), read_field),
     "hdf5": Target("a.h5", hdf5(lambda file: file.create_dataset("group/x", data=VIEWS)), read_field),
     "mat-5": Target("a.mat", mats, read_field),
@@ -521,7 +507,6 @@ TARGETS: dict[str, Target] = {
     "npz": Target("a.npz", npzs, read_field),
     "npz-packed": Target("a.npz", NPYS, read_field, close=zipped("LF.npy")),
     "eslf": Target("a_eslf.png", lenslets, read_field),
-    "looked-at": Target("a.npy", textured, read_light_field),
     "own-light-field": Target(
         "a.h5", own(*(lambda path, one=one: write_light_field(path, one) for one in FIELDS)), each(read_own, read_field)
     ),

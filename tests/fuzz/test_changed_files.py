@@ -95,10 +95,9 @@ def refusal(target: Target, folder: Path, data: bytes) -> str:
 
 
 @pytest.fixture
-def limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
+def limited(here: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
     """An empty current folder, and limits: a traceback where a test hangs, be it inside a library in C; memory."""
     # readers that are not told of the folder look into the working one
-    monkeypatch.chdir(tmp_path)
     with capfd.disabled():
         # the terminal, which pytest takes away during tests
         terminal = os.dup(2)

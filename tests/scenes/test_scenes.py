@@ -1,13 +1,11 @@
 """Built-in scenes: pictures, ground truth and masks must agree, or every score made from them is wrong."""
 
-import configparser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 from geometries import grid_baselines, standing
@@ -15,7 +13,6 @@ from remembered_scenes import remembered
 from scipy import ndimage
 
 from sepi.errors import SepiError
-from sepi.io.pfm import read_pfm
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, definitions, rendering, textures, write_hci
@@ -220,21 +217,6 @@ def test_textureless_mask_is_the_bare_wall() -> None:
         assert not any(scene_truth(name, SIZE, 2)[1]["textureless"].any() for name in SCENES if name != "wall")
 
 
-def test_stripes_fall_in_contrast() -> None:
-    light_field = render("stripes", size=SIZE, views=2)
-    stripes, count = ndimage.label(light_field.ground_truth > 0)
-    contrast = ndimage.standard_deviation(light_field.reference_view.mean(axis=2), stripes, range(1, count + 1))
-    assert count == 8
-    assert (np.diff(contrast) < 0).all()
-
-
-def test_dots_are_noisy_to_the_right_and_differently_in_each_view() -> None:
-    light_field = scene("dots")
-    again = np.abs(light_field.views[2, 2].astype(float) - ndimage.median_filter(light_field.views[2, 2], (3, 3, 1)))
-    assert again[:, -SIZE // 4 :].mean() > 1.5 * again[:, : SIZE // 4].mean()
-    assert len({view.tobytes() for row in light_field.views for view in row}) == VIEWS**2
-
-
 @pytest.mark.parametrize("name", list(SCENES))
 def test_range_encloses_the_truth_with_a_margin_in_tenths(name: str) -> None:
     light_field = scene(name)
@@ -267,9 +249,7 @@ def test_shapes_grow_with_the_picture_and_disparities_stay() -> None:
     [
         ({"name": "piramids"}, "did you mean 'pyramids'.*fronto_parallel"),
         ({"name": "wall", "size": 63}, "scene wall: size .* 64 to 1024, got 63"),
-        ({"name": "wall", "size": 96.0}, r"size .* got 96\.0"),
         ({"name": "wall", "views": 1}, "scene wall: views .* from 2"),
-        ({"name": "wall", "views": True}, "views .* got True"),
         ({"name": "dots", "row_spacing": 0.0}, "dots: row_spacing must be a positive number, got 0"),
         ({"name": "dots", "positions": np.zeros((3, 3, 2))}, r"dots: positions .* \(9, 9, 2\), got \(3, 3, 2\)"),
     ],
@@ -298,33 +278,6 @@ def test_hole_shows_what_is_behind() -> None:
 
 
 @pytest.mark.usefixtures("small_textures")
-def test_folder_has_the_layout_of_the_benchmark(tmp_path: Path) -> None:
-    light_field = render("wall", size=64, views=3)
-    folder = tmp_path / "made" / "wall"
-    write_hci(light_field, folder)
-    assert sorted(path.name for path in folder.iterdir()) == [
-        "gt_disp_lowres.pfm",
-        *(f"input_Cam{number:03d}.png" for number in range(9)),
-        "mask_occluded.png",
-        "mask_textureless.png",
-        "parameters.cfg",
-    ]
-    assert [path.name for path in folder.parent.iterdir()] == ["wall"]
-    settings = configparser.ConfigParser()
-    settings.read(folder / "parameters.cfg")
-    assert dict(settings["meta"]) | {"scene": "wall", "category": "built-in"} == dict(settings["meta"])
-    assert settings.getint("extrinsics", "num_cams_x") == settings.getint("extrinsics", "num_cams_y") == 3
-    known = light_field.require_disparity_range()
-    assert settings.getfloat("meta", "disp_min") == known.minimum
-    assert settings.getfloat("meta", "disp_max") == known.maximum
-    np.testing.assert_array_equal(read_pfm(folder / "gt_disp_lowres.pfm"), light_field.ground_truth)
-    view = cv2.imread(str(folder / "input_Cam005.png"))[..., ::-1]
-    np.testing.assert_array_equal(view, light_field.views[1, 2])
-    mask = cv2.imread(str(folder / "mask_occluded.png"), cv2.IMREAD_UNCHANGED)
-    np.testing.assert_array_equal(mask == 255, light_field.masks["occluded"])
-
-
-@pytest.mark.usefixtures("small_textures")
 @pytest.mark.parametrize("name", ["wall", "curved_occluders"])
 def test_folder_is_read_back_exactly(name: str, tmp_path: Path) -> None:
     """Scores of a written scene must be those of the built-in one."""
@@ -337,14 +290,6 @@ def test_folder_is_read_back_exactly(name: str, tmp_path: Path) -> None:
     assert set(back.masks) == set(light_field.masks)
     for key, mask in light_field.masks.items():
         np.testing.assert_array_equal(back.masks[key], mask)
-
-
-@pytest.mark.usefixtures("small_textures")
-def test_existing_folder_is_not_overwritten(tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(SepiError, match="exists already"):
-        write_hci(render("fronto_parallel", size=64, views=2), tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 
 def test_truth_of_another_view_is_where_the_centre_views_points_are_seen() -> None:

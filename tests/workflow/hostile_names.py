@@ -4,44 +4,10 @@ from sepi.errors import SepiError
 from sepi.workflow.config import load_settings
 
 HOSTILE = (
-    "a b",
-    "it's",
-    'say "so"',
-    "$(touch hacked)",
-    "`touch hacked`",
-    "a;touch hacked",
-    "a&touch hacked&",
-    "a|b",
-    "a>hacked",
-    "*",
-    "?",
-    "~",
-    "{scene}",
-    "{wildcards.scene}",
-    "{{a}}",
-    "%s",
-    "$HOME",
-    "\\",
-    "<script>hacked()</script>",
-    "<img src=x onerror=hacked()>",
-    "&amp;",
-    "a\nb",
-    "a\rb",
-    "a\tb",
-    "a\0b",
-    "\x1b[31m",
-    "\u202eabc",
-    "\ud800",
-    "..",
-    ".",
-    "",
-    "-rf",
-    "--help",
-    "a/b",
-    "/etc/passwd",
-    "a" * 300,
+    *("a b", "it's", 'say "so"', "$(touch hacked)", "a;touch hacked", "a|b", "a>hacked", "*", "~", "%s", "\\"),
+    *("{scene}", "{{a}}", "<script>hacked()</script>", "&amp;", "a\nb", "a\0b", "\x1b[31m", "\u202eabc", "\ud800"),
+    *("..", "", "-rf", "a/b", "/etc/passwd", "a" * 300),
 )
-
 FOLDER = 'it\'s $(touch hacked); `id` %s "so" & <B>'
 """Of light fields, maps and the run: whatever the system allows."""
 

@@ -5,11 +5,8 @@ import re
 from pathlib import Path
 
 import pytest
-import yaml
 from snakemake_runs import run_snakemake
 from workflow_copy import REPOSITORY
-
-from sepi.workflow.config import Config
 
 # each job is a command of the package that the rules themselves import: it is there where Snakemake runs
 ALLOWED = {"Specify a conda environment or container for each rule."}
@@ -23,18 +20,3 @@ def test_snakemakes_linter_finds_nothing_else(tmp_path: Path) -> None:
     checked = set(re.findall(r"^Lints for rule (\w+)", result.stdout, re.MULTILINE))
     assert {"ingest", "optimize", "page"} <= checked, result.stdout
     assert set(re.findall(r"^ +\* (.+):$", result.stdout, re.MULTILINE)) == ALLOWED, result.stdout
-
-
-def test_the_catalogs_file_has_what_it_reads() -> None:
-    """A key of another name is taken for one that is absent."""
-    usage = yaml.safe_load((REPOSITORY / ".snakemake-workflow-catalog.yml").read_text())["usage"]
-    assert set(usage) == {"mandatory-flags", "software-stack-deployment", "report"}
-    assert set(usage["mandatory-flags"]) == {"desc", "flags"}
-    assert set(usage["software-stack-deployment"]) == {"conda", "apptainer", "apptainer+conda"}
-    assert usage["report"] is True
-
-
-def test_the_instructions_name_every_key() -> None:
-    """The catalog's page shows this text alone."""
-    text = (REPOSITORY / "config/README.md").read_text()
-    assert [key for key in Config.model_fields if f"`{key}`" not in text] == []

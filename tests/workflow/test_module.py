@@ -4,7 +4,6 @@ import os
 import re
 import shutil
 import subprocess
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,12 +121,6 @@ def test_tables_and_page_go_below_the_prefix(finished: User) -> None:
     assert " reports/" not in result.stdout
 
 
-def test_a_wrong_key_is_one_line_and_nothing_runs(beside: Callable[..., User]) -> None:
-    wrong = beside("sepi: {builtn: {size: 64}}")
-    assert "unknown 'builtn'; did you mean 'builtin'?" in wrong.told()
-    assert not (wrong.folder / "depth").exists()
-
-
 def test_without_prefix_and_names_of_its_own(beside: Callable[..., User]) -> None:
     """The other way to write it: the user's first rule is what `snakemake` makes, and sees nothing of this one."""
     shown = """rule shown:
@@ -198,10 +191,3 @@ class TestFromElsewhere:
         snakefile.write_text(f"import sys\n\nsys.modules['sepi'] = None\n\n{snakefile.read_text()}")
         line = fetched.told()
         assert "the Python package is not installed where Snakemake runs; pip install sepi==" in line
-
-
-def test_the_rules_are_of_the_packages_version() -> None:
-    """A release whose rules name another version would refuse to run."""
-    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
-    (stated,) = re.findall(r'^VERSION = "(.+)"$', (REPOSITORY / "rules/package.smk").read_text(), re.MULTILINE)
-    assert stated == project["version"]

@@ -2,10 +2,8 @@
 
 import os
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,20 +13,14 @@ from workflow_copy import REPOSITORY, TINY, Workflow
 from sepi.errors import SepiError
 from sepi.registry import added
 from sepi.report.plan import PUBLISHED
-from sepi.variants import HANDED_ON, STAGES
+from sepi.variants import HANDED_ON, STAGES, VARIANTS
 from sepi.workflow.code_digest import code_digest, ingest_modules, stage_modules
 from sepi.workflow.config import load_settings
-from sepi.workflow.datasets import Scene
 from sepi.workflow.settings import MOST_ON_PAGE, Report
 
 pytestmark = pytest.mark.workflow
 
-BEST = {
-    "initial": "semi_global",
-    "occlusion": "visibility",
-    "textureless": "uniform_planes",
-    "optimize": "second_order",
-}
+BEST = VARIANTS["best"].choices
 
 
 def scene(**labels: str) -> Wildcards:
@@ -86,18 +78,8 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
                 modules = ("sepi.truth", "sepi.scenes")
             given = code(scene(**{rule.name: name})) if callable(code) else code
             assert given == code_digest(*modules), f"{rule.name} {name}"
-    assert {
-        "ingest",
-        "truth",
-        *STAGES,
-        "evaluate",
-        "export",
-        "external",
-        "numbers",
-        "maps",
-        "page",
-        "render",
-    } <= checked
+    others = {"ingest", "truth", "evaluate", "export", "external", "numbers", "maps", "page", "render"}
+    assert {*STAGES, *others} <= checked
 
 
 def test_every_file_that_a_job_reads_is_an_input(read: Any) -> None:
@@ -147,8 +129,6 @@ def test_the_page_can_be_left_out_and_is_by_itself_where_there_are_too_many_scen
     ("target", "wrong", "meant"),
     [
         ("results/builtin/dotz/paper/result.h5", "dotz", "dots"),
-        ("results/bultin/dots/paper/result.h5", "bultin", "builtin"),
-        ("reports/maps/builtin/dotz", "dotz", "dots"),
         ("reports/comparison/page/bultin/dots.json", "bultin", "builtin"),
     ],
 )
@@ -172,22 +152,6 @@ def test_jobs_ask_for_what_their_scene_takes(tmp_path: Path) -> None:
     assert many["runtime"] > 2 * once["initial"]["runtime"]
 
 
-def test_minutes_are_several_times_what_was_measured() -> None:
-    """Of a benchmark scene, 30 s for a million samples: 11 minutes on the machine of the measurement."""
-    benchmark = Scene("hci", "cotton", None, (), 81, 512, 512)
-    assert 20 < benchmark.minutes(30) < 60
-
-
-def test_a_full_disk_is_told(read: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """A job that found no room for its message fails without one."""
-    for free, told in ((10**7, "only 10 MB are free on this disk"), (10**12, "")):
-        monkeypatch.setattr(shutil, "disk_usage", lambda _, free=free: SimpleNamespace(free=free))
-        read.globals["run_failed"]()
-        said = capsys.readouterr().err
-        assert told in said
-        assert bool(said) == bool(told)
-
-
 def test_no_command_grows_with_the_number_of_scenes(tmp_path: Path) -> None:
     """The system takes 128 kB for one: thousands of light fields would end with `Argument list too long`."""
     report = {"plan", "numbers", "page"}
@@ -201,23 +165,3 @@ def test_no_command_grows_with_the_number_of_scenes(tmp_path: Path) -> None:
     )
     assert one.keys() == report
     assert one == three
-
-
-def test_the_end_names_some_scenes_without_a_map(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A method that lacks maps of hundreds of scenes must not bury the other warnings."""
-    scenes = ["dots", "wall", "rack", "stripes", "pencils"]
-    rules = Workflow(REPOSITORY, tmp_path / "run", {"builtin": {"scenes": scenes}}).read().globals
-    monkeypatch.chdir(tmp_path)
-    for number, name in enumerate(scenes):
-        log = tmp_path / "logs/builtin" / name / "external.log"
-        log.parent.mkdir(parents=True)
-        lacking = ["all", "three"] if number < 3 else ["all"]
-        lines = [f"sepi: warning: external {one}, scene builtin/{name}: a/b: no such file\n" for one in lacking]
-        log.write_text("".join(lines))
-    rules["print_warnings"]()
-    assert capsys.readouterr().out.splitlines() == [
-        "sepi: warning: external all: no map of builtin/dots, builtin/wall, builtin/rack and 2 more",
-        "sepi: warning: external three: no map of builtin/dots, builtin/wall, builtin/rack",
-    ]
