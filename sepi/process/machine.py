@@ -32,7 +32,7 @@ def this_machine() -> dict[str, Any]:
     return {
         "processor": _processor(),
         "cores": available_cores(),
-        "memory_gb": round(_memory() / 2**30, 1),
+        "memory_gb": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1),
         "system": platform.system(),
         "python": platform.python_version(),
         **versions(),
@@ -49,15 +49,6 @@ def versions() -> dict[str, str]:
             told = re.search(r"^Version: (.+)$", distribution(name).read_text("METADATA") or "", re.MULTILINE)
             found |= {} if told is None else {name: told[1]}
     return found
-
-
-def _memory() -> int:
-    """Memory of the machine, bytes."""
-    if hasattr(os, "sysconf"):
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    import psutil
-
-    return int(psutil.virtual_memory().total)
 
 
 def _processor() -> str:
