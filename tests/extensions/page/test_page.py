@@ -24,7 +24,7 @@ from sepi.extensions.page.scene import page_json
 from sepi.extensions.page.viewer import CONFIDENCE, OTHER, PRECISE, STEPS, viewer_json
 from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
-from sepi.report import charts, figures, page_data, published
+from sepi.report import charts, figures, published
 from sepi.report.charts import write_error_bars
 from sepi.report.panels import Kind, Panel, SceneResults, note_of, panels_of
 from sepi.report.runs import Runs
@@ -333,7 +333,7 @@ def score_of(
 
 def test_headline_figures(runs: Runs, example: Example) -> None:
     """Ours beside the paper's, for the scenes that the paper has; then the others."""
-    row, other = page_data.headline(runs)
+    row, other = page.headline(runs)
     assert other["scene"] == "builtin/dots"
     assert other["published"] == [None, None]
     assert other["ours"]["paper"] == [score_of(example, DOTS, "paper", "all", name) for name in ("mse100", "q25")]
@@ -344,7 +344,7 @@ def test_headline_figures(runs: Runs, example: Example) -> None:
 
 
 def test_scenes_of_the_paper_that_are_not_at_hand(runs: Runs) -> None:
-    found = page_data.missing_scenes(runs)
+    found = page.missing_scenes(runs)
     assert "Cotton" not in found["hci"]
     assert "Antinous" in found["hci"]
     assert len(found["hci"]) == 23
@@ -353,7 +353,7 @@ def test_scenes_of_the_paper_that_are_not_at_hand(runs: Runs) -> None:
 
 def test_ablation_bars(runs: Runs, example: Example) -> None:
     """Averages over the scenes available, beside the published averages of the same variant and region."""
-    groups = {(group.dataset, group.region): group for group in page_data.ablation_bars(runs)}
+    groups = {(group.dataset, group.region): group for group in charts.ablation_bars(runs)}
     assert {region for _, region in groups} == {"whole map", *REGIONS[1:]}
     whole = groups["hci", "whole map"]
     bars = {bar.variant: bar for bar in whole.rows}
@@ -375,27 +375,27 @@ def test_averages_name_the_scenes_that_have_no_such_region(runs: Runs) -> None:
     wall = runs.numbers[runs.numbers["scene"] == "dots"].assign(scene="wall")
     wall.loc[(wall["region"] == "occluded") & (wall["score"] == "mse100"), "value"] = np.nan
     changed = Runs(facts, pd.concat([runs.numbers, wall]))
-    groups = {group.region: group for group in page_data.ablation_bars(changed) if group.dataset == "builtin"}
+    groups = {group.region: group for group in charts.ablation_bars(changed) if group.dataset == "builtin"}
     assert (groups["whole map"].over, groups["occluded"].over) == ("2 scenes", "1 of 2 scenes")
     wall.loc[wall["score"] == "mse100", "value"] = np.nan
     changed = Runs(facts, pd.concat([runs.numbers, wall]))
-    assert page_data.headline(changed)[-1]["notes"]["paper"] == "1/2 scenes"
+    assert page.headline(changed)[-1]["notes"]["paper"] == "1/2 scenes"
 
 
 def test_times(runs: Runs, example: Example) -> None:
-    rows = page_data.stage_times(runs)
-    assert [(row.scene, row.variant) for row in rows[:2]] == [("builtin/dots", "best"), ("builtin/dots", "paper")]
+    rows = charts.stage_times(runs)
+    assert list(rows.index[:2]) == [("builtin/dots", "best"), ("builtin/dots", "paper")]
     assert len(rows) == 6
-    assert rows[0].seconds == {"initial": 1.5, "occlusion": 2.5, "textureless": 3.5, "optimize": 4.5}
-    assert (rows[0].total, rows[0].peak) == (12.0, 230.0)
-    assert page_data.total_seconds(example.numbers) == 72.0
+    assert rows["seconds"].iloc[0].to_dict() == {"initial": 1.5, "occlusion": 2.5, "textureless": 3.5, "optimize": 4.5}
+    assert rows["peak_memory_mb"].iloc[0].max() == 230
+    assert page.total_seconds(example.numbers) == 72.0
 
 
 def test_the_first_scene(example: Example) -> None:
     """One that the paper has; else the last, the built-in ones being ordered from easy to hard."""
-    assert page_data.first_scene(example.numbers) == "hci/cotton"
+    assert page.first_scene(example.numbers) == "hci/cotton"
     plan = example.numbers.facts["plan"] | {"scenes": {"builtin": ["dots", "wall"]}}
-    assert page_data.first_scene(replace(example.numbers, facts={"plan": plan})) == "builtin/wall"
+    assert page.first_scene(replace(example.numbers, facts={"plan": plan})) == "builtin/wall"
 
 
 def test_charts_are_written_twice_the_same(example: Example, tmp_path: Path) -> None:
