@@ -32,6 +32,8 @@ for stage, title in TITLES.items():
         resources:
             **stage_resources(stage),
         params:
+            # when a job runs, `stage` is the last one
+            module=f"sepi.{stage}",
             previous=lambda wildcards, input: ["--previous", input.previous] if input.previous else [],
             choice=choice_for(stage),
             parameters=parameters_of(stage),
@@ -41,7 +43,7 @@ for stage, title in TITLES.items():
             stage_message(stage, title)
         shell:
             command(
-                f"sepi.{stage} --light-field {{input.light_field:q}} {{params.previous:q}} --choice {{params.choice}} "
+                "{params.module} --light-field {input.light_field:q} {params.previous:q} --choice {params.choice} "
                 "--parameters {params.parameters:q} --threads {threads} "
                 "--output {output.maps:q} --timing {output.timing:q} 2> {log:q}"
             )
