@@ -39,7 +39,7 @@ from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.specks import without_specks
 from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.matching.mean_reference import mean_reference
+from sepi.matching.aligned_views import mean_reference
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
 from sepi.matching.softening import compared_views
 from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters, spread_views

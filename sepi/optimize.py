@@ -37,8 +37,7 @@ from sepi.regularization.wls import WlsParameters, data_weight, rectified_confid
 from sepi.stage import Choice, NoParameters, OcclusionMarginParameters, Progress, StageMaps, none, require_previous
 
 if TYPE_CHECKING:
-    from sepi.matching.gauss_newton import Evidence
-    from sepi.matching.surface_windows import Surfaces
+    from sepi.matching.gauss_newton import Evidence, Surfaces
 
 UNIFORM_WEIGHT = 0.05
 """Weight of the data on planes of textureless regions; planes cost nothing, so a small weight keeps them."""
@@ -178,9 +177,8 @@ def second_order(
     >>> bool(errors[1] < 0.8 * errors[0])
     True
     """
-    from sepi.matching.gauss_newton import GaussNewton
+    from sepi.matching.gauss_newton import ANY_SURFACE, GaussNewton, Surfaces, windowed_step
     from sepi.matching.spline_views import forget_splines
-    from sepi.matching.surface_windows import ANY_SURFACE, Surfaces, windowed_step
 
     before, given = require_previous(previous), light_field
     noisy = isinstance(denoised(light_field, parameters.denoising), DenoisedLightField)
@@ -302,7 +300,7 @@ def _prior(
 
 
 def _coloured(mean: FloatMap, light_field: LightField, parameters: SecondOrderParameters) -> Surfaces:
-    from sepi.matching.surface_windows import Surfaces
+    from sepi.matching.gauss_newton import Surfaces
 
     colours = np.ascontiguousarray(np.moveaxis(mean[..., :3], 2, 0))
     width = np.sqrt(parameters.smooth_colour**2 + reference_residual_variance(light_field))

@@ -473,7 +473,7 @@ def require_costs(previous: StageMaps | None) -> tuple[StageMaps, CostVolume]:
     A stage that takes the candidate of least cost at each pixel, and returns no costs:
 
     >>> import numpy as np
-    >>> from sepi.extensions.methods.cost_volumes import disparity_of, least_costs
+    >>> from sepi.extensions.methods.costs import disparity_of, least_costs
     >>> from sepi.stage import CostVolume, StageMaps, require_costs
     >>> def cheapest(light_field, previous, parameters, progress):
     ...     before, volume = require_costs(previous)

@@ -107,6 +107,13 @@ def one_thread() -> None:
         kernels.set_thread_count(1)
 
 
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder, which is the current one."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
 @pytest.fixture(scope="session")
 def real_data() -> Path:
     """Folder of the real light fields; absent data skips the test, or fails it where they are required."""

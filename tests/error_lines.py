@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 from click.testing import CliRunner, Result
 
@@ -14,9 +15,16 @@ from sepi.io.readers.options import ReadOptions
 from sepi.reading import read_light_field
 
 
-def call(*words: object) -> Result:
-    """``sepi`` with these words."""
-    return CliRunner().invoke(main, list(map(str, words)))
+def call(*words: object, of: click.Command = main) -> Result:
+    """``sepi``, or another command, with these words."""
+    return CliRunner().invoke(of, list(map(str, words)))
+
+
+def done(*words: object, of: click.Command = main) -> Result:
+    """The same, which must end well."""
+    called = call(*words, of=of)
+    assert called.exit_code == 0, (called.output, called.exception)
+    return called
 
 
 def everything_in(folder: Path | str) -> dict[str, bytes]:

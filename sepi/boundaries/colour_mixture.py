@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from sepi.boundaries.parameters import BoundaryParameters
-from sepi.boundaries.surroundings import Surroundings
+from sepi.boundaries.rim import Surroundings
 from sepi.kernels import colour_mixture as kernels
 from sepi.lightfield import FloatMap
 

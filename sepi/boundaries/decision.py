@@ -18,9 +18,8 @@ import numpy as np
 from sepi.boundaries.colour_mixture import mixture_evidence
 from sepi.boundaries.edge_lines import line_evidence
 from sepi.boundaries.parameters import BoundaryParameters
-from sepi.boundaries.rim import Rim, rim_of
+from sepi.boundaries.rim import Rim, Surroundings, rim_of, surroundings
 from sepi.boundaries.surface_shares import ShareCosts, nothing_told, share_costs
-from sepi.boundaries.surroundings import Surroundings, surroundings
 from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import FloatMap, LightField
 

@@ -1,13 +1,92 @@
-"""The pixels beside depth steps, and the surfaces on both sides."""
+"""The pixels beside depth steps, the surfaces on both sides, and the views that are compared there."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap
+
+
+class RimViews(NamedTuple):
+    """The compared views, and the occlusions in them.
+
+    Attributes
+    ----------
+    lines : ndarray, shape (T, S, H, W C), uint8, uint16 or float32
+        Rows of the pixels, their channels side by side.
+    channels : int
+        C, 1 or 3.
+    units : ndarray, shape (N,), float32
+        What the pixels of each view that is compared are multiplied with to be 0..1, and as bright as the reference.
+    places : ndarray, shape (N, 2), int64
+        Row and column in the grid of each view that is compared.
+    baselines : ndarray, shape (N, 2), float64
+        Theirs, down and across, in view steps.
+    nearest : ndarray, shape (T, S, n, W), float32
+        z-buffers of the map, its nearer surfaces widened by a pixel, so that no mixed pixel counts as background.
+    low : int
+        First row of ``nearest``.
+    margin : float32
+        By how much an occluder must be nearer, pixels per view step.
+    """
+
+    lines: npt.NDArray[Any]
+    channels: int
+    units: FloatMap
+    places: npt.NDArray[np.int64]
+    baselines: npt.NDArray[np.float64]
+    nearest: FloatMap
+    low: int
+    margin: np.float32
+
+
+class Sides(NamedTuple):
+    """The surfaces of a map, and their colours in the reference view.
+
+    Attributes
+    ----------
+    disparity : ndarray, shape (H, W), float32
+    guide : ndarray, shape (H, W, 3), float32
+        Reference view, 0..1.
+    clean : ndarray, shape (H, W), bool
+        Pixels of one surface alone.
+    clean_radius : int
+        How far away clean colours of the nearer surface are looked for, pixels.
+    """
+
+    disparity: FloatMap
+    guide: FloatMap
+    clean: BoolMap
+    clean_radius: int
+
+
+_AROUND = np.ones((3, 3), np.uint8)
+
+
+class Surroundings(NamedTuple):
+    """The least and the largest disparity of each pixel and its eight neighbours.
+
+    A pixel is clean with respect to a level between two surfaces where all nine lie on one side of it: the edge between
+    them does not run through it.
+
+    Attributes
+    ----------
+    farthest, nearest : ndarray, shape (H, W), float32
+        Pixels per view step.
+    """
+
+    farthest: FloatMap
+    nearest: FloatMap
+
+
+def surroundings(disparity: FloatMap) -> Surroundings:
+    """Those of a disparity map (H, W), float32; beyond its border there is nothing."""
+    farthest, nearest = cv2.erode(disparity, _AROUND), cv2.dilate(disparity, _AROUND)
+    return Surroundings(np.asarray(farthest, np.float32), np.asarray(nearest, np.float32))
 
 
 class Rim(NamedTuple):

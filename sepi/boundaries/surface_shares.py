@@ -15,10 +15,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.parameters import BoundaryParameters
-from sepi.boundaries.rim import Rim
-from sepi.boundaries.surroundings import Surroundings
+from sepi.boundaries.rim import Rim, RimViews, Sides, Surroundings
 from sepi.image.noise import noise_of_reference_view
 from sepi.kernels import background as background_kernels
 from sepi.kernels import surface_shares as kernels

@@ -195,7 +195,7 @@ def guide_of(light_field: LightField, mean: FloatMap | None = None) -> FloatMap:
     ----------
     light_field : LightField
     mean : ndarray, shape (H, W, 3), float32, optional
-        Of many views (:mod:`sepi.matching.mean_reference`), which takes the reference view's place.
+        Of many views (:mod:`sepi.matching.aligned_views`), which takes the reference view's place.
 
     Returns
     -------

@@ -149,7 +149,7 @@ def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, 
 
 
 MeanOf = Callable[[LightField, FloatMap, BoolMap, BaseDetailParameters, float], FloatMap | None]
-"""What :func:`sepi.matching.mean_reference.mean_reference` is."""
+"""What :func:`sepi.matching.aligned_views.mean_reference` is."""
 
 
 def depth_from_visible_views(
@@ -170,7 +170,7 @@ def depth_from_visible_views(
     parameters : VisibleViewsParameters
     progress : callable
     mean_of : callable, optional
-        :func:`sepi.matching.mean_reference.mean_reference`, for noisy views; default: views are compared with the
+        :func:`sepi.matching.aligned_views.mean_reference`, for noisy views; default: views are compared with the
         reference view.
 
     Returns

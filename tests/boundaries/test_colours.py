@@ -5,7 +5,7 @@ import pytest
 
 from sepi.boundaries.colour_mixture import mixture_evidence
 from sepi.boundaries.parameters import BoundaryParameters
-from sepi.boundaries.surroundings import surroundings
+from sepi.boundaries.rim import surroundings
 from sepi.lightfield import FloatMap
 
 pytestmark = pytest.mark.slow

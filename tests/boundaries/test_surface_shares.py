@@ -9,14 +9,11 @@ import numpy.typing as npt
 import pytest
 from geometries import GEOMETRIES, standing
 
-from sepi.boundaries import decision
-from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.decision import assigned_to_surfaces
 from sepi.boundaries.parameters import BoundaryParameters
-from sepi.boundaries.rim import Rim, rim_of
+from sepi.boundaries.rim import Rim, RimViews, Sides, rim_of, surroundings
 from sepi.boundaries.surface_shares import _views_alike as views_alike
 from sepi.boundaries.surface_shares import view_brightness
-from sepi.boundaries.surroundings import surroundings
 from sepi.kernels import background as background_kernels
 from sepi.kernels import surface_shares as kernels
 from sepi.lightfield import LightField
@@ -40,7 +37,6 @@ def test_edges_are_found_again(name: str, change: str) -> None:
     """Surfaces a pixel too wide close narrow gaps, those a pixel too narrow lose what is thin."""
     scene = render(name, size=96)
     truth = scene.ground_truth
-    assert truth is not None
     changed = (cv2.dilate if change == "too wide" else cv2.erode)(truth, AROUND)
     before = wrong(changed, truth)
     assert before > 500
@@ -51,7 +47,6 @@ def test_each_pixel_can_be_decided_alone() -> None:
     """The ablation without edges: other pixels than with them, and much better than a map a pixel too narrow."""
     scene = render("dots", size=96)
     truth = scene.ground_truth
-    assert truth is not None
     narrow = cv2.erode(truth, AROUND)
     alone = assigned_to_surfaces(scene, narrow, BoundaryParameters(use_mixture=False, use_lines=False))
     along_edges = assigned_to_surfaces(scene, narrow, USUAL)
@@ -62,31 +57,7 @@ def test_each_pixel_can_be_decided_alone() -> None:
 @pytest.mark.parametrize("name", ["stripes", "curved_occluders", "dots", "slanted_plane", "pyramids"])
 def test_what_is_right_stays(name: str) -> None:
     scene = render(name, size=96)
-    assert scene.ground_truth is not None
     assert wrong(assigned_to_surfaces(scene, scene.ground_truth, USUAL), scene.ground_truth) < 0.01 * 96**2
-
-
-def test_colours_have_a_vote(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where views tell nothing, colours decide; without doubt, the views decide; where neither is asked, nothing is."""
-    scene = render("stripes", size=64)
-    truth = scene.ground_truth
-    assert truth is not None
-    wide = cv2.dilate(truth, AROUND)
-    none, alone = (BoundaryParameters(use_shares=False, use_mixture=mixture) for mixture in (False, True))
-    assert assigned_to_surfaces(scene, wide, none) is wide
-
-    def colours_say(evidence: npt.NDArray[np.float32]) -> None:
-        monkeypatch.setattr(decision, "mixture_evidence", lambda *_: evidence)
-
-    colours_say(((wide - truth) > 0.3).astype(np.float32))
-    assert wrong(assigned_to_surfaces(scene, wide, alone), truth) < 0.1 * wrong(wide, truth)
-    colours_say(np.zeros_like(wide))
-    np.testing.assert_array_equal(assigned_to_surfaces(scene, wide, alone), wide)
-    # colours that hint at half of what moves a pixel of which nothing else is known do not move what views say
-    by_views = assigned_to_surfaces(scene, wide, USUAL)
-    colours_say(np.full_like(wide, 0.003))
-    hinted = assigned_to_surfaces(scene, wide, BoundaryParameters())
-    assert wrong(hinted, by_views) < 0.1 * wrong(wide, by_views)
 
 
 def edge(rim: float, background: float = 0.0) -> tuple[LightField, npt.NDArray[np.float32]]:
@@ -136,7 +107,6 @@ def test_a_surface_one_pixel_too_wide_gets_its_edge_back(background: float) -> N
 def test_dark_views_and_other_exposures_do_no_harm(factor: float) -> None:
     """Lenses darken the views at the edge of the grid: edges would move by pixels."""
     scene = render("curved_occluders", size=96)
-    assert scene.ground_truth is not None
     wide = cv2.dilate(scene.ground_truth, AROUND)
     views = scene.views * np.float32(0.8)
     views[[0, -1]] = views[[0, -1]] * np.float32(factor)
@@ -152,7 +122,6 @@ def test_dark_views_and_other_exposures_do_no_harm(factor: float) -> None:
 def test_grey_and_bands_change_nothing(geometry: str) -> None:
     """The same bytes, however much memory there is, and for grey as three colours."""
     scene = render("dots", size=96)
-    assert scene.ground_truth is not None
     wide = cv2.dilate(scene.ground_truth, AROUND)
     grey = np.rint(scene.views[2:7, 2:7].mean(axis=4, keepdims=True)).astype(np.uint8)
     field = LightField(grey, "grey", **standing(geometry, (5, 5)))
@@ -383,27 +352,3 @@ def test_brightness_is_that_of_what_a_view_shows() -> None:
     for marked, kept in ((missing, 3), (None, 2)):
         field = LightField(views, "half shown", missing=marked)
         assert len(views_alike(field, sides, USUAL).places) == kept
-
-
-@pytest.mark.parametrize("grid", [(1, 9), (9, 9)])
-def test_bands_hold_every_row_that_is_looked_at(grid: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where memory is short, compiled code would read beside its arrays, and who knows what."""
-    whole = render("curved_occluders", size=96)
-    rows = slice(4, 5) if grid[0] == 1 else slice(None)
-    light_field = LightField(whole.views[rows], "rows", disparity_range=whole.disparity_range)
-    background_of, asked = background_kernels.background_of, []
-
-    def checked(views, layer, wanted, begin, end, background):
-        y, x = np.nonzero(wanted[begin:end])
-        d = layer[begin:end][y, x]
-        for down, across in views.baselines:
-            row, column = y + begin - d * down, x - d * across
-            inside = (row >= 0) & (row < 95) & (column >= 0) & (column < 95)
-            number = (row[inside] + 0.5).astype(int) - views.low
-            asked.append(bool((number >= 0).all() and (number < views.nearest.shape[2]).all()))
-        background_of(views, layer, wanted, begin, end, background)
-
-    monkeypatch.setattr(background_kernels, "background_of", checked)
-    assigned_to_surfaces(replace(light_field, workspace=Workspace(1)), whole.ground_truth, USUAL)
-    assert asked
-    assert all(asked)

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from error_lines import done
 
 from sepi.cli.evaluate import NO_INTERVAL
-from sepi.cli.main import main
 from sepi.io.all_views import write_all_views
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import write_png
@@ -23,18 +23,16 @@ SCALE = 1 / 8
 
 
 def call(*words: object) -> Result:
-    result = CliRunner().invoke(main, list(map(str, words)), catch_exceptions=False)
-    assert result.exit_code == 0, result.output
+    result = done(*words)
     return result
 
 
 @pytest.fixture
-def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StageMaps:
+def files(here: Path) -> StageMaps:
     """In the current folder a scene, a result with error bars, its map alone, and the truth as a picture of levels.
 
     The truth lies 0.15 below the left half of the map and 0.05 below the right one; intervals reach 0.1 down.
     """
-    monkeypatch.chdir(tmp_path)
     levels = np.full((64, 64), 40, np.uint8)
     write_png(Path("truth.png"), levels)
     light_field = render("dots", size=64, views=3)
@@ -74,11 +72,8 @@ def test_rounded_truth_may_be_half_a_step_off(files: StageMaps) -> None:
     def held(*words: object) -> float:
         return float(json.loads(call("evaluate", "map", *words, "--json").stdout)["paper"]["all"]["coverage"])
 
-    assert (held("exact.pfm"), held("exact.pfm", "--truth-step", 0.09), held("exact.pfm", "--truth-step", 0.12)) == (
-        50,
-        50,
-        100,
-    )
+    steps = [held("exact.pfm"), held("exact.pfm", "--truth-step", 0.09), held("exact.pfm", "--truth-step", 0.12)]
+    assert steps == [50, 50, 100]
     assert held(*flags) == 100
     assert held(*flags, "--truth-step", 0) == 50
     assert "ground truth in steps of 0.125" in call("evaluate", "map", *flags).stdout
@@ -97,20 +92,6 @@ def test_a_crop_has_the_error_bars_of_its_pixels(files: StageMaps) -> None:
     write_result("part", cropped, small)
     told = json.loads(call("evaluate", "part", "exact.pfm", "--offset", "10,10", "--json").stdout)
     assert told["paper"]["all"]["coverage"] == pytest.approx(100 * 28 / 50)
-
-
-@pytest.mark.extension("page")
-def test_compared_maps_have_it_where_there_is_one(files: StageMaps) -> None:
-    """In the scores, and on the page."""
-    shown = call("compare", "map", "bare.pfm", "exact.pfm", "-o", "page.html").stdout
-    ours, other = shown.split("\n\n")[:2]
-    assert "coverage %" in ours
-    assert other.splitlines()[-1] == NO_INTERVAL
-    page = Path("page.html").read_text()
-    assert "coverage %, map" in page
-    assert "map: standard deviation" in page
-    assert "bare.pfm: standard deviation" not in page
-    assert "no interval</td>" in page
 
 
 def test_maps_of_all_views_have_those_of_the_view(files: StageMaps) -> None:

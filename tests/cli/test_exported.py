@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from error_lines import call, error_of, reading_error
+from error_lines import call, done, error_of, reading_error
 from geometries import jittered
 
 from sepi.camera import Camera
@@ -50,9 +50,7 @@ def deep() -> tuple[object, ...]:
     return ("deep.npy", "--white", "1020", "--row-spacing", "1", "--disparity-range", "-1.5", "1.625", *CAMERA)
 
 
-@pytest.fixture(autouse=True)
-def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("here")
 
 
 @pytest.mark.filterwarnings("ignore::sepi.SepiWarning")
@@ -62,8 +60,7 @@ def test_all_that_flags_said_is_kept(made: Callable[[], tuple[object, ...]]) -> 
     words = made()
     found: list[LightField] = []
     for out in ("one.h5", "many"):
-        called = call("export", words[0], out, *words[1:])
-        assert called.exit_code == 0, called.output
+        done("export", words[0], out, *words[1:])
         found.append(read_light_field(out, check_order=made is deep))
     one, many = found
     assert digest_of(one) == digest_of(many)
@@ -141,15 +138,8 @@ def test_a_folder_that_was_exported_is_read_with_flags_too() -> None:
 @pytest.mark.parametrize(
     ("key", "value", "expected"),
     [
-        ("views", [["a.png"], []], "views: expected 2 rows of 1 values"),
-        ("views", [], "views: expected 0 rows of 0 values"),
         ("views", [["../a.png", "b.png"]], "names of files in its own folder, got '../a.png'"),
-        ("views", [["absent.png", "b.png"]], "saved/absent.png: cannot be read"),
         ("view", [5, 5], "view 5,5 lies outside the grid"),
-        ("positions", [[[0, 0]]], "positions: expected 3 rows of 3 values"),
-        ("disparity_range", {"minimum": 2, "maximum": 1, "source": "given"}, "two finite numbers MIN < MAX"),
-        ("camera", {"scale": 1}, "camera.offset: field required"),
-        ("row_spacing", "wide", "row_spacing: input should be a valid number"),
         ("spacing", 2, "unknown 'spacing'; did you mean 'row_spacing'?"),
         (None, None, "not a file of 'sepi export', or damaged"),
     ],

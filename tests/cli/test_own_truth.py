@@ -26,12 +26,11 @@ SCALE = 1 / 32
 
 
 @pytest.fixture
-def seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> LightField:
+def seen(here: Path) -> LightField:
     """The light field as its truth has it; in the current folder that without truth, its map, and truth as a picture.
 
     The truth is a fiction: scores ask no more of it than that it is the one in the file.
     """
-    monkeypatch.chdir(tmp_path)
     plain = replace(render("curved_occluders", size=64, views=3), ground_truth=None, masks={})
     write_light_field(Path("plain.h5"), plain)
     levels = np.full((64, 64), 20, np.uint8)
@@ -82,9 +81,7 @@ def test_export_keeps_it_for_every_command(seen: LightField) -> None:
     [
         (("map", "--truth", "absent.pfm"), "absent.pfm: no such file"),
         (("map", "--truth", "truth.png"), "truth.png: a PNG without the text chunks 'scale' and 'offset' does not say"),
-        (("map", "--truth", "text.png", "--truth-scale", 1), "text.png: not a PNG"),
         (("map", "--truth", "nothing.png", "--truth-scale", 1), "nothing.png: no pixel is known; 0 in whole numbers"),
-        (("map", "--truth", "small.pfm"), "small.pfm: ground truth has shape (60, 64), the estimate (64, 64)"),
         (("map", "plain.h5", "--truth", "small.pfm"), "small.pfm: ground truth is (60, 64), the views are (64, 64)"),
         (
             ("map", "--truth", "truth.png", "--truth-scale", 1, "--view", "1,1"),
@@ -99,7 +96,6 @@ def test_what_is_wrong_with_it_is_one_line(seen: LightField, words: tuple[object
 
 def test_truth_of_another_convention_is_told_beside_the_scores(seen: LightField) -> None:
     """A map that is right looks hopeless when the truth is read upside down."""
-    assert seen.ground_truth is not None
     known = np.nan_to_num(seen.ground_truth)
     write_pfm(Path("upside.pfm"), known[::-1])
     np.save("right.npy", known)
@@ -108,19 +104,3 @@ def test_truth_of_another_convention_is_told_beside_the_scores(seen: LightField)
     assert json.loads(called.stdout)["paper"]["all"]["pixels"] == 64 * 64
     write_pfm(Path("upside.pfm"), known)
     assert call("evaluate", "right.npy", "upside.pfm").stderr == ""
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("map",), "expected GROUND_TRUTH, a SCENE, or --truth FILE"),
-        (("map", "truth.npy", "--truth", "truth.png"), "truth.npy and --truth FILE"),
-        (("map", "plain.h5", "--truth-scale", 2), "--truth FILE; give --truth"),
-        (("map", "--truth", "truth.png", "--truth-scale", 0), "0.0 is not in the range 0<x<inf"),
-        (("map", "--truth", "truth.png", "--bad", 0), "'--bad': 0.0 is not in the range x>0"),
-    ],
-)
-def test_flags_that_do_not_fit_are_told(seen: LightField, words: tuple[object, ...], message: str) -> None:
-    called = call("evaluate", *words)
-    assert called.exit_code == 2
-    assert message in called.stderr.replace("\n", " ")

@@ -20,7 +20,7 @@ CALLS: Calls = [
 
 
 @pytest.mark.parametrize(("function", "given", "name"), exchanged(CALLS))
-def test_an_argument_of_another_type_is_told_in_one_line(
-    function: Callable[..., object], given: dict[str, Any], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_an_argument_of_another_type_is_told(
+    function: Callable[..., object], given: dict[str, Any], name: str, here: Path
 ) -> None:
-    refused(function, given, name, tmp_path, monkeypatch)
+    refused(function, given, name, here)

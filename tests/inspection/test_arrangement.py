@@ -82,13 +82,6 @@ def test_a_disc_is_recognised() -> None:
     np.testing.assert_array_equal(found.views[disc], whole.views[disc])
 
 
-def test_missing_views_of_a_sequence_stay_missing() -> None:
-    present = np.ones((1, 25), bool)
-    present[0, [3, 17]] = False
-    found = arrange(LightField(sequence(GRID).views, "holes", present=present, arranged=False), ReadOptions())
-    np.testing.assert_array_equal(found.present.ravel(), present[0])
-
-
 def test_options_speak_of_the_grid() -> None:
     """Which view is excluded, and from which depth is made, is said in rows and columns."""
     options = ReadOptions(central=3, order="flip-rows", exclude=("0,0",), view=(1, 2))

@@ -98,9 +98,3 @@ def test_what_is_known_is_not_estimated() -> None:
 def test_a_single_row_or_column_has_no_spacing(part: tuple[slice, ...]) -> None:
     light_field = LightField(render("dots", size=96, views=5).views[part], "line")
     assert estimate_row_spacing(Views(light_field)) is None
-
-
-def test_pictures_of_noise_have_none() -> None:
-    rng = np.random.default_rng(5)
-    noise = LightField(rng.integers(0, 256, (5, 5, 80, 80, 3), dtype=np.uint8), "noise")
-    assert settle_row_spacing(noise) is noise

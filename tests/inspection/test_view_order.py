@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from real_scenes import views_of
 
-from sepi.inspection.disparity_sign import Evidence, Look, add_pairs
-from sepi.inspection.view_layouts import Trial, Views
+from sepi.inspection.disparity_sign import add_pairs
 from sepi.inspection.view_order import check_order
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import LightField
@@ -27,7 +26,6 @@ TURNED = {
 TURNED |= {second: first for first, second in TURNED.items()}
 SOME_ORDERS = ("flip-both", "flip-rows", "transpose-flip-columns")
 """Inside out, one axis, and axes exchanged: for real views that take long; the built-in scenes have all."""
-UP_TO_SIGN = ("as-given", "flip-rows", "transpose", "transpose-flip-rows")
 """One of each two orders that differ by half a turn, where either may be named."""
 MIDDLE = np.s_[2:7, 2:7]
 """Of a benchmark scene's views, as many as it takes."""
@@ -134,13 +132,6 @@ def test_missing_views_neither_hide_the_order_nor_invent_one(shape: str, word: s
     assert found.best == word
 
 
-def test_the_reference_view_does_not_matter() -> None:
-    """A corner view as reference must not bring warnings that its light field otherwise has not."""
-    light_field = scene("curved_occluders")
-    corner = LightField(light_field.views, "corner", view=(0, 4))
-    assert check_order(corner) == check_order(light_field)
-
-
 @pytest.mark.parametrize("place", [np.s_[2:3], np.s_[:, 2:3], np.s_[2:3, 1:4], np.s_[:, 2:4], np.s_[2:4, 2:4]])
 @pytest.mark.parametrize("name", ["curved_occluders", "dots", "slanted_plane", "wall"])
 def test_thin_and_small_grids_bring_no_warning(name: str, place: tuple[slice, ...]) -> None:
@@ -154,13 +145,6 @@ def test_a_row_of_views_that_runs_the_other_way_is_found() -> None:
     found = check_order(misread(row, "flip-columns"))
     assert found.sign_clear
     assert found.best == "flip-columns"
-
-
-def test_a_column_of_views_read_as_a_row_is_found() -> None:
-    column = grey_field(scene("curved_occluders").views[:, 2:3])
-    warning = check_order(misread(column, "transpose")).warning()
-    assert warning is not None
-    assert warning.endswith("--order transpose")
 
 
 def test_pictures_of_noise_are_left_undecided() -> None:
@@ -205,27 +189,6 @@ def test_camera_positions_tell_near_from_far_where_the_views_do_not(word: str, t
     assert found.note() is None
 
 
-@pytest.mark.parametrize("level", [0, 1, 128, 255])
-def test_empty_pictures_are_left_undecided(level: int) -> None:
-    flat = grey_field(np.full((5, 5, 40, 50, 3), level, np.uint8))
-    found = check_order(flat)
-    assert not found.clear
-    assert found.best == "as-given"
-    assert found.warning() is None
-
-
-def test_equal_views_are_left_undecided() -> None:
-    """Views between which nothing moves fit in any order."""
-    picture = scene("dots").views[2, 2]
-    assert not check_order(grey_field(np.broadcast_to(picture, (3, 3, *picture.shape)))).clear
-
-
-@pytest.mark.parametrize("shape", [(2, 2), (2, 300), (300, 2), (3, 17), (16, 16), (20, 1000)])
-def test_pictures_too_small_to_tell_are_left_undecided(shape: tuple[int, int]) -> None:
-    rng = np.random.default_rng(6)
-    assert check_order(grey_field(rng.integers(0, 256, (3, 3, *shape, 1), dtype=np.uint8))).warning() is None
-
-
 def test_dark_and_noisy_views_are_not_warned_of() -> None:
     light_field = scene("curved_occluders")
     rng = np.random.default_rng(7)
@@ -234,41 +197,6 @@ def test_dark_and_noisy_views_are_not_warned_of() -> None:
     for divisor in (12, 30, 60):
         for name in ("curved_occluders", "wall", "stripes"):
             assert check_order(grey_field(scene(name).views // divisor)).warning() is None
-
-
-def test_the_kind_of_pixels_does_not_matter() -> None:
-    field = misread(scene("curved_occluders"), "flip-both")
-    deep = field.views.astype(np.uint16) * 257
-    real = field.views.astype(np.float32) / 255
-    grey = field.views[..., 1:2]
-    for views in (deep, real, grey):
-        assert check_order(grey_field(views)).best == "flip-both"
-
-
-def test_views_that_darken_outwards_are_still_in_order() -> None:
-    light_field = scene("curved_occluders")
-    t, s = np.mgrid[-2:3, -2:3]
-    gain = np.exp(-0.08 * (t**2 + s**2))[:, :, None, None, None]
-    views = (light_field.views * gain).astype(np.uint8)
-    for word in UP_TO_SIGN:
-        assert check_order(misread(grey_field(views), word)).best in (word, TURNED[word])
-    assert check_order(grey_field(views)).warning() is None
-
-
-def test_a_large_parallax_is_found() -> None:
-    """Sparse camera arrays move things by tens of pixels from view to view."""
-    rng = np.random.default_rng(8)
-    texture = cv2.GaussianBlur(rng.random((500, 500)).astype(np.float32), (0, 0), 2)
-    texture = (255 * (texture - texture.min()) / np.ptp(texture)).astype(np.uint8)
-    views = np.empty((3, 3, 240, 260, 1), np.uint8)
-    for t, s in np.ndindex(3, 3):
-        # a pixel y of the middle view is seen at y - 23 (t - 1)
-        top, left = 100 + 23 * (t - 1), 100 + 23 * (s - 1)
-        views[t, s, :, :, 0] = texture[top : top + 240, left : left + 260]
-    for word in ("as-given", "transpose-flip-rows"):
-        found = check_order(misread(grey_field(views), word))
-        assert found.clear
-        assert found.best in (word, TURNED[word])
 
 
 @pytest.mark.parametrize("name", ["cotton", "antinous"])
@@ -291,21 +219,6 @@ def test_near_and_far_are_told_in_noise_and_in_small_pictures(hci: Path, kind: s
 
     light_field = grey_field(views_of(hci / "cotton").views[part])
     orders_are_named(DISTURBANCES[kind].change(light_field), ["flip-both"])
-
-
-@pytest.mark.parametrize(("closer", "best"), [(1.4, "as-given"), (0.1, "flip-both"), (-1.4, "flip-both")])
-def test_a_doubt_is_dropped_if_more_views_deny_it(closer: float, best: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Thin wires misled the views of one row and one column: a warning told to turn depth inside out."""
-    means = {Look.GLANCE: 0.0, Look.AXES: -1.4, Look.MANY_VIEWS: closer}
-
-    def told(_field: LightField, trial: Trial, look: Look, _views: Views) -> Evidence:
-        sign = next(sign for order, sign in trial.best.items() if order == "as-given")
-        return Evidence(sign * means[look], 30 * abs(means[look]), 16, 12)
-
-    monkeypatch.setattr("sepi.inspection.view_order.occlusion_evidence", told)
-    found = check_order(render("pyramids", size=96, views=5))
-    assert found.sign_clear
-    assert found.best == best
 
 
 def orders_are_named(light_field: LightField, orders: Iterable[str]) -> None:

@@ -1,18 +1,15 @@
 """Our own HDF5 files, damaged anywhere: a clear error or what was written; never a crash, a hang or other numbers."""
 
 import os
-import sys
 from collections.abc import Callable, Iterator
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-import psutil
 import pytest
 
-import sepi
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_attributes, read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.result_folder import read_result, write_result
@@ -162,18 +159,3 @@ def test_what_another_program_changes_is_told(tmp_path: Path, kind: str) -> None
             change(file)
         with pytest.raises(SepiError, match=r"\.h5: damaged, or changed by another program"):
             read(path)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells how many bytes a process reads")
-def test_a_file_is_checked_once(tmp_path: Path) -> None:
-    """On a slow share, each check takes as long as reading."""
-    light_field = replace(LIGHT_FIELD, views=np.tile(VIEWS, (1, 1, 8, 8, 1)))
-    read_bytes = []
-    for name in ("first.h5", "second.h5"):
-        write_light_field(tmp_path / name, light_field)
-        earlier(tmp_path / name)
-        before = psutil.Process().io_counters().read_chars
-        sepi.read_light_field(tmp_path / name, check_order=False)
-        read_bytes.append(psutil.Process().io_counters().read_chars - before)
-    # once for the check, once for the values; the first one's are of modules, too
-    assert read_bytes[1] < 2.5 * (tmp_path / name).stat().st_size

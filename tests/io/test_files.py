@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
@@ -15,12 +14,9 @@ import pytest
 
 from sepi.errors import SepiError, SepiWarning
 from sepi.io import files
-from sepi.io.all_views import write_all_views
-from sepi.io.files import PatientFile, atomic_folder, atomic_path
+from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.hdf5 import create_hdf5, open_hdf5
 from sepi.io.pfm import read_pfm
-from sepi.io.result_files import RESULT_FILES
-from sepi.scenes import render, write_hci
 
 SOURCE = Path(__file__).parents[2]
 
@@ -186,89 +182,6 @@ def test_a_full_disk_is_one_line_for_each_kind_of_file(tmp_path: Path) -> None:
     assert names_in(tmp_path) == []
 
 
-@pytest.fixture(scope="session")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("scenes") / "dots"
-    write_hci(render("dots", size=64, views=3), folder)
-    return folder
-
-
-def started(scene: Path, folder: Path) -> "subprocess.Popen[str]":
-    return subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "sepi",
-            "depth",
-            str(scene),
-            "-o",
-            "out",
-            "--set",
-            "initial.semi_global.num_disparities=21",
-        ],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # a background process of a shell ignores SIGINT; a user's does not
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-        env=os.environ | {"PYTHONPATH": str(SOURCE)},
-    )
-
-
-@pytest.mark.slow
-def test_depth_stopped_at_any_time_leaves_all_of_the_maps_or_none(scene: Path, tmp_path: Path) -> None:
-    (tmp_path / "whole").mkdir()
-    begun = time.monotonic()
-    process = started(scene, tmp_path / "whole")
-    assert process.communicate(timeout=120)[1] == ""
-    whole = time.monotonic() - begun
-    assert set(RESULT_FILES) <= set(os.listdir(tmp_path / "whole/out"))
-    for index, part in enumerate((0.6, 0.9, 0.97)):
-        folder = tmp_path / str(index)
-        folder.mkdir()
-        process = started(scene, folder)
-        time.sleep(whole * part)
-        process.send_signal((signal.SIGINT, signal.SIGTERM)[index % 2])
-        process.communicate(timeout=60)
-        left = names_in(folder)
-        assert left in ([], names_in(tmp_path / "whole")), (part, left)
-
-
-INTERRUPTED_WHILE_A_THREAD_STARTS = """
-import sys, threading, time
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
-from sepi.io.files import atomic_folder, atomic_path
-
-class Interrupted(threading.Event):
-    def wait(self, timeout=None):
-        super().wait(timeout)
-        raise KeyboardInterrupt
-
-def write(folder):
-    time.sleep(0.2)
-    with atomic_path(folder / "late") as temporary:
-        temporary.write_text("new")
-    print("written")
-
-try:
-    with atomic_folder(Path(sys.argv[1])) as folder, ThreadPoolExecutor() as pool:
-        threading.Event = Interrupted
-        pool.submit(write, folder)
-except KeyboardInterrupt:
-    print("interrupted")
-"""
-
-
-def test_a_thread_that_writes_after_the_interrupt_leaves_nothing(tmp_path: Path) -> None:
-    """Interrupted while it starts a thread, a pool does not know of it, and does not wait for it."""
-    program = [sys.executable, "-c", INTERRUPTED_WHILE_A_THREAD_STARTS, str(tmp_path / "out")]
-    done = subprocess.run(program, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(SOURCE)})
-    assert done.stdout.split() == ["interrupted", "written"]
-    assert names_in(tmp_path) == []
-
-
 @pytest.fixture
 def ctrl_c() -> Iterator[None]:
     """As at a terminal: a background process of a shell ignores SIGINT."""
@@ -276,35 +189,6 @@ def ctrl_c() -> Iterator[None]:
     yield
     found = signal.signal(signal.SIGINT, before)
     assert found is signal.default_int_handler
-
-
-@pytest.mark.usefixtures("ctrl_c")
-def test_an_interrupt_while_hdf5_writes_is_not_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """HDF5 calls Python to write, and forgets what is raised there: the program would go on after Ctrl-C."""
-    write, calls = PatientFile.write, 0
-
-    def interrupted(file: PatientFile, data: Any) -> int:
-        nonlocal calls
-        calls += 1
-        if calls == moment:
-            signal.raise_signal(signal.SIGINT)
-        return write(file, data)
-
-    def written() -> None:
-        nonlocal calls
-        calls = 0
-        with create_hdf5(tmp_path / "x.h5") as file:
-            file["x"] = np.arange(4)
-
-    monkeypatch.setattr(PatientFile, "write", interrupted)
-    moment = 0
-    written()
-    for moment in range(1, calls + 1):
-        (tmp_path / "x.h5").unlink(missing_ok=True)
-        with pytest.raises(KeyboardInterrupt):
-            written()
-        assert names_in(tmp_path) == [], moment
-    assert moment > 5
 
 
 @pytest.mark.usefixtures("ctrl_c")
@@ -327,25 +211,6 @@ def test_an_interrupt_waits_while_hdf5_reads_and_a_second_one_does_not(tmp_path:
     assert read == [3], "read once more after the second"
 
 
-@pytest.mark.usefixtures("ctrl_c")
-def test_maps_of_all_views_can_be_interrupted(tmp_path: Path) -> None:
-    """They are written as they come: a Ctrl-C that waits for the last one waits for minutes."""
-    light_field, computed = render("dots", size=64, views=3), 0
-
-    def maps() -> Iterator[tuple[tuple[int, int], dict[str, np.ndarray]]]:
-        nonlocal computed
-        for position in np.ndindex(light_field.grid):
-            if computed == 2:
-                signal.raise_signal(signal.SIGINT)
-            computed += 1
-            yield position, {"disparity": np.zeros((64, 64), np.float32)}
-
-    with pytest.raises(KeyboardInterrupt):
-        write_all_views(tmp_path / "all.h5", light_field, maps(), {})
-    assert computed == 2
-    assert names_in(tmp_path) == []
-
-
 def test_an_error_is_one_line_whatever_is_in_a_name(tmp_path: Path) -> None:
     """A file's name may hold what clears a terminal, or ends a line of a log."""
     path = tmp_path / "a\x1b[2J\nb.pfm"
@@ -357,9 +222,3 @@ def test_an_error_is_one_line_whatever_is_in_a_name(tmp_path: Path) -> None:
     # who follows its causes comes to an end
     assert caught.value.__cause__ is not caught.value
     assert str(SepiWarning("a\tb\x00")) == "a b?"
-
-
-def test_too_little_memory_is_no_fault_of_the_file(tmp_path: Path) -> None:
-    """Who hears that a sound file is damaged downloads it again."""
-    with pytest.raises(MemoryError), files.reading(tmp_path / "a.mat", "MATLAB file"):
-        raise MemoryError

@@ -95,36 +95,19 @@ def as_bytes(values: np.ndarray, white: int) -> Callable[[Path], object]:
 EXACT: dict[str, tuple[str, Callable[[Path], object], np.ndarray]] = {
     "png grey 8": ("a.png", by_imageio(GREY8), GREY8),
     "png grey 16": ("a.png", by_opencv(GREY16), GREY16),
-    "png RGB 8": ("a.png", by_pillow(RGB8), RGB8),
     "png RGB 16": ("a.png", by_opencv(RGB16), RGB16),
     "png RGBA 8": ("a.png", by_pillow(alpha(RGB8)), RGB8),
-    "png RGBA 16": ("a.png", by_opencv(alpha(RGB16)), RGB16),
     "png grey with alpha": ("a.png", by_pillow(RGB8[:, :, :2]), GREY8),
-    "png capitals": ("A.PNG", by_opencv(RGB8), RGB8),
-    "bmp grey": ("a.bmp", by_pillow(GREY8), GREY8),
     "bmp of 1 bit": ("a.bmp", lambda path: Image.fromarray(GREY8[:, :, 0] > 99).save(path), (GREY8 > 99) * 255),
     "bmp that claims another length": ("a.bmp", bmp_of_wrong_length, RGB8),
-    "bmp RGB": ("a.bmp", by_pillow(RGB8), RGB8),
-    "bmp RGBA": ("a.bmp", by_opencv(alpha(RGB8)), RGB8),
-    "tiff grey 8": ("a.tif", by_tifffile(GREY8), GREY8),
     "tiff grey 16": ("a.tif", by_tifffile(GREY16), GREY16),
-    "tiff grey float": ("a.tiff", by_tifffile(GREYF), GREYF),
-    "tiff RGB 8": ("a.tif", by_imageio(RGB8), RGB8),
-    "tiff RGB 16": ("a.tiff", by_tifffile(RGB16), RGB16),
     "tiff RGB float": ("a.tif", by_tifffile(RGBF), RGBF),
-    "tiff RGBA 8 opaque": ("a.tif", by_tifffile(alpha(RGB8, 255), extrasamples=["unassalpha"]), RGB8),
     "tiff RGBA 8 transparent": ("a.tif", by_tifffile(alpha(RGB8), extrasamples=["unassalpha"]), RGB8),
-    "tiff RGBA 16": ("a.tif", by_tifffile(alpha(RGB16), extrasamples=["unassalpha"]), RGB16),
-    "tiff RGBA float": ("a.tif", by_tifffile(alpha(RGBF), extrasamples=["unassalpha"]), RGBF),
-    "tiff RGBA 8 of OpenCV": ("a.tif", by_opencv(alpha(RGB8)), RGB8),
     "tiff LZW of OpenCV": ("a.tif", by_opencv(RGB16), RGB16),
     "tiff big endian": ("a.tif", by_tifffile(RGB16, byteorder=">"), RGB16),
-    "tiff float big endian": ("a.tif", by_tifffile(RGBF, byteorder=">"), RGBF),
     "tiff of 64 bit offsets": ("a.tif", by_tifffile(RGB16, bigtiff=True), RGB16),
     "tiff deflated": ("a.tif", by_tifffile(RGB16, compression="zlib", predictor=True), RGB16),
     "tiff in tiles": ("a.tif", by_tifffile(RGB16, tile=(32, 32)), RGB16),
-    "tiff in strips": ("a.tif", by_tifffile(RGB8, rowsperstrip=7), RGB8),
-    "tiff in planes": ("a.tif", by_tifffile(RGB16.transpose(2, 0, 1), planarconfig="separate"), RGB16),
     "tiff in planes and tiles": (
         "a.tif",
         by_tifffile(RGB8.transpose(2, 0, 1), planarconfig="separate", tile=(32, 32), compression="zlib"),
@@ -133,33 +116,11 @@ EXACT: dict[str, tuple[str, Callable[[Path], object], np.ndarray]] = {
     "tiff of half floats": ("a.tif", by_tifffile(RGBF.astype(np.float16)), RGBF.astype(np.float16).astype(np.float32)),
     "tiff with a sign": ("a.tif", by_tifffile((GREY16 // 2).astype(np.int16), byteorder=">"), GREY16 // 2),
     "tiff with white as zero": ("a.tif", by_tifffile(GREY16, photometric="miniswhite"), 65535 - GREY16),
-    "tiff packed with white as zero": (
-        "a.tif",
-        by_tifffile(GREY8, photometric="miniswhite", compression="zlib"),
-        255 - GREY8,
-    ),
-    "tiff LZW of planes, transparent": (
-        "a.tif",
-        by_tifffile(alpha(RGB8).transpose(2, 0, 1), planarconfig="separate", compression="lzw"),
-        RGB8,
-    ),
-    "tiff LZW with a sign and white as zero": (
-        "a.tif",
-        by_tifffile((GREY16 // 2).astype(np.int16), photometric="miniswhite", compression="lzw", predictor=True),
-        32767 - GREY16 // 2,
-    ),
     "tiff with a palette": ("a.tif", by_pillow_palette, PALETTE[GREY8[:, :, 0]]),
     "tiff packbits": ("a.tif", by_pillow(RGB8, compression="packbits"), RGB8),
     "webp": ("a.webp", by_pillow(RGB8, lossless=True), RGB8),
-    "webp RGBA": ("a.webp", by_pillow(alpha(RGB8), lossless=True, exact=True), RGB8),
-    "pgm": ("a.pgm", by_pillow(GREY8), GREY8),
     "pgm 16": ("a.pgm", by_opencv(GREY16), GREY16),
-    "ppm": ("a.ppm", by_imageio(RGB8), RGB8),
-    "ppm 16": ("a.ppm", by_opencv(RGB16), RGB16),
-    "pnm": ("a.pnm", by_opencv(RGB8), RGB8),
     "pgm text": ("a.pgm", as_text(GREY8, 255), GREY8),
-    "ppm text 16": ("a.ppm", as_text(RGB16, 65535), RGB16),
-    "pgm of white 15": ("a.pgm", as_bytes(GREY8 // 17, 15), GREY8 // 17 * 17),
     "ppm of 12 bit": ("a.ppm", as_bytes(RGB16 // 16, 4095), np.rint(RGB16 // 16 * (65535 / 4095))),
     "png named jpg": ("a.jpg", lambda path: path.write_bytes(cv2.imencode(".png", RGB8[:, :, ::-1])[1]), RGB8),
     "tiff named png": ("a.png", by_tifffile(RGB16), RGB16),
@@ -232,8 +193,6 @@ ORIENTED: dict[str, tuple[str, Callable[[int], Callable[[Path], object]]]] = {
     "PNG": ("a.png", turned),
     "WebP": ("a.webp", partial(turned, lossless=True)),
     "TIFF": ("a.tif", lambda value: by_tifffile(smooth(), extratags=[(274, "H", 1, value)])),
-    "TIFF big endian": ("a.tif", lambda value: by_tifffile(smooth(), extratags=[(274, "H", 1, value)], byteorder=">")),
-    "TIFF LZW": ("a.tif", partial(turned, compression="tiff_lzw")),
     "TIFF JPEG": ("a.tif", partial(turned, compression="jpeg", quality=100)),
 }
 
@@ -314,48 +273,23 @@ def jpeg(width: int, height: int) -> bytes:
     return data[:at] + struct.pack(">HH", height, width) + data[at + 4 :]
 
 
-def bmp(width: int, height: int, compression: int = 0) -> bytes:
-    header = struct.pack("<IiiHHIIiiII", 40, width, height, 1, 24, compression, 0, 0, 0, 0, 0)
-    return b"BM" + struct.pack("<IHHI", 254, 0, 0, 54) + header + bytes(200)
-
-
-def webp(width: int, height: int) -> bytes:
-    data = cv2.imencode(".webp", smooth(), [cv2.IMWRITE_WEBP_QUALITY, 101])[1].tobytes()
-    at = data.index(b"VP8L") + 9
-    return data[:at] + struct.pack("<I", (width - 1) | (height - 1) << 14) + data[at + 4 :]
-
-
 BAD: dict[str, tuple[bytes, str]] = {
     "empty": (b"", "not a PNG, JPEG"),
-    "PSD": (b"8BPS" + bytes(100), "not a PNG, JPEG"),
-    "GIF without a picture": (b"GIF89a" + bytes(100), "not a GIF, or damaged"),
-    "AVIF without a size": (b"\0\0\0 ftypavif" + bytes(100), "pixels cannot be in a AVIF"),
     "huge PNG": (png(60_000, 60_000), "60000x60000"),
     "PNG without pixels": (png(0, 5), "not a PNG, or damaged"),
     "huge JPEG": (jpeg(65_000, 65_000), "65000x65000"),
-    "JPEG without height": (jpeg(50, 0), "not a JPEG, or damaged"),
     "huge TIFF": (tiff(width=2**31, height=2**31), "2147483648"),
     "plain TIFF larger than its file": (tiff(compression=1, width=100, height=100), "bytes of pixels"),
-    "TIFF with pixels beyond its end": (tiff(start=10**6), "cut off"),
     "TIFF of 12 bit": (tiff(bits=12), "12 bit"),
     "TIFF whose pixels are missing": (tiff(size=0), "missing"),
-    "TIFF of 64 bit": (tiff(bits=64, form=3), "64 bit float"),
-    "TIFF of two samples": (tiff(samples=2), "2 samples"),
     "TIFF in CMYK": (tiff(samples=4, photometric=5), "nor RGB"),
-    "huge BMP": (bmp(2**31 - 1, 2**31 - 1), "2147483647x2147483647"),
-    "BMP of negative width": (bmp(-10, 10), "too many"),
-    "huge WebP": (webp(16_383, 16_383), "16383x16383"),
     "huge PGM": (b"P5 999999999 999999999 255\n" + bytes(100), "cut off"),
-    "huge PGM in digits": (b"P2 99999 99999 255\n" + b"1 " * 100, "cut off"),
     "PGM with letters": (b"P2 3 2 255\n" + b"100 " * 5 + b"white", "damaged"),
     "PGM brighter than white": (b"P5 3 2 100\n" + bytes([101] * 6), "white is 100"),
-    "PGM with no white": (b"P5 3 2 0\n" + bytes(6), "white"),
-    "PGM with white too high": (b"P5 3 2 70000\n" + bytes(12), "70000"),
-    "PGM without size": (b"P5 # nothing\n" * 3, "P5 WIDTH HEIGHT WHITE"),
 }
 
 
-@pytest.mark.parametrize("make", [png, jpeg, bmp, webp])
+@pytest.mark.parametrize("make", [png, jpeg])
 def test_large_picture_gives_no_warning(tmp_path: Path, make: Callable[[int, int], bytes]) -> None:
     """A lenslet picture may have more pixels than Pillow warns of, 89 million, and refuses, 179 million."""
     # as many bytes as such a picture takes at least
@@ -378,35 +312,21 @@ def test_bad_picture_is_one_line_that_names_it(tmp_path: Path, case: str, capfd:
     assert capfd.readouterr() == ("", "")
 
 
-def test_sound_header_beside_a_bad_one(tmp_path: Path) -> None:
-    """The makers of bad files make good ones too, so that what is refused is what was changed."""
-    sound = {(4, 4): tiff(), (40, 50): jpeg(50, 40), (5, 10): bmp(10, 5), (40, 50, 3): webp(50, 40)}
-    for shape, data in sound.items():
-        (tmp_path / "a").write_bytes(data)
-        assert read_picture(tmp_path / "a").shape[:2] == shape[:2]
-
-
 UNREAD: dict[str, tuple[Callable[[Path], object], str]] = {
     "64 bit floats": (by_tifffile(RGBF.astype(np.float64)), "64 bit float"),
-    "32 bit integers": (by_tifffile(GREY16.astype(np.uint32)), "32 bit"),
     "YCbCr of another range": (
         by_pillow_ycbcr(RGB8, tiffinfo={532: (15.0, 235.0, 128.0, 240.0, 128.0, 240.0)}),
         "neither grey nor RGB",
     ),
-    "YCbCr in half as many columns": (by_pillow_ycbcr(RGB8, tiffinfo={530: (2, 1)}), "neither grey nor RGB"),
     "packed by Zstandard": (by_tifffile(RGB16, compression="zstd"), "save it uncompressed"),
     "below zero": (by_tifffile(-(GREY16 // 2).astype(np.int16) - 1), "a pixel of -32"),
     "not a number": (by_tifffile(np.where(RGBF > 0.5, np.float32(np.nan), RGBF)), "NaN"),
-    "one pixel infinite": (by_tifffile(np.where(RGBF > 0.99, np.float32(np.inf), RGBF)), "infinity"),
     "0 to 255": (by_tifffile(RGBF * 255), "within 0..1"),
-    "negative": (by_tifffile(RGBF - 1), "within 0..1"),
 }
 
 
 @pytest.mark.parametrize("case", UNREAD)
-def test_tiff_that_would_be_read_wrongly_is_refused(
-    tmp_path: Path, case: str, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_tiff_of_other_values_is_refused(tmp_path: Path, case: str, capfd: pytest.CaptureFixture[str]) -> None:
     """OpenCV decodes some of these to values that are not in the file."""
     write, word = UNREAD[case]
     write(tmp_path / "a.tif")
@@ -431,7 +351,6 @@ def test_what_is_no_file(tmp_path: Path) -> None:
 UNLIKE = {
     "size": (RGB8[1:], "50x39"),
     "depth": (RGB16, "16 bit"),
-    "float": (RGBF, "32 bit float"),
     "channels": (GREY8, "grey"),
 }
 
@@ -447,31 +366,6 @@ def test_views_of_two_sorts_are_refused(tmp_path: Path, case: str) -> None:
     assert "--exclude" in str(caught.value)
 
 
-def test_views_that_take_more_memory_than_there_is_are_refused(tmp_path: Path) -> None:
-    """The system would end the program without a word."""
-    by_pillow(np.zeros((3000, 3000, 3), np.uint8))(tmp_path / "a.png")
-    with pytest.raises(SepiError, match="memory"):
-        read_views([tmp_path / "a.png"], [0], 10**6)
-
-
-def test_opencv_speaks_again_after_a_picture(tmp_path: Path) -> None:
-    """Other users of OpenCV in the same program want its words."""
-    before = cv2.utils.logging.getLogLevel()
-    (tmp_path / "a.bmp").write_bytes(bmp(10, 10, 1))
-    with pytest.raises(SepiError):
-        read_picture(tmp_path / "a.bmp")
-    by_pillow(RGB8)(tmp_path / "a.bmp")
-    read_views([tmp_path / "a.bmp"] * 20)
-    assert cv2.utils.logging.getLogLevel() == before
-
-
-def test_png_with_fewer_rows_than_it_says_is_refused(tmp_path: Path) -> None:
-    """All its checksums are right."""
-    (tmp_path / "a.png").write_bytes(png(100, 100))
-    with pytest.raises(SepiError, match=r"a\.png: .*cannot be decoded"):
-        read_picture(tmp_path / "a.png")
-
-
 def test_views_come_in_the_order_asked_for(tmp_path: Path) -> None:
     """Threads finish in any order."""
     views = RANDOM.integers(0, 256, (9, 12, 16, 3), np.uint8)
@@ -481,22 +375,6 @@ def test_views_come_in_the_order_asked_for(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_views([tmp_path / f"{number}.png" for number in order]), views[order])
 
 
-@pytest.mark.parametrize("pixels", [RGB8, RGB16])
-def test_written_picture_is_read_back(tmp_path: Path, pixels: np.ndarray) -> None:
-    write_png(tmp_path / "colour.png", pixels)
-    np.testing.assert_array_equal(cv2.imread(str(tmp_path / "colour.png"), -1)[:, :, ::-1], pixels)
-
-
 def test_mask_is_white_inside(tmp_path: Path) -> None:
     write_png(tmp_path / "mask.png", np.array([[True, False]]))
     assert read_picture(tmp_path / "mask.png")[:, :, 0].tolist() == [[255, 0]]
-
-
-def test_warnings_are_shown_after_views_were_read(tmp_path: Path) -> None:
-    """Threads that silence a library and end in another order would silence all that comes after."""
-    for number in range(24):
-        write_png(tmp_path / f"{number:02}.png", np.full((64, 64, 3), number, np.uint8))
-    before = list(warnings.filters)
-    for _ in range(20):
-        read_views(sorted(tmp_path.iterdir()))
-    assert warnings.filters == before

@@ -56,13 +56,10 @@ def names_in(folder: Path) -> list[str]:
 
 def pixels_of(path: Path) -> np.ndarray:
     image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    assert image is not None
     return image
 
 
-def test_other_programs_read_the_same_disparity_from_every_format(
-    tmp_path: Path, light_field: LightField, maps: StageMaps
-) -> None:
+def test_every_format_holds_the_same_disparity(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
     write_result(tmp_path, light_field, maps, {})
     array = np.load(tmp_path / "disparity.npy", allow_pickle=False)
     assert array.dtype == np.dtype("<f4")
@@ -72,9 +69,7 @@ def test_other_programs_read_the_same_disparity_from_every_format(
         np.testing.assert_array_equal(file["disparity"], maps.disparity)
 
 
-def test_16_bit_picture_says_how_to_get_disparity_back(
-    tmp_path: Path, light_field: LightField, maps: StageMaps
-) -> None:
+def test_16_bit_picture_gives_disparity_back(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
     write_result(tmp_path, light_field, maps, {})
     values = pixels_of(tmp_path / "disparity_16bit.png")
     with Image.open(tmp_path / "disparity_16bit.png") as image:
@@ -132,7 +127,7 @@ def test_depth_in_metres(tmp_path: Path, light_field: LightField, maps: StageMap
 
 
 @pytest.mark.parametrize("view", [None, (0, 4)])
-def test_result_holds_the_view_that_the_maps_belong_to(
+def test_result_holds_its_view(
     tmp_path: Path, light_field: LightField, maps: StageMaps, view: tuple[int, int] | None
 ) -> None:
     shown = replace(light_field, view=view)
@@ -212,30 +207,6 @@ def test_error_bars_in_view_steps_and_metres(tmp_path: Path, light_field: LightF
         np.testing.assert_array_equal(getattr(back, name), barred.extra[name])
 
 
-def test_sigma_in_colours_says_how_much_it_is(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
-    """Errors differ by powers of ten: on an even scale all but the worst would look alike."""
-    sigma = np.tile(np.geomspace(0.001, 0.1, SHAPE[1], dtype=np.float32), (SHAPE[0], 1))
-    barred = with_bars(maps).updated(maps.disparity, maps.confidence, sigma=sigma)
-    write_result(tmp_path, light_field, barred)
-    picture = pixels_of(tmp_path / "sigma.png")[:, :, ::-1].astype(int)
-    assert (picture[3, 4] == 128).all()
-    # as even as the scale of the disparity is for even steps, from the map's left to its right
-    even = colour_code(np.tile(np.linspace(-1, 1, SHAPE[1], dtype=np.float32), (SHAPE[0], 1)))
-    assert np.abs(picture[5, : SHAPE[1]] - even[5]).max() <= 12
-    bar = picture[:, SHAPE[1] :]
-    assert len(np.unique(bar.reshape(-1, 3), axis=0)) > 60
-    assert (bar.sum(axis=2) == 0).any()
-
-
-def test_a_result_without_error_bars_claims_none(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
-    """As those of the methods compared with, and of earlier versions."""
-    named = write_result(tmp_path, light_field, maps)
-    assert not any(word in name for name in named for word in ("sigma", "interval"))
-    back = read_result(tmp_path)
-    assert back.sigma is back.low is back.high is None
-    assert not back.unknown.any()
-
-
 def test_files_of_an_earlier_run_do_not_outlive_it(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
     """A mask of a stage that is now switched off, depth of a camera no longer given, a time, error bars of another
     variant or maps of all views would be taken for this run's; a user's own file stays.
@@ -252,7 +223,7 @@ def test_files_of_an_earlier_run_do_not_outlive_it(tmp_path: Path, light_field: 
 
 @pytest.mark.parametrize("earlier", [False, True])
 @pytest.mark.parametrize("name", ["depth.pfm", "runtime.txt", "all_views.h5", "confidence.png", "mask_mine.png"])
-def test_a_file_of_someone_else_is_neither_removed_nor_replaced(
+def test_files_of_others_stay(
     tmp_path: Path, light_field: LightField, maps: StageMaps, name: str, earlier: bool
 ) -> None:
     """Ground truth, or another program's map, was gone without a word; also where an earlier result claims others."""
@@ -270,9 +241,7 @@ def test_a_file_of_someone_else_is_neither_removed_nor_replaced(
     assert ((tmp_path / name).read_bytes() == b"mine") == (name not in written)
 
 
-def test_a_list_of_files_does_not_lead_out_of_the_folder(
-    tmp_path: Path, light_field: LightField, maps: StageMaps
-) -> None:
+def test_listed_files_lead_out_of_no_folder(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
     """A result may come from anyone."""
     (tmp_path / "precious").write_text("mine")
     listed = " ".join((*RESULT_FILES, "depth.pfm", "mask_occluded.png"))
@@ -285,9 +254,7 @@ def test_a_list_of_files_does_not_lead_out_of_the_folder(
     assert (tmp_path / "out" / "notes.txt").exists()
 
 
-def test_another_light_fields_result_is_not_overwritten(
-    tmp_path: Path, light_field: LightField, maps: StageMaps
-) -> None:
+def test_results_of_others_are_not_overwritten(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
     """Two folders 'views' both write to 'views-depth'; one read otherwise, or changed since, is the same."""
     one, other = (replace(light_field, source=f"{folder}/views", name="views") for folder in "ab")
     other = replace(other, views=light_field.views // 2)
@@ -307,47 +274,30 @@ def test_another_light_fields_result_is_not_overwritten(
     write_result(tmp_path, other, maps, force=True)
 
 
+def with_other_bars(maps: StageMaps, **bars: np.ndarray) -> StageMaps:
+    barred = with_bars(maps)
+    return barred.updated(barred.disparity, barred.confidence, **bars)
+
+
 BAD_MAPS = {
     "confidence of 0..255": (lambda maps: replace(maps, confidence=200 * maps.confidence), "within 0..1"),
-    "maps of another scene": (
-        lambda _: StageMaps(np.zeros((3, 4), np.float32), np.zeros((3, 4), np.float32)),
-        "(12, 16)",
-    ),
-    "negative confidence": (lambda maps: replace(maps, confidence=-maps.confidence), "within 0..1"),
     "confidence of another shape": (lambda maps: replace(maps, confidence=maps.confidence[:5]), "confidence of"),
     "mask of another shape": (lambda maps: replace(maps, extra={"odd": np.ones((3, 3), bool)}), "odd of"),
     "mask that leaves the folder": (
         lambda maps: replace(maps, extra={"/../up": np.ones(SHAPE, bool)}),
         "expected a name",
     ),
-}
-
-
-BAD_BARS = {
-    "no bounds": (lambda bars: bars.pop("low"), "sigma and high"),
-    "negative sigma": (lambda bars: bars.update(sigma=-bars["sigma"]), "sigma must be finite and not negative, got -0"),
-    "endless sigma": (lambda bars: bars.update(sigma=bars["sigma"] * np.inf), "sigma must be finite"),
+    "sigma without bounds": (lambda maps: replace(maps, extra={"sigma": np.ones(SHAPE, np.float32)}), "sigma"),
+    "endless sigma": (lambda maps: with_other_bars(maps, sigma=with_bars(maps).sigma * np.inf), "sigma must be finite"),
     "bounds the wrong way round": (
-        lambda bars: bars.update(low=bars["high"], high=bars["low"]),
+        lambda maps: with_other_bars(maps, low=with_bars(maps).high, high=with_bars(maps).low),
         "low must be no more than high",
     ),
     "disparity beyond": (
-        lambda bars: bars.update(high=bars["high"] - np.float32(2.5) * bars["sigma"]),
+        lambda maps: with_other_bars(maps, high=with_bars(maps).high - np.float32(2.5) * with_bars(maps).sigma),
         "must enclose the disparity",
     ),
-    "bounds of text": (lambda bars: bars.update(low=np.full(SHAPE, "a")), "map 'low': expected numbers"),
 }
-
-
-@pytest.mark.parametrize("case", BAD_BARS)
-def test_bad_error_bars_are_refused(tmp_path: Path, light_field: LightField, maps: StageMaps, case: str) -> None:
-    spoil, word = BAD_BARS[case]
-    bars = dict(with_bars(maps).extra)
-    spoil(bars)
-    with pytest.raises(SepiError, match="toy: ") as raised:
-        write_result(tmp_path / "out", light_field, replace(maps, extra=bars))
-    assert word in str(raised.value)
-    assert names_in(tmp_path) == []
 
 
 def test_bounds_may_be_rounded(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
@@ -360,9 +310,7 @@ def test_bounds_may_be_rounded(tmp_path: Path, light_field: LightField, maps: St
 
 
 @pytest.mark.parametrize("case", BAD_MAPS)
-def test_bad_maps_are_refused_before_anything_is_written(
-    tmp_path: Path, light_field: LightField, maps: StageMaps, case: str
-) -> None:
+def test_bad_maps_are_refused(tmp_path: Path, light_field: LightField, maps: StageMaps, case: str) -> None:
     spoil, word = BAD_MAPS[case]
     with pytest.raises(SepiError, match="toy: ") as raised:
         write_result(tmp_path / "out", light_field, spoil(maps), {})
@@ -389,20 +337,14 @@ BAD_RESULTS = {
     "no view": (_replaced("view", None), "not a result of 'sepi depth'"),
     "no confidence": (_replaced("confidence", None), "no confidence"),
     "stage file": (lambda file: file.attrs.pop("view_position"), "view_position"),
-    "grid of one number": (lambda file: file.attrs.__setitem__("grid", 3), "damaged"),
     "camera of nonsense": (lambda file: file.attrs.__setitem__("camera", (0.0, 1.0, -2.0)), "camera"),
-    "camera of two numbers": (lambda file: file.attrs.__setitem__("camera", (1.0, 1.0)), "damaged"),
     "view of another size": (_replaced("view", np.zeros((4, 4, 3), np.uint8)), "do not fit"),
-    "view of two channels": (_replaced("view", np.zeros((*SHAPE, 2), np.uint8)), "do not fit"),
-    "view of text": (_replaced("view", np.array(b"text")), "damaged"),
     "more than the file holds": (_huge, "cannot lie in"),
 }
 
 
 @pytest.mark.parametrize("case", BAD_RESULTS)
-def test_bad_result_is_one_line_that_names_it(
-    tmp_path: Path, light_field: LightField, maps: StageMaps, case: str
-) -> None:
+def test_a_bad_result_is_named(tmp_path: Path, light_field: LightField, maps: StageMaps, case: str) -> None:
     spoil, word = BAD_RESULTS[case]
     write_result(tmp_path, light_field, maps, {})
     with changed(tmp_path / "result.h5") as file:
@@ -429,12 +371,6 @@ def test_colours_show_finite_values_whatever_else_is_there() -> None:
     finite = np.isfinite(values)
     assert np.abs(spoilt[finite].astype(int) - clean[finite]).max() <= 6
     assert len(np.unique(clean.reshape(-1, 3), axis=0)) > 200
-
-
-@pytest.mark.parametrize("value", [0.7, np.nan])
-def test_colours_of_a_map_without_contrast(value: float) -> None:
-    picture = colour_code(np.full((4, 5), value, np.float32))
-    assert (picture == picture[0, 0]).all()
 
 
 def test_unknown_pixels_are_grey_and_take_no_part_of_the_scale() -> None:

@@ -12,7 +12,6 @@ from sepi.lightfield import FloatMap, LightField
 from sepi.matching import denoising as module
 from sepi.matching.denoising import DenoisedLightField, denoised
 from sepi.matching.view_noise import variance_map, view_noise
-from sepi.pipeline import estimate_depth
 from sepi.process.workspace import Workspace
 from sepi.scenes import render
 
@@ -129,15 +128,6 @@ def test_kernel_equals_plain_means(channels: int) -> None:
     kernels.denoise_views(levels_of_bytes, present, 255, lines, least, rounded)
     expected = plain_denoised((levels_of_bytes[0, 0] / np.float32(255)), levels, variances, least)
     np.testing.assert_allclose(rounded[0, 0], 255 * np.clip(expected, 0, 1), atol=0.51)
-
-
-@pytest.mark.parametrize("memory", [None, 2**31])
-def test_noise_is_measured_once_for_all_stages(memory: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    """To tell what is needed of the memory views are denoised; again for each stage, a limit would cost time."""
-    measured = []
-    monkeypatch.setattr(module, "view_noise", lambda light_field: measured.append(1) or view_noise(light_field))
-    estimate_depth(with_noise(render("dots", size=64, views=3), 6), "fast", memory=memory)
-    assert len(measured) == 1
 
 
 def test_only_noisy_views_are_changed() -> None:

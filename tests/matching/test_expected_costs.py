@@ -96,20 +96,6 @@ def test_each_candidate_has_the_mean_of_what_its_views_make_of_noise() -> None:
         np.testing.assert_allclose(taken, (of_views - anywhere) / (1 - anywhere), atol=3e-3)
 
 
-def test_what_is_overexposed_has_less_noise() -> None:
-    """If this fails, depth beside what is cut off is drawn away from where it was without any correction."""
-    scene = render("slanted_plane", size=96, views=7)
-    bright = np.minimum(scene.views / 255 * 1.2 + 0.4, 1)
-    noise = np.random.default_rng(0).standard_normal(bright.shape) * 6 / 255
-    light_field = replace(scene, views=np.clip(bright + noise, 0, 1).astype(np.float32))
-    assert scene.ground_truth is not None
-    wrong = []
-    for corrects in (True, False):
-        found = sweep(light_field, SweepParameters(correct_noise=corrects)).disparity[0]
-        wrong.append(np.mean(np.abs(found - scene.ground_truth)[12:-12, 12:-12] > 0.07))
-    assert wrong[0] < 1.1 * wrong[1]
-
-
 def test_texture_is_distinct_in_noise_and_noise_is_not() -> None:
     """If this fails, bare walls take planes of edges nearby, or noise itself passes for texture."""
     scene = render("slanted_plane", size=96, views=5)
@@ -125,7 +111,6 @@ def test_faint_texture_in_noise_keeps_its_depth() -> None:
     """If this fails, dark folds of a noisy picture lie in steps."""
     noisy = noisy_pictures(3, texture=0.15)
     found = sweep(noisy, SweepParameters())
-    assert noisy.ground_truth is not None
     error = (found.disparity[0] - noisy.ground_truth)[8:-8, 8:-8]
     assert np.median(np.abs(error)) < 0.04
 

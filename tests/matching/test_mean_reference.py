@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from sepi.matching.aligned_views import mean_reference
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, compared_with
 from sepi.matching.denoising import DenoisedLightField, denoised
-from sepi.matching.mean_reference import mean_reference
 from sepi.matching.row_bands import Rows
 from sepi.matching.view_subsets import spread_views
 from sepi.scenes import render
@@ -28,7 +28,6 @@ def test_mean_of_the_views_has_half_of_their_noise() -> None:
     """Else noise of the reference view, which all residuals share, is taken for depth."""
     light_fields, parameters = [noisy(seed) for seed in (0, 1)], BaseDetailParameters()
     truth = light_fields[0].ground_truth
-    assert truth is not None
     compared = spread_views(light_fields[0], 25)
     means = [mean_reference(one, truth, compared, parameters, 0.15) for one in light_fields]
     left, before = (np.std(np.subtract(*two)) for two in (means, [one.reference_view for one in light_fields]))
@@ -39,7 +38,6 @@ def test_views_are_compared_with_others() -> None:
     """Else each is most like a mean that has its own noise, and in strong noise a wrong map finds itself again."""
     light_field, parameters = noisy(0), BaseDetailParameters()
     truth, compared = light_field.ground_truth, spread_views(light_field, 25)
-    assert truth is not None
     mean = mean_reference(light_field, truth, compared, parameters, 0.15)
     views = light_field.views.copy()
     compared[light_field.reference_position] = False

@@ -136,7 +136,7 @@ def test_nothing_is_compared_with_what_stands_at_missing_pixels(found_in) -> Non
 @pytest.mark.extension("cameras")
 @pytest.mark.parametrize("variant", ["best", "fast", "paper"])
 def test_depth_near_the_border_of_turned_views_is_nearly_as_good(variant: str) -> None:
-    from sepi.extensions.cameras.resampling import completed
+    from sepi.extensions.cameras.frame import completed
 
     whole = render("pyramids", size=SIZE, views=VIEWS)
     light_field = turned(whole, 16)
@@ -178,9 +178,3 @@ def test_files_and_turned_grids_keep_the_marks(tmp_path: Path, kind: str) -> Non
     np.testing.assert_array_equal(sepi.read_light_field(path).missing, light_field.missing)
     flipped = sepi.read_light_field(path, options=ReadOptions(order="flip-columns"), check_order=False)
     np.testing.assert_array_equal(flipped.missing, light_field.missing[:, ::-1])
-
-
-def test_marks_of_another_shape_are_refused() -> None:
-    light_field = render("dots", size=SIZE, views=3)
-    with pytest.raises(sepi.SepiError, match=r"missing must be bool of shape \(3, 3, 64, 64\), got \(3, 3\)"):
-        replace(light_field, missing=~light_field.present)

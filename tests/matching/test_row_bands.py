@@ -3,17 +3,15 @@
 import subprocess
 import sys
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
+from several_threads import threads
 
-from sepi.errors import SepiError
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching import row_bands as module
 from sepi.matching.memory_limit import bytes_of_bands
-from sepi.matching.row_bands import FEWEST_ROWS, row_bands
+from sepi.matching.row_bands import row_bands
 from sepi.pipeline import estimate_depth
 from sepi.process.workspace import Workspace
 from sepi.scenes import render
@@ -35,64 +33,32 @@ def test_bands_cover_the_picture_and_what_it_is_seen_in() -> None:
         assert high - low <= 100
 
 
-def test_bands_are_never_narrower_than_useful() -> None:
-    field = LightField(np.zeros((5, 5, 200, 40, 3), np.uint8), "grid", workspace=Workspace(1))
-    assert all(band.end - band.begin >= FEWEST_ROWS - 1 for band in row_bands(field, field.present, 1.5, 10))
-
-
 @pytest.mark.parametrize("geometry", GEOMETRIES)
 @pytest.mark.parametrize("variant", ["best", "best_no_detail"])
-def test_maps_are_the_same_for_any_number_of_bands(variant: str, geometry: str, monkeypatch: Any) -> None:
+def test_maps_are_the_same_for_any_number_of_bands(variant: str, geometry: str) -> None:
     """Someone with less memory gets the map that others get."""
     scene = render("wall", size=64)
     field = LightField(
         scene.views[2:7, 2:7], "wall", disparity_range=scene.disparity_range, **standing(geometry, (5, 5))
     )
-    numbers = []
-    bands = module.row_bands
-    for name in ("sepi.matching.visibility_sweep", "sepi.boundaries.surface_shares", "sepi.matching.aligned_views"):
-        monkeypatch.setattr(
-            f"{name}.row_bands", lambda *arguments: numbers.append(len(found := bands(*arguments))) or found
-        )
     few = {"initial": {"num_disparities": 21}, "occlusion": {"num_disparities": 21}}
-    at_once = estimate_depth(field, variant, few)
-    assert set(numbers) == {1}
-    numbers.clear()
-    # with memory for the detail of all views beside the bands, and without
-    for room in (None, 0):
-        if room is not None:
-            monkeypatch.setattr("sepi.pipeline.bytes_of_volumes", lambda *_, room=room: room)
-        in_bands = estimate_depth(replace(field, workspace=Workspace(1)), variant, few)
-        assert set(numbers) == {4}
-        np.testing.assert_array_equal(in_bands.disparity, at_once.disparity)
-        np.testing.assert_array_equal(in_bands.confidence, at_once.confidence)
-        for name, values in at_once.extra.items():
-            np.testing.assert_array_equal(in_bands.extra[name], values)
-
-
-def test_a_limit_on_memory_leaves_the_rest_to_the_bands() -> None:
-    field = LightField(
-        np.zeros((5, 5, 400, 500, 3), np.uint8), "grid", disparity_range=DisparityRange(-1.5, 1.5, "given")
+    at_once, in_bands = (
+        estimate_depth(one, variant, few).all() for one in (field, replace(field, workspace=Workspace(1)))
     )
-    stages = list(stage_parameters(variant_named("best")).values())
-    megabyte = 2**20
-    few, many = (bytes_of_bands(field, stages, n * megabyte) for n in (600, 800))
-    assert many - few == 200 * megabyte
-    with pytest.raises(SepiError, match=r"grid: .* at least \d+ MB .* 100 MB"):
-        bytes_of_bands(field, stages, 100 * megabyte)
-    # 91 candidates of 400 x 500 pixels are 139 MB
-    assert bytes_of_bands(field, list(stage_parameters(variant_named("paper")).values()), 600 * megabyte) > few
+    assert at_once.keys() == in_bands.keys()
+    for name, values in at_once.items():
+        np.testing.assert_array_equal(in_bands[name], values, err_msg=name)
 
 
-def test_a_limit_on_memory_counts_what_each_thread_of_a_plane_sweep_holds(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_limit_on_memory_counts_what_each_thread_of_a_plane_sweep_holds() -> None:
     """961 candidates of eight groups of views take dozens of megabytes a thread, however small the picture."""
     field = LightField(np.zeros((3, 3, 64, 512, 3), np.uint8), "a", disparity_range=DisparityRange(-1, 1, "given"))
     many = {stage: {"num_disparities": 961} for stage in ("initial", "occlusion")}
     stages = list(stage_parameters(variant_named("paper"), many).values())
     left = []
-    for threads in (1, 2):
-        monkeypatch.setattr("sepi.matching.memory_limit.threads_used", lambda threads=threads: threads)
-        left.append(bytes_of_bands(field, stages, 2**30))
+    for count in (1, 2):
+        with threads(count):
+            left.append(bytes_of_bands(field, stages, 2**30))
     assert 961 * 8 * 2 * 7 * 4 * 128 < left[0] - left[1] < 961 * 8 * 2 * 7 * 4 * 150
 
 

@@ -53,16 +53,6 @@ def test_kernel_equals_a_plain_twin(random_views: np.ndarray, cubic: bool) -> No
         np.testing.assert_allclose(found[n], rows @ random_views[n].astype(float) @ columns.T, atol=2e-6)
 
 
-@pytest.mark.parametrize("cubic", [True, False], ids=["cubic", "bilinear"])
-def test_whole_pixels_move_exactly(random_views: np.ndarray, cubic: bool) -> None:
-    """Interpolation has nothing to do there."""
-    offsets = np.array([[0, 0], [0, -1], [3, 2], [-4, 5], [-10, -16], [11, 0], [2, 40]], float)
-    found = sheared(random_views, offsets, cubic)
-    for n, (down, across) in enumerate(offsets.astype(int)):
-        rows, columns = np.clip(np.arange(11) + down, 0, 10), np.clip(np.arange(17) + across, 0, 16)
-        np.testing.assert_array_equal(found[n], random_views[n][:, rows][:, :, columns])
-
-
 @pytest.fixture(scope="module")
 def plane() -> LightField:
     return render("fronto_parallel", size=64, views=5)
@@ -77,16 +67,6 @@ def test_views_of_a_plane_agree_at_its_disparity(plane: LightField) -> None:
         return float(views.at(disparity)[..., 8:-8, 8:-8].std(axis=0).mean())
 
     assert spread(true) < 0.25 * min(spread(true - 0.5), spread(true + 0.5), spread(-true))
-
-
-def test_reference_and_baselines_belong_to_the_views(plane: LightField) -> None:
-    """Methods weight views by their baselines and leave the reference out."""
-    views = ShearedViews(plane)
-    assert len(views.positions) == 25
-    assert tuple(views.positions[views.reference]) == plane.reference_position
-    for (t, s), baseline in zip(views.positions, views.baselines, strict=True):
-        np.testing.assert_array_equal(baseline, plane.baselines[t, s])
-    np.testing.assert_array_equal(views.at(1.3)[views.reference], plane.reference_view.transpose(2, 0, 1))
 
 
 def test_missing_views_are_left_out(plane: LightField) -> None:
@@ -108,14 +88,6 @@ def test_chosen_views_alone_are_sheared(plane: LightField) -> None:
     assert views.reference == -1
     expected = as_unit_float(plane.views[0, 1]).transpose(2, 0, 1)
     np.testing.assert_array_equal(views.at(0)[1], expected)
-
-
-def test_over_gives_each_disparity_in_turn(plane: LightField) -> None:
-    """The number is where a method puts its costs."""
-    views, disparities = ShearedViews(plane), np.array([-0.3, 0, 0.8], np.float32)
-    for (k, found), expected in zip(views.over(disparities), range(3), strict=True):
-        assert k == expected
-        np.testing.assert_array_equal(found, ShearedViews(plane).at(float(disparities[k])))
 
 
 def test_refocused_is_the_mean_of_the_views() -> None:

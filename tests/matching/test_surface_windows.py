@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sepi.matching.surface_windows import ANY_SURFACE, BESIDE_NEARER, OF_OTHER_COLOUR, Surfaces, windowed_step
+from sepi.matching.gauss_newton import ANY_SURFACE, BESIDE_NEARER, OF_OTHER_COLOUR, Surfaces, windowed_step
 
 MARGIN, COLOUR_WIDTH = 0.15, 0.1
 
@@ -54,23 +54,6 @@ def test_steps_are_those_of_the_pixels_of_one_surface(shape, radius) -> None:
         np.testing.assert_allclose(step, expected, rtol=1e-4, atol=1e-6)
         np.testing.assert_allclose(weight, expected_weight, rtol=1e-5)
         assert {step.dtype, weight.dtype} == {np.dtype(np.float32)}
-
-
-def test_updates_are_those_of_newton_and_no_larger_than_allowed() -> None:
-    """Far from the minimum the linearisation does not hold: an uncut update would throw a pixel off its surface."""
-    gradient, curvature = np.full((9, 9), 0.3, np.float32), np.full((9, 9), 10.0, np.float32)
-    gradient[:, 5:] *= -100
-    flat = np.zeros((9, 9), np.float32)
-    update, curvature_there = windowed_step(gradient, curvature, flat, BY_DEPTH, 0, 0.05)
-    np.testing.assert_allclose(update[:, :5], 0.03, rtol=1e-5)
-    np.testing.assert_allclose(update[:, 5:], -0.05, rtol=1e-5)
-    np.testing.assert_allclose(curvature_there, 10)
-    # a margin of nothing leaves a pixel what it has
-    alone = windowed_step(gradient, curvature, flat, Surfaces(0.0), 0, 0.05)
-    np.testing.assert_array_equal(alone, (update, curvature_there))
-    # a window takes the mean of both before they are divided
-    wide, _ = windowed_step(gradient, curvature, flat, BY_DEPTH, 1, 9.0)
-    np.testing.assert_allclose(wide[4, 4], (2 * 0.3 - 30) / 3 / 10, rtol=1e-4)
 
 
 def test_a_well_known_edge_does_not_hold_the_wall_behind_it() -> None:

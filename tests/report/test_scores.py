@@ -25,9 +25,7 @@ def test_numbers_hold_every_region(found: Runs) -> None:
 @pytest.mark.parametrize(
     ("scene", "variant", "ratio"), [("cotton", "paper", "300.1000"), ("cotton", "best", ""), ("mine", "paper", "")]
 )
-def test_published_seconds_are_divided_by_ours_for_scenes_of_their_size(
-    scene: str, variant: str, ratio: str, external: Runs
-) -> None:
+def test_published_seconds_are_divided_by_ours(scene: str, variant: str, ratio: str, external: Runs) -> None:
     """Another number of pixels is other work, and its ratio would flatter."""
     facts = copy.deepcopy(external.facts)
     for one in facts["scenes"]:

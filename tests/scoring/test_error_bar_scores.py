@@ -87,7 +87,6 @@ def test_a_map_has_scores_of_its_error_bars_in_every_region() -> None:
     """Over the very pixels of the other scores; the confidence is about less where views stand farther apart."""
     light_field = render("curved_occluders", size=64, views=3)
     truth = light_field.ground_truth
-    assert truth is not None
     holed = truth.copy()
     holed[:20] = NAN
     one = np.ones(truth.shape, np.float32)

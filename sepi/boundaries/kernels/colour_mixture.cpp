@@ -10,7 +10,7 @@ namespace sepi::colour_mixture {
 namespace {
 
 // The least and the largest disparity of each pixel and its eight neighbours: the fields of
-// sepi.boundaries.surroundings.Surroundings, in their order; (H, W).
+// sepi.boundaries.rim.Surroundings, in their order; (H, W).
 struct Surroundings {
     Array<const float, 2> farthest, nearest;
 

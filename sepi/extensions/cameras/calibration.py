@@ -20,11 +20,10 @@ from typing import Any
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.extensions.cameras.colmap_model import LENS_MODELS, require_pycolmap
-from sepi.extensions.cameras.features import SEED, Finding, colmap, match, tolerance, write_features
-from sepi.extensions.cameras.files import read_model
-from sepi.extensions.cameras.motion import require_motion
-from sepi.extensions.cameras.pictures import PROJECT
+from sepi.extensions.cameras.files import LENS_MODELS, require_pycolmap
+from sepi.extensions.cameras.model import PROJECT
+from sepi.extensions.cameras.motion import SEED, Finding, colmap, match, require_motion, tolerance, write_features
+from sepi.extensions.cameras.reader import read_model
 from sepi.extensions.cameras.rectification import rectification_of
 from sepi.io.files import atomic_folder
 from sepi.io.images import SUFFIXES

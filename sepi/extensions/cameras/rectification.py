@@ -14,11 +14,9 @@ import numpy as np
 from sepi.camera import Camera
 from sepi.camera.rig import Floats, Rectified, Rig
 from sepi.errors import SepiError
-from sepi.extensions.cameras.frame import Frame, Seeing, frame_of
-from sepi.extensions.cameras.grid import grid_of
+from sepi.extensions.cameras.frame import Frame, Seeing, completed, frame_of, rectified_view
 from sepi.extensions.cameras.model import CameraModel
-from sepi.extensions.cameras.plane import Plane, disparity_errors, plane_through, zooms
-from sepi.extensions.cameras.resampling import completed, rectified_view
+from sepi.extensions.cameras.plane import Plane, disparity_errors, grid_of, plane_through, zooms
 from sepi.io.files import name_of
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.exposure import equally_bright

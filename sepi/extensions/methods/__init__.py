@@ -43,7 +43,7 @@ _MODULES = {
     "optimize.median_descent": "mishiba",
     "optimize.confident_labels": "acc",
     "optimize.occ": "occ",
-    "optimize.guided_costs": "guided_costs",
+    "optimize.guided_costs": "costs",
     "optimize.markov_field": "markov_field",
 }
 

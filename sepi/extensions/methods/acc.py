@@ -14,20 +14,21 @@ cost is the initial choice ``acc``, the remaining steps are the choice ``confide
    weighted median, are the first map ``l_a``. Pixels whose costs hardly vary over the candidates are unreliable.
 4. *Labels.* The labels minimise ``sum_x C(x, l) + L1 [x reliable] |l - l_a| + L2 [x matched] |l - l_c| + L3 sum_x'
    |l - l(x')|`` over neighbours ``x'``; ``l_c`` is the disparity of features matched in several views
-   (:mod:`sepi.extensions.methods.acc_features`).
+   (:func:`matched_disparities`).
 5. *Iterative refinement.* From labels to a continuous map, four times: costs of the distance to the current map are
    filtered slice by slice, and the parabola through the least cost and its neighbours,
    ``l - (E(l+) - E(l-)) / (2 (E(l+) + E(l-) - 2 E(l)))``, gives the new map.
 
 Choices made here where the publication is not specific or could not be confirmed:
 
-- The border: views continue as their mirror image (:mod:`sepi.extensions.methods.acc_phase_shift`).
+- The border: views are not periodic, so an image is extended by its mirror image as far as samples reach; beyond, that
+  is blended with the mirror image of the opposite border, so that the period has no seam.
 - Colours: differences are means over the channels, and the gradients central differences.
 - All numbers: the share ``a``, truncations, the size of windows and filters, and the weights. Truncations match the
   differences caused by occlusion and texture; costs are scaled to 0..1; weights are in hundredths of the range.
 - The edge-preserving filter: the guided filter.
 - Graph cuts: replaced by message passing on the same energy (for the reason, see
-  :mod:`sepi.extensions.methods.message_passing`).
+  :mod:`sepi.extensions.methods.markov_field`).
 - Which pixels are unreliable: the standard deviation of their costs over the candidates is below a threshold.
 - Features: mutual nearest neighbours with Lowe's ratio test, and a median instead of the robust regression.
 - The costs of the refinement: the squared distance, truncated at two labels. Truncated at one label, that is 0 at a
@@ -42,19 +43,16 @@ References
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.extensions.methods.acc_features import matched_disparities
-from sepi.extensions.methods.acc_phase_shift import PhaseShift
-from sepi.extensions.methods.cost_volumes import disparity_of, distinctness, least_costs
-from sepi.extensions.methods.guided_filter import GuidedFilter
-from sepi.extensions.methods.message_passing import labels_of_least_energy
-from sepi.extensions.methods.weighted_median import weighted_median
+from sepi.extensions.methods.costs import GuidedFilter, disparity_of, distinctness, least_costs, weighted_median
+from sepi.extensions.methods.markov_field import labels_of_least_energy
+from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, require_costs
@@ -278,3 +276,200 @@ CHOICES = {
     "initial": {"acc": Choice(AccParameters, acc)},
     "optimize": {"confident_labels": Choice(ConfidentLabelsParameters, confident_labels)},
 }
+
+
+_SEAM = 16
+"""Pixels over which the two mirror images are blended."""
+
+
+class PhaseShift:
+    """Images to be shifted by fractions of a pixel in the Fourier domain.
+
+    Parameters
+    ----------
+    pictures : ndarray, shape (C, H, W), float32
+    farthest : float or None
+        Largest offset in pixels along either axis. None: the images are periodic.
+    """
+
+    def __init__(self, pictures: FloatMap, farthest: float | None) -> None:
+        from scipy import fft
+
+        if farthest is not None:
+            margin = 2 * int(np.ceil(farthest)) + _SEAM
+            pictures = _seamless(_seamless(pictures, 1, margin), 2, margin)
+        self._size = pictures.shape[1:]
+        self._spectrum = fft.rfft2(pictures)
+
+    def by(self, offsets: npt.NDArray[np.float64]) -> FloatMap:
+        """Samples of the images at ``(y, x) + offset``.
+
+        Parameters
+        ----------
+        offsets : ndarray, shape (M, 2), float64
+            Down and across, pixels.
+
+        Returns
+        -------
+        ndarray, shape (M, C, H or more, W or more), float32
+            Values beyond the images' height and width are meaningless.
+        """
+        from scipy import fft
+
+        rows, columns = (_phases(length, offsets[:, axis]) for axis, length in enumerate(self._size))
+        turned = self._spectrum * (rows[:, None, :, None] * columns[:, None, None, : self._spectrum.shape[2]])
+        moved = fft.irfft2(turned, s=self._size, overwrite_x=True, workers=thread_count())
+        return np.asarray(moved, np.float32)
+
+
+def _phases(length: int, offsets: npt.NDArray[np.float64]) -> npt.NDArray[np.complex64]:
+    """Phase factors of all frequencies for each offset; shape (M, length), complex64."""
+    phases = np.exp(2j * np.pi * np.outer(offsets, np.fft.fftfreq(length)))
+    if length % 2 == 0:
+        # the Nyquist frequency represents both signs: a real image stays real
+        phases[:, length // 2] = phases[:, length // 2].real
+    return phases.astype(np.complex64)
+
+
+def _seamless(pictures: FloatMap, axis: int, margin: int) -> FloatMap:
+    """Images extended at the end of an axis by their mirror image, blended into that of the start."""
+    from scipy import fft
+
+    length = pictures.shape[axis]
+    extra = fft.next_fast_len(length + margin, real=True) - length
+    along = np.moveaxis(pictures, axis, -1)
+    beyond_end = np.pad(along, ((0, 0), (0, 0), (0, extra)), mode="symmetric")[..., length:]
+    before_begin = np.pad(along, ((0, 0), (0, 0), (extra, 0)), mode="symmetric")[..., :extra]
+    # both halves are unblended as far as samples reach
+    step = np.linspace(-extra / 2, extra / 2, extra, dtype=np.float32) / np.float32(_SEAM / 2)
+    share = np.float32(0.5) + np.float32(0.5) * np.sin(np.float32(np.pi / 2) * np.clip(step, -1, 1))
+    joined = np.concatenate([along, beyond_end + share * (before_begin - beyond_end)], axis=-1)
+    return np.ascontiguousarray(np.moveaxis(joined, -1, axis))
+
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+_RATIO = 0.8
+"""Ratio of distances to the nearest and second nearest descriptor above which a match is rejected [1]_."""
+
+_OFF_LINE = 1.0
+"""Maximum distance of a match from its predicted position, pixels."""
+
+_LEAST_SUPPORT = 0.25
+"""Share of the other views that must agree on a feature's disparity."""
+
+_SMALLEST = 16
+"""Minimum size of views in pixels for the detection of features."""
+
+
+class Features(NamedTuple):
+    """Features of one view.
+
+    Attributes
+    ----------
+    points : ndarray, shape (N, 2), float64
+        Row and column.
+    descriptors : ndarray, shape (N, 128), float32
+    """
+
+    points: FloatArray
+    descriptors: FloatMap
+
+
+_NO_FEATURES = Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
+
+
+def matched_disparities(light_field: LightField, low: float, high: float) -> tuple[IntArray, IntArray, FloatMap]:
+    """Pixels of the reference view whose disparity follows from matched features.
+
+    Parameters
+    ----------
+    light_field : LightField
+    low, high : float
+        Disparity range of accepted matches, pixels per view step.
+
+    Returns
+    -------
+    rows, columns : ndarray, shape (M,), int64
+        Each pixel occurs once.
+    disparity : ndarray, shape (M,), float32
+        Pixels per view step.
+    """
+    here = features_of(light_field.reference_view)
+    others = light_field.present.copy()
+    others[light_field.reference_position] = False
+    baselines = light_field.baselines[others]
+    found = np.full((len(baselines), len(here.points)), np.nan)
+    for n, position in enumerate(np.argwhere(others)):
+        there = features_of(as_unit_float(light_field.rgb_views[tuple(position)]))
+        first, second = mutual_matches(here.descriptors, there.descriptors)
+        along, aside = _along(there.points[second] - here.points[first], baselines[n])
+        fits = (aside <= _OFF_LINE) & (along >= low) & (along <= high)
+        found[n, first[fits]] = along[fits]
+    disparity, support = agreed(found, np.hypot(*baselines.T))
+    kept = support >= max(1.0, _LEAST_SUPPORT * len(baselines))
+    pixels = np.floor(here.points[kept] + 0.5).astype(np.int64)
+    # a point with two orientations yields two features
+    pixels, once = np.unique(pixels, axis=0, return_index=True)
+    return pixels[:, 0], pixels[:, 1], disparity[kept][once].astype(np.float32)
+
+
+def features_of(view: FloatMap) -> Features:
+    """Features of a view ``(H, W, 3)``, colours in 0..1."""
+    grey = np.clip(np.rint(view.mean(axis=2) * 255), 0, 255).astype(np.uint8)
+    if min(grey.shape) < _SMALLEST:
+        return _NO_FEATURES
+    keypoints, descriptors = cv2.SIFT.create().detectAndCompute(grey, None)
+    if descriptors is None:
+        return _NO_FEATURES
+    return Features(np.array([keypoint.pt[::-1] for keypoint in keypoints]), np.asarray(descriptors, np.float32))
+
+
+def mutual_matches(first: FloatMap, second: FloatMap) -> tuple[IntArray, IntArray]:
+    """Indices of the matching descriptors of ``(N, 128)`` and ``(M, 128)``; each shape (K,), int64."""
+    none = np.zeros(0, np.int64)
+    if not (len(first) and len(second) > 1):
+        return none, none
+    squared = (first**2).sum(axis=1)[:, None] + (second**2).sum(axis=1) - 2 * first @ second.T
+    nearest, back = squared.argmin(axis=1), squared.argmin(axis=0)
+    least, next_least = np.partition(np.maximum(squared, 0), 1, axis=1)[:, :2].T
+    numbers = np.arange(len(first))
+    kept = (least < _RATIO**2 * next_least) & (back[nearest] == numbers)
+    return numbers[kept], nearest[kept]
+
+
+def agreed(found: FloatArray, distances: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Disparity on which views agree: least squares over those within half a pixel of the median.
+
+    Parameters
+    ----------
+    found : ndarray, shape (V, N), float64
+        Disparity of each feature in each view; NaN where it was not found.
+    distances : ndarray, shape (V,), float64
+        Distance of the views from the reference view, view steps.
+
+    Returns
+    -------
+    disparity : ndarray, shape (N,), float64
+        NaN where no view found the feature.
+    support : ndarray, shape (N,), int64
+        Number of views that agree.
+    """
+    disparity, support = np.full(found.shape[1], np.nan), np.zeros(found.shape[1], np.int64)
+    seen = np.isfinite(found).any(axis=0)
+    values = found[:, seen]
+    with np.errstate(invalid="ignore"):
+        agrees = np.abs(values - np.nanmedian(values, axis=0)) * distances[:, None] <= 0.5
+    weight = agrees * distances[:, None] ** 2
+    total = weight.sum(axis=0)
+    disparity[seen] = (weight * np.nan_to_num(values)).sum(axis=0) / np.where(total > 0, total, 1)
+    support[seen] = agrees.sum(axis=0)
+    return disparity, support
+
+
+def _along(moved: FloatArray, baseline: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Disparity that fits a displacement ``(K, 2)`` best, and the remaining distance."""
+    squared = float(baseline @ baseline)
+    disparity = -(moved @ baseline) / squared if squared else np.full(len(moved), np.nan)
+    return disparity, np.hypot(*(moved + disparity[:, None] * baseline).T)

@@ -49,8 +49,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.cost_volumes import disparity_of, distinctness, least_costs
-from sepi.extensions.methods.guided_filter import GuidedFilter
+from sepi.extensions.methods.costs import GuidedFilter, disparity_of, distinctness, least_costs
 from sepi.kernels import cae as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field

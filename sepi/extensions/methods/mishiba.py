@@ -54,7 +54,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.extensions.methods.guided_filter import GuidedFilter
+from sepi.extensions.methods.costs import GuidedFilter
 from sepi.image.noise import residual_variance
 from sepi.kernels import mishiba as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float

@@ -33,11 +33,11 @@ a small threshold. Everything else was chosen here:
 - the combination of the number of votes and the mean difference, as above;
 - 128 candidates, uniform over the disparity range; views resampled by cubic convolution. Views are extended by their
   border pixels; samples there vote at random, like occluded ones;
-- the edge-preserving filter: the guided filter (:mod:`sepi.extensions.methods.guided_filter`), in windows of 15 pixels;
+- the edge-preserving filter: the guided filter (:mod:`sepi.extensions.methods.costs`), in windows of 15 pixels;
 - the sub-candidate disparity, by a parabola through the filtered costs. It makes most pixels more precise than the
   publication's results;
 - the last step: a weighted median with weights by the colours of the reference view
-  (:mod:`sepi.extensions.methods.weighted_median`).
+  (:mod:`sepi.extensions.methods.costs`).
 
 Any set of views works: one row, one column, positions off the grid.
 
@@ -55,10 +55,15 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.colour_differences import colour_differences
-from sepi.extensions.methods.cost_volumes import disparity_of, distinctness, least_costs
-from sepi.extensions.methods.guided_costs import GuidedCostsParameters, guided_costs
-from sepi.extensions.methods.weighted_median import weighted_median
+from sepi.extensions.methods.costs import (
+    GuidedCostsParameters,
+    colour_differences,
+    disparity_of,
+    distinctness,
+    guided_costs,
+    least_costs,
+    weighted_median,
+)
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews

@@ -52,9 +52,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.colour_differences import colour_differences
-from sepi.extensions.methods.cost_volumes import disparity_of, distinctness, least_costs
-from sepi.extensions.methods.guided_filter import GuidedFilter
+from sepi.extensions.methods.costs import GuidedFilter, colour_differences, disparity_of, distinctness, least_costs
 from sepi.image.noise import noise_level
 from sepi.image.superpixels import Superpixels, superpixels
 from sepi.lightfield import FloatMap, LightField

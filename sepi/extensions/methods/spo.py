@@ -13,7 +13,7 @@ affects both sides equally. The data cost is the initial choice ``spo``.
 3. *Both directions.* The row of views through the reference view gives ``D_h``, the column ``D_v``. A direction is
    weighted by how distinct the peak of its distances is, ``c = exp(-(mean_l D / max_l D) / (2 s^2))``, and
    ``D(l) = c_h D_h(l) + c_v D_v(l)``.
-4. *Labels.* Every slice of the volume is smoothed by a guided filter (:mod:`sepi.extensions.methods.guided_costs`),
+4. *Labels.* Every slice of the volume is smoothed by a guided filter (:mod:`sepi.extensions.methods.costs`),
    then each pixel selects its best candidate.
 
 The EPIs are sheared by each candidate, so that its lines become columns, and the histogram of a column is shared by all
@@ -48,7 +48,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.cost_volumes import disparity_of, least_costs
+from sepi.extensions.methods.costs import disparity_of, least_costs
 from sepi.kernels import spo as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field

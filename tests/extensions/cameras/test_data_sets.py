@@ -11,8 +11,7 @@ from geometries import GEOMETRIES, standing
 from plyfile import PlyData
 
 from sepi.camera import Camera
-from sepi.extensions.cameras.colmap import write_colmap
-from sepi.extensions.cameras.nerfstudio import write_nerfstudio
+from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
 from sepi.extensions.cameras.posed_views import PosedViews, posed_views
 from sepi.lightfield import LightField
 from sepi.scenes import render
@@ -51,9 +50,7 @@ def read_depth(path: Path) -> np.ndarray:
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)
 @pytest.mark.parametrize("view", [None, (2, 0)])
-def test_colmap_model_sees_points_where_the_views_show_them(
-    tmp_path: Path, geometry: str, view: tuple[int, int] | None
-) -> None:
+def test_colmap_sees_points_where_the_views_do(tmp_path: Path, geometry: str, view: tuple[int, int] | None) -> None:
     """A model whose keypoints are off by half a pixel looks right and spoils what is made from it."""
     scene = scene_of(geometry, view=view)
     posed = posed_of(scene)
@@ -153,17 +150,6 @@ def test_colmap_fuses_the_workspace(tmp_path: Path) -> None:
         ).read_bytes()
 
 
-def test_colmap_itself_reads_places_and_depth(tmp_path: Path) -> None:
-    posed = posed_of(scene_of("closer rows"))
-    write_colmap(tmp_path / "model", posed)
-    model = pycolmap.Reconstruction(tmp_path / "model/sparse/0")
-    image = model.find_image_with_name("view_02_01.png")
-    np.testing.assert_allclose(image.projection_center(), [0, 0.43 * 30 / 90, 0], atol=1e-12)
-    depth = pycolmap.DepthMap()
-    depth.read(str(tmp_path / "model/stereo/depth_maps/view_01_01.png.geometric.bin"))
-    np.testing.assert_array_equal(depth.to_array(), CAMERA.depth(posed.disparity))
-
-
 # --- nerfstudio
 
 
@@ -247,12 +233,6 @@ def test_nerfstudio_depth_has_its_error_in_every_view(tmp_path: Path) -> None:
         # pixels are carried whole, disparity between them
         assert np.quantile(np.abs(found[known] / expected - 1), 0.99) < 0.03
     assert "depth_sigma" not in (tmp_path / "bare/transforms.json").read_text()
-
-
-def test_no_points_are_no_file_of_points(tmp_path: Path) -> None:
-    write_nerfstudio(tmp_path / "set", posed_of(scene_of(), max_points=0))
-    assert "ply_file_path" not in json.loads((tmp_path / "set/transforms.json").read_text())
-    assert not (tmp_path / "set/points.ply").exists()
 
 
 # --- both

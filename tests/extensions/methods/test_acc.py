@@ -1,7 +1,5 @@
 """The compared method of phase-shifted views: its shifts, costs and refinement, and what its publication claims."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
@@ -10,21 +8,19 @@ from sepi.extensions.methods import acc
 from sepi.extensions.methods.acc import (
     AccParameters,
     ConfidentLabelsParameters,
+    PhaseShift,
+    agreed,
     confident_labels,
+    matched_disparities,
     phase_shift_costs,
     truncated_difference,
 )
-from sepi.extensions.methods.acc_features import agreed, features_of, matched_disparities, mutual_matches
-from sepi.extensions.methods.acc_phase_shift import PhaseShift
-from sepi.extensions.methods.cost_volumes import disparity_of, least_costs
-from sepi.extensions.methods.guided_filter import GuidedFilter
+from sepi.extensions.methods.costs import GuidedFilter, disparity_of, least_costs
 from sepi.lightfield import DisparityRange, LightField
 from sepi.scenes import render
 from sepi.stage import CostVolume, no_progress
 
 pytestmark = pytest.mark.slow
-
-FEW = {"initial": {"num_disparities": 25}}
 
 
 def waves(height: int, width: int, down: float, across: float) -> np.ndarray:
@@ -41,36 +37,6 @@ def test_shift_of_a_band_limited_picture_is_exact(height: int, width: int) -> No
     found = PhaseShift(waves(height, width, 0, 0).astype(np.float32), None).by(offsets)
     for moved, (down, across) in zip(found, offsets, strict=True):
         np.testing.assert_allclose(moved, waves(height, width, down, across), atol=1e-5)
-
-
-def test_shift_by_whole_pixels_is_exact_for_any_picture() -> None:
-    """Noise has the highest frequency, whose sign nobody knows."""
-    picture = np.random.default_rng(0).random((3, 24, 30), np.float32)
-    found = PhaseShift(picture, None).by(np.array([[1, -4], [-7, 0]], float))
-    np.testing.assert_allclose(found[0], np.roll(picture, (-1, 4), (1, 2)), atol=1e-5)
-    np.testing.assert_allclose(found[1], np.roll(picture, 7, 1), atol=1e-5)
-
-
-@pytest.mark.parametrize("size", [20, 64], ids=["smaller than the margin", "larger"])
-def test_pictures_go_on_as_their_mirror_image(size: int) -> None:
-    """Without a margin the opposite border would shine in, and no candidate would fit along the borders."""
-    picture = np.random.default_rng(1).random((1, size, size), np.float32)
-    mirrored = np.pad(picture[0], 9, mode="symmetric")
-    offsets = np.array([[9, 0], [0, -9], [-4, 9]])
-    for moved, (down, across) in zip(PhaseShift(picture, 9).by(offsets.astype(float)), offsets, strict=True):
-        expected = mirrored[9 + down :, 9 + across :][:size, :size]
-        np.testing.assert_allclose(moved[0, :size, :size], expected, atol=1e-5)
-
-
-def test_no_edge_shines_in_from_the_opposite_border() -> None:
-    """A picture dark at the left and bright at the right has no edge at its border, and rings at none."""
-    ramp = np.broadcast_to(np.linspace(0, 1, 64, dtype=np.float32), (1, 32, 64)).copy()
-    offset = np.array([[0.0, 0.5]])
-    error = [
-        np.abs(PhaseShift(ramp, farthest).by(offset)[0, 0, :32, :60] - ramp[0, :, :60] - 0.5 / 63).max()
-        for farthest in (None, 1)
-    ]
-    assert error[1] < 0.01 < 0.1 < error[0]
 
 
 def differences_twin(moved: np.ndarray, reference: np.ndarray, across: float, share: float) -> np.ndarray:
@@ -118,41 +84,6 @@ def errors(light_field: LightField, true: np.ndarray | float, **parameters: floa
     return np.abs(disparity_of(volume, least_costs(volume)) - true)[8:-8, 8:-8]
 
 
-def test_gradients_along_the_movement_count_at_edges(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The publication's second claim: at an edge, a view that moves across it says most by the gradient across.
-
-    On texture without a direction equal shares do better, which is no failure of the code.
-    """
-    scene = textured(0.137, 0.06, rows=1, stripes=True)
-    only_gradients = {"colour_share": 0.0, "gradient_truncation": 0.1}
-    adaptive = np.median(errors(scene, 0.137, **only_gradients))
-    monkeypatch.setattr(acc, "across_share", lambda _: 0.5)
-    assert adaptive < 0.92 * np.median(errors(scene, 0.137, **only_gradients))
-    monkeypatch.setattr(acc, "across_share", lambda _: 0.0)
-    assert adaptive < 0.4 * np.median(errors(scene, 0.137, **only_gradients))
-
-
-def test_share_of_the_gradients_follows_the_baseline() -> None:
-    assert acc.across_share(np.array([0.0, -2.0])) == 1
-    assert acc.across_share(np.array([3.0, 0.0])) == 0
-    assert acc.across_share(np.array([-3.0, 1.0])) == 0.25
-    assert acc.across_share(np.zeros(2)) == 0.5
-
-
-def test_optimisation_fills_weak_texture() -> None:
-    """The publication's fourth claim: labels propagate into regions where no candidate fits better than another."""
-    scene = textured(0.137, 0)
-    views = scene.views.copy()
-    views[:, :, 14:34, 14:34] = 0.5
-    views += np.random.default_rng(4).normal(0, 0.005, views.shape).astype(np.float32)
-    maps = acc.acc(replace(scene, views=views), None, AccParameters(num_disparities=41), no_progress)
-    parameters = ConfidentLabelsParameters(reliable_deviation=0.03)
-    filled = confident_labels(replace(scene, views=views), maps, parameters, no_progress)
-    first, last = (np.abs(found.disparity - 0.137)[18:30, 18:30].mean() for found in (maps, filled))
-    assert last < 0.5 * first
-    assert filled.cost_volume is None
-
-
 def test_refinement_makes_a_slope_of_labels_continuous() -> None:
     """Without it a map has steps as high as the disparity sampling."""
     true = np.broadcast_to(np.linspace(-0.9, 0.9, 64, dtype=np.float32), (64, 64))
@@ -164,17 +95,6 @@ def test_refinement_makes_a_slope_of_labels_continuous() -> None:
         found = acc.refined(found, disparities, smooth)
     inner = np.s_[8:-8, 8:-8]
     assert np.abs(found - true)[inner].mean() < 0.5 * np.abs(labels - true)[inner].mean()
-
-
-def test_refinement_keeps_labels_and_steps() -> None:
-    """A step at an edge of the picture must stay one, and a constant map as it is."""
-    disparities = np.linspace(-1, 1, 21).astype(np.float32)
-    labels = np.full((40, 40), disparities[4])
-    labels[:, 20:] = disparities[15]
-    guide = np.full((40, 40, 3), 0.2, np.float32)
-    guide[:, 20:] = 0.8
-    found = acc.refined(labels, disparities, GuidedFilter(guide, 3, 1e-4))
-    np.testing.assert_allclose(found, labels, atol=0.01)
 
 
 def test_features_tell_the_disparity_of_their_pixels() -> None:
@@ -200,14 +120,6 @@ def test_views_vote_on_a_feature() -> None:
     np.testing.assert_allclose(disparity[[0, 2]], [(0.5 + 4 * 0.6 + 4 * 0.55) / 9, 0.1])
     np.testing.assert_array_equal(support, [3, 0, 1])
     assert np.isnan(disparity[1])
-
-
-def test_pictures_without_features_match_nothing() -> None:
-    """Walls and tiny views are no error."""
-    for view in (np.full((40, 40, 3), 0.5, np.float32), np.zeros((2, 2, 3), np.float32)):
-        none = features_of(view)
-        assert len(none.points) == len(none.descriptors) == 0
-        assert len(mutual_matches(none.descriptors, none.descriptors)[0]) == 0
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sepi.extensions.methods.guided_filter import GuidedFilter
+from sepi.extensions.methods.costs import GuidedFilter
 
 RANDOM = np.random.default_rng(4)
 GUIDE = RANDOM.uniform(0, 1, (12, 15, 3)).astype(np.float32)

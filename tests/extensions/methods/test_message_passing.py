@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from sepi.extensions.methods.message_passing import contrast_weights, energy, labels_of_least_energy
+from sepi.extensions.methods.markov_field import contrast_weights, energy, labels_of_least_energy
 from sepi.kernels import message_passing as kernels
 
 
@@ -32,17 +32,6 @@ def test_least_energy_is_that_of_all_labellings(labels, shape, truncation) -> No
         found = labels_of_least_energy(costs, across, down, truncation, 50)
         expected = least_by_search(costs, across, down, truncation)
         np.testing.assert_allclose(energy(found, costs, across, down, truncation), expected, rtol=1e-5)
-
-
-def test_truncated_energies_are_nearly_the_least() -> None:
-    """Truncation keeps the steps between surfaces; finding the least is then hard, but tiny grids must come close."""
-    gaps = []
-    for seed in range(8):
-        costs, across, down = problem(seed, 4, (2, 3))
-        found = labels_of_least_energy(costs, across, down, 1.5, 50)
-        gaps.append(energy(found, costs, across, down, 1.5) / least_by_search(costs, across, down, 1.5) - 1)
-    assert sum(gap < 1e-5 for gap in gaps) >= 7
-    assert max(gaps) < 0.05
 
 
 def chain_energy(costs, weights, truncation):

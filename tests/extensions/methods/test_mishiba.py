@@ -7,22 +7,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from sepi.extensions.methods.guided_filter import GuidedFilter
 from sepi.extensions.methods.mishiba import (
-    LatticeFit,
-    MedianDescentParameters,
     MishibaParameters,
     details,
-    median_descent,
-    mishiba,
-    selected_views,
 )
 from sepi.kernels import mishiba as kernels
 from sepi.kernels import sheared_views
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
-from sepi.stage import StageMaps, no_progress
 
 pytestmark = pytest.mark.slow
 
@@ -35,12 +28,6 @@ def bits(light_field: LightField, views: npt.NDArray[np.bool_], disparity: float
     sheared = np.empty_like(maps)
     sheared_views.shear(maps, -disparity * light_field.baselines[views], True, sheared)
     return sheared[:, 0] > 0
-
-
-def mean_error(maps: StageMaps, light_field: LightField, region: npt.NDArray[np.bool_] | None = None) -> float:
-    """Mean absolute error, pixels per view step."""
-    error = np.abs(maps.disparity - light_field.ground_truth)
-    return float(error[region].mean() if region is not None else error.mean())
 
 
 @pytest.mark.parametrize("step", [1, 2, 3])
@@ -104,15 +91,6 @@ def test_interpolated_costs_equal_a_plain_computation() -> None:
         np.testing.assert_allclose(kept[inner, column], beside[inner], rtol=1e-4, atol=1e-5)
 
 
-def test_lattice_of_all_pixels_is_the_guided_filter() -> None:
-    """What is interpolated are the filter's own functions; otherwise edges would be lost between lattice pixels."""
-    scene = render("pencils", size=64, views=3)
-    costs = np.random.default_rng(2).random((64, 64), np.float32)
-    guide = scene.reference_view
-    slopes, constants = LatticeFit(guide, 3, 1e-3).functions(costs)
-    np.testing.assert_allclose((slopes * guide).sum(axis=2) + constants, GuidedFilter(guide, 3, 1e-3)(costs), atol=1e-4)
-
-
 def plain_median_pass(current, data, weights, guide, radius, gap, table, per_entry):
     """The same by sorting."""
     out = np.empty_like(current)
@@ -142,39 +120,6 @@ def test_bisection_finds_the_weighted_median(radius: int, gap: int) -> None:
     found = np.empty_like(data)
     kernels.median_pass(*arguments, found)
     np.testing.assert_array_equal(found, plain_median_pass(*arguments))
-
-
-def test_one_bit_features_do_not_see_brightness() -> None:
-    """Views of another exposure, or darker towards the grid's corners, must not change the depth."""
-    scene = render("fronto_parallel", size=96, views=5)
-    gain, offset = np.random.default_rng(5).uniform(0.4, 0.7, (2, 5, 5, 1, 1, 1))
-    changed = replace(scene, views=(gain * scene.views / 255 + 0.4 * offset).astype(np.float32))
-    before, after = (mean_error(mishiba(one, None, PARAMETERS, no_progress), scene) for one in (scene, changed))
-    assert after < 1.1 * before
-
-
-def test_few_views_and_a_lattice_lose_little() -> None:
-    """The other savings: a quarter of the pixels and a third of the views must do nearly as well as all of them."""
-    scene = render("curved_occluders", size=96, views=9)
-    assert selected_views(scene).sum() == 17
-    usual = mean_error(mishiba(scene, None, PARAMETERS, no_progress), scene)
-    dense = MishibaParameters(lattice_step=1, radius=6)
-    every_pixel = mean_error(mishiba(scene, None, dense, no_progress), scene)
-    assert usual < 1.1 * every_pixel
-
-
-def test_medians_take_out_what_bulges_over_edges() -> None:
-    """Costs of a window fatten what is in front; the refinement is there to undo that."""
-    scene = render("curved_occluders", size=96, views=5)
-    first = mishiba(scene, None, PARAMETERS, no_progress)
-    after = median_descent(scene, first, MedianDescentParameters(), no_progress)
-    assert mean_error(after, scene) < mean_error(first, scene)
-    # what small windows leave, more passes of them take out
-    once, again = (
-        median_descent(scene, first, MedianDescentParameters(radius=1, gap=1, passes=passes), no_progress)
-        for passes in (1, 4)
-    )
-    assert mean_error(again, scene) < mean_error(once, scene)
 
 
 @pytest.mark.parametrize("views", [5, 9])

@@ -122,7 +122,7 @@ def test_the_views_round_the_reference_view_are_taken(tmp_path: Path) -> None:
         ({"output": "depth"}, "does not take views"),
     ],
 )
-def test_what_does_not_fit_is_told_in_one_line(
+def test_what_does_not_fit_is_told(
     tmp_path: Path, light_field: LightField, parameters: dict[str, Any], message: str
 ) -> None:
     path = convolution(tmp_path / "net.onnx", np.ones((1, 27, 1, 1)), (1, 27, "y", "x"))
@@ -139,12 +139,6 @@ def test_a_wrong_file_or_none_is_told_in_one_line(tmp_path: Path, light_field: L
         estimated(light_field, tmp_path / "absent.onnx")
     with pytest.raises(SepiError, match=r"initial\.onnx\.model: .*ONNX file"):
         estimated(light_field, None)
-
-
-@pytest.mark.parametrize("parameters", [{"inputs": ("square: y x",)}, {"tile": 16, "overlap": 8}, {"inputs": ()}])
-def test_parameters_that_cannot_be_followed_are_refused(parameters: dict[str, Any]) -> None:
-    with pytest.raises(SepiError, match=r"initial\.onnx"):
-        Variant("onnx", "none", "none", "none", {"initial": parameters})
 
 
 def test_missing_views_are_told(tmp_path: Path, light_field: LightField) -> None:

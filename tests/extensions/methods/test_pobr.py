@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from scipy.ndimage import gaussian_filter
 
 from sepi.extensions.methods.pobr import (
     PobrCostParameters,
     PobrRegionParameters,
     PobrSmoothingParameters,
-    label_deviation,
     photo_consistency,
     pobr_cost,
     pobr_regions,
@@ -17,12 +16,9 @@ from sepi.extensions.methods.pobr import (
     squared_gradient,
     squared_steps,
 )
-from sepi.image.superpixels import Superpixels, superpixels
+from sepi.image.superpixels import superpixels
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching.sheared_views import ShearedViews
-from sepi.pipeline import estimate_depth
-from sepi.scenes import render
-from sepi.stage import StageMaps, no_progress
+from sepi.stage import no_progress
 
 pytestmark = pytest.mark.slow
 
@@ -94,27 +90,6 @@ def test_border_regions_are_where_the_labels_are_wrong(disc, labels):
     assert regions.mean() < 0.5
 
 
-def test_a_plane_has_no_border_regions():
-    """A slanted surface taken for a border would lose its labels."""
-    light_field = render("slanted_plane", size=96, views=5)
-    truth = StageMaps(light_field.ground_truth, np.ones(light_field.shape, np.float32))
-    maps = regions_of(light_field, truth)
-    assert not maps.mask("occluded").any()
-    assert_array_equal(maps.confidence, 1)
-    assert_array_equal(maps.extra["edge_strength"], squared_gradient(light_field.reference_view))
-
-
-def test_only_the_weights_change_in_the_regions(disc, labels):
-    """The occlusion stage hands on the labels; a pixel outside the regions keeps its confidence."""
-    maps = regions_of(disc, labels, least_share=0.25)
-    inside = maps.mask("occluded")
-    relative = np.clip(labels.confidence / np.percentile(labels.confidence, 95), 0, 1)
-    assert_array_equal(maps.disparity, labels.disparity)
-    assert_allclose(maps.confidence[~inside], relative[~inside], rtol=1e-6)
-    # with tau_0 = 1000 hardly a superpixel deviates by so little more than tau_1 that it keeps more
-    assert_allclose(np.median(maps.confidence[inside] / relative[inside]), 0.25, rtol=1e-4)
-
-
 def test_edge_strength_falls_inside_superpixels_and_rises_between_them(disc, labels):
     """Otherwise texture would stop what is filled in from beside, and the outline of the occluder would not."""
     maps = regions_of(disc, labels)
@@ -126,22 +101,6 @@ def test_edge_strength_falls_inside_superpixels_and_rises_between_them(disc, lab
     assert_allclose(changed[inner], 0.1 * plain[inner], rtol=1e-5)
     outline = regions & ~inside & (plain > np.percentile(plain, 95))
     assert changed[outline].mean() > plain[outline].mean()
-
-
-def test_deviation_of_labels_is_that_of_each_superpixel():
-    """The regions are chosen by it."""
-    segments = Superpixels(np.array([[0, 0, 1], [0, 0, 1]]), np.array([4, 2]), np.zeros((2, 2)))
-    disparity = np.array([[0, 1, 5], [0, 1, 5]], np.float32)
-    assert_allclose(label_deviation(disparity, segments), [[0.5, 0.5, 0], [0.5, 0.5, 0]], atol=1e-6)
-
-
-def test_step_between_superpixels_counts_in_full():
-    """Half of it would count, as of any central difference, and a faint outline would not hold."""
-    segments = Superpixels(np.repeat([[0, 0, 0, 1, 1, 1]], 5, axis=0), np.array([15, 15]), np.zeros((2, 2)))
-    image = np.where(segments.labels[..., None] == 1, 0.75, 0.25).astype(np.float32).repeat(3, axis=2)
-    expected = np.zeros((5, 6))
-    expected[:, 2:4] = 3 * 0.5**2
-    assert_allclose(squared_steps(image, segments), expected, rtol=1e-6)
 
 
 def test_photo_consistency_is_the_mean_truncated_difference():
@@ -171,17 +130,3 @@ def test_smoothing_solves_its_energy(disc, labels):
     least = energy(solution)
     assert all(energy(solution + 0.01 * rng.normal(size=solution.shape)) > least for _ in range(5))
     assert energy(labels.disparity) > 1.5 * least
-
-
-def test_fronto_parallel_plane_has_its_disparity():
-    """A textured plane is the easiest there is: within a hundredth of a pixel."""
-    light_field = render("fronto_parallel", size=SIZE, views=5)
-    result = estimate_depth(light_field, "pobr")
-    assert np.abs(result.disparity - light_field.ground_truth)[4:-4, 4:-4].max() < 0.01
-
-
-def test_views_sheared_at_the_true_disparity_cost_least(disc):
-    """The data cost of an unoccluded pixel is zero at its disparity."""
-    views = ShearedViews(disc)
-    out = photo_consistency(views.at(2.0), views.reference, 0.1)
-    assert out[28:36, 28:36].max() < 1e-5

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sepi.extensions.methods.weighted_median import weighted_median
+from sepi.extensions.methods.costs import weighted_median
 
 RANDOM = np.random.default_rng(3)
 VALUES = RANDOM.normal(0, 1, (11, 14)).astype(np.float32)
@@ -34,10 +34,6 @@ def test_each_pixel_is_the_weighted_median_of_its_window(radius: int, sigma: flo
     """
     found = weighted_median(VALUES, GUIDE, radius, sigma, WEIGHT)
     np.testing.assert_array_equal(found, twin(VALUES, GUIDE, radius, sigma, WEIGHT))
-
-
-def test_radius_0_changes_nothing() -> None:
-    np.testing.assert_array_equal(weighted_median(VALUES, GUIDE, 0, 0.1, WEIGHT), VALUES)
 
 
 def test_windows_without_weight_keep_their_value() -> None:

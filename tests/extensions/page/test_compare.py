@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import canvas_pixels, choose, map_pixels, opened, part, place_of, point_at, read_out, settled
-from click.testing import CliRunner, Result
-from error_lines import error_of
+from browser import canvas_pixels, choose, map_pixels, opened, part, point_at, read_out, settled
+from error_lines import call, done, error_of
 
-from sepi.cli.main import main
 from sepi.extensions.page.compare import Comparison, comparison_page
 from sepi.io.hdf5 import write_stage
 from sepi.io.pfm import write_pfm
@@ -49,30 +47,14 @@ def files(tmp_path: Path) -> list[Path]:
     return written(tmp_path)
 
 
-def compare(*words: object) -> Result:
-    return CliRunner().invoke(main, ["compare", *map(str, words)], catch_exceptions=False)
-
-
 @pytest.fixture(scope="module", params=["ground_truth", "no truth"])
 def page(request: pytest.FixtureRequest, browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """The page of two maps, with and without their truth, as the tests before have left it."""
     output = tmp_path_factory.mktemp("page") / "page.html"
     words = written(output.parent)[: 3 if request.param == "ground_truth" else 2]
-    assert compare(*words, "-o", output).exit_code == 0
+    assert call("compare", *words, "-o", output).exit_code == 0
     with opened(browser, output, color_scheme="light") as found:
         yield found
-
-
-def test_the_page_shows_both_maps(page: Any) -> None:
-    """A left of the slider, B right of it, and the slider moves by the keyboard."""
-    assert (page.input_value('[data-part="a"]'), page.input_value('[data-part="b"]')) == ("a", "b")
-    a, b = map_pixels(page, "a"), map_pixels(page, "b")
-    for press, border in ((None, 30), ("End", 60), ("Home", 0)):
-        if press:
-            page.press('[data-part="slider"]', press)
-        shown = canvas_pixels(page, '[data-part="wipe"]')
-        assert (shown == np.concatenate([a[:, :border], b[:, border:]], axis=1)).all()
-    assert (a != b).any(axis=2).mean() > 0.5
 
 
 def test_the_read_out_shows_the_values_of_the_files(page: Any) -> None:
@@ -136,33 +118,13 @@ def test_a_point_cloud_without_a_picture(page: Any) -> None:
     assert (canvas_pixels(page, CLOUD) != before).any()
 
 
-def test_a_click_and_the_grid(page: Any) -> None:
-    """There are no prepared pixels here: a click must do no harm."""
-    page.mouse.click(*place_of(page, '[data-part="wipe"]', 20, 20))
-    settled(page)
-    assert read_out(page)["pixel"] == "x 20, y 20"
-    choose(page, b="b")
-    page.locator('figure[data-key="difference"]').get_by_role("button", name="as A").click()
-    page.wait_for_selector('#viewer[data-shown="difference b"]')
-
-
-def test_the_page_on_a_phone(browser: Any, files: list[Path], tmp_path: Path) -> None:
-    output = tmp_path / ("a_rather_long_name_of_a_page_" * 5 + ".html")
-    assert compare(*files, "-o", output).exit_code == 0
-    with opened(browser, output, 390, 844, is_mobile=True, has_touch=True, color_scheme="dark") as page:
-        assert page.evaluate("[document.documentElement.scrollWidth, innerWidth]") == [390, 390]
-        assert page.evaluate("jumped") < 0.1
-
-
 def test_a_scene_brings_its_view_its_truth_and_its_regions(browser: Any, tmp_path: Path) -> None:
     light_field = render("dots", size=64, views=3)
-    assert light_field.ground_truth is not None
     write_hci(light_field, tmp_path / "scene")
     for number, name in enumerate(("one", "two")):
         write_pfm(tmp_path / f"{name}.pfm", light_field.ground_truth + np.float32(0.04 * number))
     output = tmp_path / "page.html"
-    result = compare(tmp_path / "one.pfm", tmp_path / "two.pfm", tmp_path / "scene", "-o", output)
-    assert result.exit_code == 0, result.output
+    result = done("compare", tmp_path / "one.pfm", tmp_path / "two.pfm", tmp_path / "scene", "-o", output)
     assert "occluded" in result.stdout
     with opened(browser, output) as page:
         choose(page, a="reference_view", b="b/error")
@@ -184,7 +146,7 @@ def test_scores_are_printed_and_on_the_page(files: list[Path], tmp_path: Path) -
     """Those of sepi.evaluate, by both protocols; the better one is marked."""
     ours, other, ground_truth = maps()
     output = tmp_path / "page.html"
-    result = compare(*files, "-o", output)
+    result = call("compare", *files, "-o", output)
     assert result.stdout.rstrip().endswith(f"written: {output}")
     page = output.read_text()
     for values, name in ((ours, "ours.pfm"), (other, "other.pfm")):
@@ -197,26 +159,6 @@ def test_scores_are_printed_and_on_the_page(files: list[Path], tmp_path: Path) -
     assert Comparison(("x", "y"), (ours, other)).scores == {}
     # without ground truth there is nothing to score
     assert "<td" not in comparison_page(Comparison(("x", "y"), (ours, other))).split('class="viewer"')[0]
-
-
-def test_equal_input_gives_equal_bytes(files: list[Path], tmp_path: Path) -> None:
-    for name in ("one.html", "two.html"):
-        compare(*files, "-o", tmp_path / name)
-    assert (tmp_path / "one.html").read_bytes() == (tmp_path / "two.html").read_bytes()
-
-
-def test_equal_names_are_told_apart(tmp_path: Path) -> None:
-    """Two programs' maps often have one name; a map may be held against itself."""
-    ours, other, _ = maps()
-    for folder, values in (("old", ours), ("new", other)):
-        (tmp_path / folder).mkdir()
-        write_pfm(tmp_path / folder / "disparity.pfm", values)
-    output = tmp_path / "page.html"
-    compare(tmp_path / "old" / "disparity.pfm", tmp_path / "new" / "disparity.pfm", "-o", output)
-    assert "<h1>old/disparity.pfm beside new/disparity.pfm</h1>" in output.read_text()
-    same = tmp_path / "old" / "disparity.pfm"
-    compare(same, same, "-o", output)
-    assert "<h1>disparity.pfm (A) beside disparity.pfm (B)</h1>" in output.read_text()
 
 
 def test_names_are_no_markup(browser: Any, tmp_path: Path) -> None:
@@ -246,12 +188,12 @@ def test_maps_without_a_single_known_pixel(browser: Any, tmp_path: Path) -> None
 def test_maps_of_different_sizes_are_refused(files: list[Path], tmp_path: Path) -> None:
     write_pfm(tmp_path / "small.pfm", np.zeros((4, 5), np.float32))
     output = tmp_path / "page.html"
-    line = error_of(compare(files[0], tmp_path / "small.pfm", "-o", output))
+    line = error_of(call("compare", files[0], tmp_path / "small.pfm", "-o", output))
     assert line == f"sepi: {tmp_path / 'small.pfm'}: is (4, 5), but {files[0]} is (40, 60) (height, width)"
-    line = error_of(compare(files[0], files[1], tmp_path / "small.pfm", "-o", output))
+    line = error_of(call("compare", files[0], files[1], tmp_path / "small.pfm", "-o", output))
     assert line.startswith(f"sepi: {tmp_path / 'small.pfm'}: is (4, 5)")
     write_hci(render("dots", size=64, views=2), tmp_path / "scene")
-    line = error_of(compare(files[0], files[1], tmp_path / "scene", "-o", output))
+    line = error_of(call("compare", files[0], files[1], tmp_path / "scene", "-o", output))
     assert "(64, 64)" in line
     assert not output.exists()
 
@@ -262,6 +204,6 @@ def test_maps_of_different_views_are_refused(tmp_path: Path) -> None:
     for name, values, view in (("one", ours, (1, 1)), ("two", other, (0, 1))):
         attributes = {"view_position": view, "grid": (3, 3)}
         write_stage(tmp_path / f"{name}.h5", StageMaps(values, np.ones(SHAPE, np.float32)), attributes)
-    line = error_of(compare(tmp_path / "one.h5", tmp_path / "two.h5", "-o", tmp_path / "page.html"))
+    line = error_of(call("compare", tmp_path / "one.h5", tmp_path / "two.h5", "-o", tmp_path / "page.html"))
     assert "depth of another view" in line
     assert not (tmp_path / "page.html").exists()

@@ -46,29 +46,20 @@ def random_map(kind: str, shape: tuple[int, int] = (23, 31)) -> npt.NDArray[Any]
     random = np.random.default_rng(5)
     y, x = np.indices(shape)
     smooth = np.sin(y / 7) + x / 20
+    if kind == "mask":
+        return random.random(shape) < 0.4
     values = {
-        "smooth": smooth,
         "noise": random.normal(0, 1, shape),
-        "steps": np.where(x > shape[1] // 2, 2.0, -2.0) + 0.01 * y,
         "constant": np.full(shape, -1.234),
-        "zero": np.zeros(shape),
         "unknown": np.full(shape, np.nan),
-        "holes": np.where(random.random(shape) < 0.3, np.nan, smooth),
-        "infinite": np.where(random.random(shape) < 0.1, random.choice([np.inf, -np.inf, np.nan], shape), smooth),
-        "extremes": random.choice([-32.7, 32.7], shape),
+        "holes": np.where(random.random(shape) < 0.1, random.choice([np.inf, -np.inf, np.nan], shape), smooth),
         "wide": random.choice([-5e5, 3.3, 1e6], shape),
         "astronomic": random.choice([-3e38, 0, 3e38], shape),
-        "huge constant": np.full(shape, 1e20),
-        "tiny": random.normal(0, 1e-30, shape),
-        "mask": random.random(shape) < 0.4,
     }
-    return values[kind] if kind == "mask" else values[kind].astype(np.float32)
+    return values[kind].astype(np.float32)
 
 
-KINDS = (
-    "smooth", "noise", "steps", "constant", "zero", "unknown", "holes", "infinite", "extremes", "wide", "astronomic",
-    "huge constant", "tiny", "mask",
-)  # fmt: skip
+KINDS = ("noise", "constant", "unknown", "holes", "wide", "astronomic", "mask")
 
 
 @pytest.mark.parametrize("step", STEPS)
@@ -94,24 +85,6 @@ def test_any_map_comes_out_again(values: npt.NDArray[np.float32], step: float) -
 def test_the_step_grows_only_where_it_must(span: float, step: float) -> None:
     values = np.linspace(-span / 2, span / 2, 60, dtype=np.float64).reshape(6, 10).astype(np.float32)
     assert packed(values, 0.001)["step"] == pytest.approx(step)
-
-
-def test_usual_disparities_are_shown_as_they_are_rounded() -> None:
-    """What the read-out prints with three decimals is what the file's value rounds to."""
-    values = np.random.default_rng(0).uniform(-4, 4, (60, 60)).astype(np.float32)
-    found = unpacked(packed(values, 0.001), *values.shape)
-    assert [f"{value + 0.0:.3f}" for value in found.ravel()] == [
-        f"{float(f'{value:.3f}') + 0.0:.3f}" for value in values.ravel()
-    ]
-
-
-def test_smooth_maps_are_small() -> None:
-    """A plane of real disparities takes a fraction of the two bytes that a pixel would."""
-    y, x = np.indices((128, 128))
-    plane = (0.01 * x - 0.003 * y).astype(np.float32)
-    noisy = plane + np.random.default_rng(0).normal(0, 0.002, plane.shape)
-    for values, step, share in ((plane, 0.001, 0.4), (noisy, 0.001, 0.9), (plane > 0.3, 1, 0.03)):
-        assert len(packed(values, step)["data"]) < share * plane.size
 
 
 def test_the_script_of_the_page_reads_the_same(browser: Any, example: Any) -> None:

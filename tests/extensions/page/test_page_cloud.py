@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import CLOUD, WIPE, canvas_pixels, changed_pixels, opened, part, place_of, read_out, settled, touch
-from page_example import SIZE, Example
+from browser import CLOUD, canvas_pixels, changed_pixels, part, settled
+from page_example import SIZE
 
 
 def cloud_at(page: Any) -> None:
@@ -83,29 +83,17 @@ def test_near_points_hide_far_ones(same_page: Any) -> None:
 
 
 def test_the_point_cloud_turns_by_keyboard_and_mouse(page: Any) -> None:
-    """And the wheel scrolls the page past it, until it was clicked: a reader who scrolls by must not be caught."""
-    cloud_at(page)
-    box = page.locator(CLOUD).bounding_box()
-    page.mouse.move(box["x"] + 50, box["y"] + 50)
-    before = page.evaluate("scrollY")
-    page.mouse.wheel(0, 150)
-    page.wait_for_function("(before) => scrollY !== before", arg=before)
     cloud_at(page)
     page.locator(CLOUD).focus()
     start, before = angles(page), canvas_pixels(page, CLOUD)
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowDown")
     settled(page)
-    turned = canvas_pixels(page, CLOUD)
     assert (angles(page)[0] > start[0], angles(page)[1] > start[1]) == (True, True)
-    assert (turned != before).any()
-    page.keyboard.press("+")
-    settled(page)
-    assert drawn_share(canvas_pixels(page, CLOUD)) > drawn_share(turned)
-    page.keyboard.press("0")
+    assert (canvas_pixels(page, CLOUD) != before).any()
+    page.click('[data-part="cloud-reset"]')
     settled(page)
     assert (canvas_pixels(page, CLOUD) == before).all()
-    start = angles(page)
     box = page.locator(CLOUD).bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
@@ -114,36 +102,5 @@ def test_the_point_cloud_turns_by_keyboard_and_mouse(page: Any) -> None:
     page.mouse.up()
     settled(page)
     assert angles(page) == pytest.approx([start[0] + 0.6, start[1] + 0.2], abs=0.03)
-    assert (canvas_pixels(page, CLOUD) != before).any()
     page.mouse.move(x, y)
     assert angles(page) == pytest.approx([start[0] + 0.6, start[1] + 0.2], abs=0.03), "turns without a button"
-    scrolled = page.evaluate("scrollY")
-    far = canvas_pixels(page, CLOUD)
-    page.mouse.wheel(0, -200)
-    assert drawn_share(changed_pixels(page, CLOUD, far)) > drawn_share(far)
-    assert page.evaluate("scrollY") == scrolled
-    page.click('[data-part="cloud-reset"]')
-    settled(page)
-    assert angles(page) == start
-
-
-def test_the_point_cloud_turns_by_touch(browser: Any, example: Example) -> None:
-    """One finger turns, two zoom; the page stays where it is. So does the slider of the maps move."""
-    with opened(browser, example.page, 390, 844, has_touch=True, is_mobile=True, device_scale_factor=2) as page:
-        touch(page, {0: [place_of(page, WIPE, x, 20) for x in (30, 36, 42, 48)]})
-        settled(page)
-        assert abs(int(page.input_value('[data-part="slider"]')) / 1000 - 48.5 / SIZE) < 0.02
-        assert read_out(page)["pixel"] == "x 48, y 20"
-        cloud_at(page)
-        start, scrolled = angles(page), page.evaluate("scrollY")
-        box = page.locator(CLOUD).bounding_box()
-        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        touch(page, {0: [(x + 15 * step, y) for step in range(5)]})
-        settled(page)
-        assert angles(page) == pytest.approx([start[0] + 0.4, start[1]], abs=0.05)
-        covered = drawn_share(canvas_pixels(page, CLOUD))
-        one, two = ([(x + sign * (30 + 15 * step), y) for step in range(5)] for sign in (-1, 1))
-        touch(page, {0: one, 1: two})
-        settled(page)
-        assert drawn_share(canvas_pixels(page, CLOUD)) > 1.3 * covered
-        assert page.evaluate("scrollY") == scrolled

@@ -41,32 +41,7 @@ def test_a_pixel_that_the_configuration_asks_for_comes_first(page: Any, example:
     assert "90 % interval of best{:.3f} … {:.3f}".format(*interval) in facts
     assert page.locator('[data-part="curves"] rect.interval').count() == 1
     ground_truth = example.light_field(COTTON).ground_truth
-    assert ground_truth is not None
     assert f"ground truth{ground_truth[y, x]:.3f}" in facts
-
-
-def test_buttons_choose_prepared_pixels(same_page: Any, example: Example) -> None:
-    """Each with its curves, its SEPIs, and the views that it kept."""
-    probes = cotton_probes(example)
-    buttons = same_page.locator('[data-part="pixels"] button')
-    assert buttons.count() == len(probes)
-    for number, probe in enumerate(probes):
-        buttons.nth(number).click()
-        assert same_page.get_attribute("#pixel", "data-pixel") == f"{probe['x']} {probe['y']}"
-        pressed = [button.get_attribute("aria-pressed") for button in buttons.all()]
-        assert pressed == ["true" if other == number else "false" for other in range(len(probes))]
-        kept = same_page.locator('[data-part="sepis"] svg rect').evaluate_all(
-            "(all) => all.map((r) => r.className.baseVal)"
-        )
-        assert "".join("1" if name == "kept" else "0" for name in kept) == probe["kept"]
-        curves = same_page.locator('[data-part="curves"] polyline')
-        assert curves.count() == len(probe["costs"])
-    pictures = same_page.locator('[data-part="sepis"] img')
-    pictures.first.scroll_into_view_if_needed()
-    sizes = pictures.evaluate_all(
-        "async (all) => Promise.all(all.map(async (i) => (await i.decode(), [i.naturalWidth, i.naturalHeight])))"
-    )
-    assert sizes == [[49, 25]] * len(probes[-1]["sepi"]) + [[5, 5]]
 
 
 def test_the_curve_has_its_minimum_where_the_text_says(page: Any, example: Example) -> None:

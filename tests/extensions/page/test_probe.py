@@ -1,32 +1,17 @@
 """Single pixels under the glass: the curves are the sweep's, SEPIs show straight lines where the depth is right."""
 
-import base64
-import json
-from dataclasses import replace
-from pathlib import Path
-
-import cv2
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
 
-from bench.noisy import with_noise
 from sepi.errors import SepiError
-from sepi.extensions.page import scene
 from sepi.extensions.page.curves import cost_curves
 from sepi.extensions.page.pixels import APART, BORDER, InterestingPixel, interesting_pixels
 from sepi.extensions.page.probe import GREY, HALF_WIDTH, probe, sepi_picture, to_json
-from sepi.extensions.page.probe_figure import write_probes
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching.denoising import sure_noise
-from sepi.matching.exposure import equally_bright
 from sepi.matching.plane_sweep import SweepParameters, sweep
-from sepi.matching.stitched_epi import stitched_epi
-from sepi.matching.view_subsets import half_planes, halves_and_quarters
+from sepi.matching.view_subsets import halves_and_quarters
 from sepi.pipeline import estimate_depth
-from sepi.report.panels import SceneResults
-from sepi.report.pictures import reference_picture
-from sepi.report.plan import MAIN_VARIANT
 from sepi.scenes import render
 from sepi.stage import StageMaps
 
@@ -58,11 +43,7 @@ def occluder():
     ("settings", "radius"),
     [
         ({}, 2),
-        ({"dtype": np.uint16}, 2),
         ({"dtype": np.float32, "channels": 1}, 2),
-        ({"channels": 1}, 0),
-        ({"present": missing_views()}, 1),
-        ({"view": (0, 3)}, 1),
         ({"view": (3, 1), "present": missing_views()}, 2),
         ({"grid": (1, 5)}, 2),
         (standing("closer rows", (5, 4)), 2),
@@ -88,44 +69,6 @@ def test_curves_are_what_the_sweep_minimises(settings, radius):
             disparity, cost = curves.minimum(curves.names[n])
             assert disparity == pytest.approx(result.disparity[n, y, x], abs=5e-3)
             assert cost == pytest.approx(result.cost[n, y, x], abs=2e-5)
-
-
-def test_curves_of_a_scene_are_those_of_the_default_sweep():
-    """Noise and colour scales of real use: a curve off by the noise would have its minimum elsewhere."""
-    parameters = SweepParameters(num_disparities=61)
-    corrected = with_noise(render("pyramids", size=64, views=5), 8)
-    assert sure_noise(corrected) is not None
-    for light_field in (render("dots", size=64, views=5), corrected):
-        result = sweep(light_field, parameters)
-        for y, x in [(0, 0), (20, 31), (63, 40), (33, 33)]:
-            disparity, cost = cost_curves(light_field, y, x, parameters).minimum()
-            assert cost == pytest.approx(result.cost[0, y, x], abs=2e-5)
-            assert disparity == pytest.approx(result.disparity[0, y, x], abs=5e-3)
-
-
-def test_curves_of_a_scene_are_of_views_as_bright_as_the_stages_had_them(monkeypatch):
-    """Curves of pictures of unlike exposure would explain a depth that was found in others."""
-    light_field = render("pyramids", size=64, views=5)
-    views = light_field.views.astype(np.float32) / 255
-    views[::2, 1::2] *= 0.7
-    light_field = replace(light_field, views=views)
-    maps = estimate_depth(light_field, "no_occlusion_no_textureless")
-    parameters = SweepParameters(num_disparities=41)
-    monkeypatch.setattr(scene, "sweep_parameters", lambda file: parameters)
-    results = SceneResults(light_field, {MAIN_VARIANT: {"optimize": maps}}, {}, [])
-    found = scene.scene_probes(results, Path("unread"), [InterestingPixel(20, 31, "a pixel")])[0]
-    result = sweep(equally_bright(light_field), parameters)
-    assert found.curves.costs[0].min() == pytest.approx(result.cost[0, 20, 31], abs=2e-5)
-    assert cost_curves(light_field, 20, 31, parameters).costs[0].min() > 2 * found.curves.costs[0].min()
-
-
-def test_a_pixel_outside_the_view_is_refused():
-    """A negative row from a config would silently count from the bottom."""
-    for y, x in [(-1, 0), (0, 17), (14, 0)]:
-        with pytest.raises(SepiError, match=r"lies outside the reference view; rows go from 0 to 13"):
-            cost_curves(random_light_field(), y, x, SweepParameters())
-        with pytest.raises(SepiError, match="lies outside the reference view"):
-            sepi_picture(random_light_field(), y, x, 0.5)
 
 
 def plane(disparity, grid=(5, 5), size=60, **known):
@@ -158,15 +101,6 @@ def test_the_right_candidate_gives_upright_stripes(view, geometry):
     assert raggedness(near) > 4 * raggedness(right)
     assert raggedness(wrong) > raggedness(near)
     assert right.pixels.shape == (25, 2 * HALF_WIDTH + 1, 3)
-
-
-def test_the_middle_column_is_the_line_of_the_stitched_epi():
-    """A picture of other samples than those of Eq. 1-2 would mislead."""
-    light_field = plane(0.25)
-    samples, valid = stitched_epi(light_field, 30, 0.5).along_line(28)
-    assert valid.all()
-    expected = np.rint(255 * samples[:, 0]).astype(int)
-    np.testing.assert_array_equal(sepi_picture(light_field, 30, 28, 0.5).pixels[:, HALF_WIDTH, 0], expected)
 
 
 def test_grey_where_nothing_is_seen():
@@ -225,48 +159,6 @@ def test_probe_tells_what_the_maps_say():
     assert "ground_truth" not in other.pictures
 
 
-def test_sides_of_another_occlusion_stage_are_refused():
-    """Wang's half planes are numbered otherwise; their names would be wrong, or an index out of range."""
-    light_field = plane(0.5)
-    maps = made_maps(light_field, view_subset=np.full((60, 60), 3, np.uint8))
-    maps = replace(maps, subset_names=half_planes(light_field, 8).names)
-    with pytest.raises(SepiError, match=r"half-plane 0.*expected those of half_sepi, full, left"):
-        probe(light_field, InterestingPixel(20, 30, ""), maps=maps, parameters=SweepParameters(num_disparities=5))
-
-
-def test_json_holds_the_curves_and_pictures(occluder):
-    """The page shows nothing but this; 14 kB a pixel, of such fine texture, keep ten scenes in one page."""
-    light_field, maps = occluder
-    found = probe(light_field, InterestingPixel(40, 50, ""), maps=maps, best=maps, parameters=SweepParameters())
-    text = json.dumps(to_json(found), allow_nan=False)
-    assert len(text) <= 14_000
-    data = json.loads(text)
-    assert list(data["costs"]) == list(found.curves.names)
-    for name, cost in zip(found.curves.names, found.curves.costs, strict=True):
-        decoded = np.frombuffer(base64.b64decode(data["costs"][name]), "<u2") / 65535
-        np.testing.assert_allclose(decoded, cost, atol=1e-5)
-    np.testing.assert_allclose(data["range"], found.curves.disparities[[0, -1]], atol=1e-4)
-    assert data["kept"] == "".join("01"[int(view)] for view in found.kept.ravel())
-    assert set(data["sepi"]) == {"minimum", "chosen", "wrong", "ground_truth"}
-    for name, picture in found.pictures.items():
-        assert data["sepi"][name]["disparity"] == pytest.approx(picture.disparity, abs=1e-4)
-        shown = decoded_picture(data["sepi"][name]["src"], "image/webp")
-        other = "chosen" if name == "wrong" else "wrong"
-        own, others = (np.abs(shown.astype(int) - found.stretched[one]).mean() for one in (name, other))
-        assert own < min(12, others / 3)
-    np.testing.assert_array_equal(decoded_picture(data["patch"], "image/png"), found.patch)
-    np.testing.assert_array_equal(found.patch.reshape(-1, 3), found.stretched["chosen"][:, HALF_WIDTH])
-    assert text == json.dumps(
-        to_json(probe(light_field, InterestingPixel(40, 50, ""), maps=maps, best=maps, parameters=SweepParameters()))
-    )
-
-
-def decoded_picture(uri, kind):
-    head, _, body = uri.partition(",")
-    assert head == f"data:{kind};base64"
-    return cv2.imdecode(np.frombuffer(base64.b64decode(body), np.uint8), cv2.IMREAD_COLOR)[:, :, ::-1]
-
-
 def test_interesting_pixels_show_each_kind(occluder):
     """Pixels on top of each other, or none of a kind that the scene has, would leave the reader without an example."""
     light_field, maps = occluder
@@ -317,48 +209,3 @@ def test_an_occluded_pixel_is_one_beside_its_occluder():
     (found,) = [pixel for pixel in interesting_pixels(light_field, maps, None) if "occluded" in pixel.label]
     assert found.label == "occluded, left half kept"
     assert 22 <= found.x < 28
-
-
-@pytest.mark.parametrize("shape", [(64, 64), (20, 300), (9, 9), (2, 2)])
-def test_interesting_pixels_of_plain_and_small_pictures(shape):
-    """Nothing to choose by, or no room: the report must still come."""
-    light_field = LightField(np.full((3, 3, *shape, 3), 90, np.uint8), "plain")
-    flat = made_maps(light_field, textureless=np.ones(shape, bool))
-    for maps in (made_maps(light_field), flat):
-        pixels = interesting_pixels(light_field, maps, None)
-        assert 1 <= len(pixels) <= 8
-        if min(shape) > 2 * BORDER:
-            check_places(pixels, shape)
-
-
-def test_figure_is_whole(occluder, tmp_path):
-    """As a picture and for a paper, with a row for each pixel."""
-    light_field, maps = occluder
-    parameters = SweepParameters(num_disparities=31)
-    pixels = interesting_pixels(light_field, maps, light_field.ground_truth)[:2]
-    probes = [probe(light_field, pixel, maps=maps, parameters=parameters) for pixel in pixels]
-    view = reference_picture(light_field)
-    write_probes(tmp_path / "first/probes.v1", probes, view)
-    assert sorted(path.name for path in (tmp_path / "first").iterdir()) == ["probes.v1.pdf", "probes.v1.png"]
-    for name in ("probes.v1.pdf", "probes.v1.png"):
-        assert b"Matplotlib" not in (tmp_path / "first" / name).read_bytes()
-    picture = cv2.imread(str(tmp_path / "first" / "probes.v1.png"))
-    taller = tmp_path / "more"
-    write_probes(taller, [*probes, probes[0]], view)
-    assert cv2.imread(f"{taller}.png").shape[0] > picture.shape[0]
-    with pytest.raises(SepiError, match="at least one"):
-        write_probes(tmp_path / "none", [], view)
-
-
-def test_figure_of_a_grey_picture_without_views_around(tmp_path):
-    """One row of views, missing views, a flat picture: nothing to stretch, and a side that holds a part of the rows."""
-    present = np.array([[False, True, True]])
-    light_field = LightField(
-        np.full((1, 3, 9, 9, 1), 7, np.uint8), "flat", present=present, disparity_range=DisparityRange(-20, 20, "given")
-    )
-    maps = made_maps(light_field, view_subset=np.full((9, 9), 5, np.uint8))
-    found = probe(light_field, InterestingPixel(0, 8, ""), maps=maps, parameters=SweepParameters(num_disparities=5))
-    assert found.kept_subset == "left-up"
-    np.testing.assert_array_equal(found.kept, [[False, True, False]])
-    write_probes(tmp_path / "flat", [found], reference_picture(light_field))
-    assert (tmp_path / "flat.png").stat().st_size > 0

@@ -1,7 +1,6 @@
 """Rendered scenes in the workflow: what the configuration names, which jobs that makes, how their files are read."""
 
 import importlib.util
-import json
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -15,14 +14,10 @@ from workflow_copy import REPOSITORY, TINY, Workflow
 from sepi import ingest, truth
 from sepi.errors import SepiError
 from sepi.extensions.rendered.catalogue import RENDERED
-from sepi.extensions.rendered.dataset import Dataset
 from sepi.extensions.rendered.exposure import read_scene
-from sepi.extensions.rendered.options import Exposure, RenderOptions
 from sepi.io.hdf5 import read_light_field
 from sepi.io.truth import read_with_truth
-from sepi.report.plan import Plan
 from sepi.scoring.scores import region_masks, score_regions
-from sepi.variants import VARIANTS, needing_files
 from sepi.workflow.code_digest import imported_modules, ingest_modules
 from sepi.workflow.config import load_settings
 from sepi.workflow.rendered_scenes import RenderedScene, rendered_scene
@@ -100,7 +95,6 @@ def test_a_render_becomes_a_light_field_and_apart_from_it_its_truth(tmp_path: Pa
     alone, whole = read_light_field(field), read_with_truth(field, apart)
     assert (alone.name, alone.ground_truth, alone.masks) == ("sticks_high_2", None, {})
     np.testing.assert_array_equal(alone.views, read_scene(file, "high", 2).views)
-    assert whole.ground_truth is not None
     scores = score_regions(whole.ground_truth, whole.ground_truth, region_masks(whole))["paper"]
     assert list(scores)[:4] == ["all", "occluded", "textureless", "discontinuities"]
     assert scores["glossy"]["pixels"] == 16 * 64
@@ -121,23 +115,3 @@ def test_a_scene_is_rendered_again_for_the_renderer_and_itself_alone() -> None:
         "sepi.process.command",
     }
     assert not any("rendered" in name for name in imported_modules(*ingest_modules("sepi.scenes")))
-
-
-def test_chosen_variants_are_those_and_the_papers() -> None:
-    plan = Plan(Path(), {"builtin": ["dots"]}, {name: variant.labels for name, variant in VARIANTS.items()})
-    whole = Dataset(variants="all").report(plan, ["sticks"])
-    assert set(whole.variants) == set(VARIANTS) - needing_files()
-    assert list(Dataset(variants=["best"]).report(plan, ["sticks"]).variants) == ["best", "paper"]
-    assert list(Dataset().report(plan, ["sticks"]).variants) == list(plan.comparison().variants)
-
-
-def test_the_page_lists_scenes_split_and_options_as_the_code_has_them() -> None:
-    """A scene that the page calls free for choosing, and the command refuses, would be no split."""
-    page = (REPOSITORY / "docs/reproduce/rendered.md").read_text(encoding="utf-8")
-    for name, entry in RENDERED.items():
-        split = "choosing" if entry.for_choosing else "held out"
-        assert f"\n| `{name}` | {entry.description} | {entry.tests} | {split} |\n" in page
-    for name, field in {**RenderOptions.model_fields, **Exposure.model_fields}.items():
-        meaning = str(field.description).replace("|", r"\|")
-        default = json.dumps(field.default).strip('"')
-        assert f"\n| `{name}` | {default} | {meaning} |\n" in page

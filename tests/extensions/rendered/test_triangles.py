@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from sepi.extensions.rendered.sampling import _CAMERA, _tiles
 from sepi.kernels import triangles as kernels
 
 NEAR = 0.1
@@ -56,21 +55,3 @@ def test_no_ray_slips_through_a_side() -> None:
     triangles, frame = np.array([np.zeros((3, 3)), *fan]), np.array([20.0, 16.5, 16.5])
     met = first_met(triangles, np.zeros(3), np.eye(3), frame, 33)
     assert (met > 0).all()
-
-
-def test_tiles_hold_what_is_asked_for_and_cost_least() -> None:
-    """A tile that is left out has the grain of few paths; one asked twice costs twice."""
-    rng = np.random.default_rng(0)
-    # sides that are no multiple of the widest tile, and less than it
-    for shape, part, paths in (((64, 128), 0.3, 12), ((37, 45), 0.9, 64), ((5, 3), 0.5, 12), ((16, 16), 1.0, 12)):
-        asked = rng.random(shape) < part
-        held, spent = np.zeros(shape, int), 0
-        for tiles in _tiles(asked, paths):
-            np.add.at(held, (tiles[..., 0], tiles[..., 1]), 1)
-            spent += len(tiles) * _CAMERA + tiles[..., 0].size * paths
-        assert held[asked].all()
-        assert min(shape) % 16 or held.max() == 1
-        # cheaper than all alone or, where all is asked for, one in all
-        assert spent <= asked.sum() * (_CAMERA + paths)
-    assert spent == _CAMERA + 256 * paths
-    assert _tiles(np.zeros((8, 8), bool), 12) == []

@@ -5,28 +5,23 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-import cv2
 import h5py
 import numpy as np
 import numpy.typing as npt
 import pytest
-from click.testing import CliRunner
-from error_lines import error_of
+from error_lines import done
 from geometries import standing
 from several_threads import SEVERAL
 
 import sepi
 from bench.all_views import disagreement, moved_pixels
 from sepi.camera import Camera
-from sepi.cli.main import main
-from sepi.errors import SepiError
-from sepi.extensions.views.all_views import AllViews, Sources, ViewMaps, _with_doubt, anchor_views, estimate_all_views
+from sepi.extensions.views.all_views import AllViews, ViewMaps, estimate_all_views
 from sepi.io.all_views import write_all_views
 from sepi.io.hdf5 import read_attributes, write_light_field
 from sepi.io.pfm import read_pfm, write_pfm
 from sepi.io.provenance import result_attributes
 from sepi.io.result_folder import write_result
-from sepi.kernels import all_views as kernels
 from sepi.kernels import carried_map as carried_map_kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.carried_map import TOLERANCE, carried_map, corner_disparities
@@ -35,7 +30,6 @@ from sepi.stage import StageMaps
 
 pytestmark = pytest.mark.slow
 
-FloatArray = npt.NDArray[np.float64]
 
 SIZE, VIEWS = 96, 5
 LAYERS = "stripes"
@@ -145,12 +139,6 @@ def test_carried_surfaces_are_what_plain_numpy_draws(v: float, u: float) -> None
     assert np.abs(column - nearest[seen] * u - x).max() <= 0.51
 
 
-def test_a_map_carried_nowhere_stays_as_it_is() -> None:
-    """Otherwise the maps would change where nothing is to be done."""
-    disparity = bumpy_map()
-    np.testing.assert_allclose(carried_map(disparity, (0, 0)), disparity, atol=1e-6)
-
-
 @pytest.mark.parametrize("baseline", [(0.0, 4.0), (-3.0, 0.5), (2.6, -3.7)])
 def test_a_slanted_plane_is_carried_exactly(baseline: tuple[float, float]) -> None:
     """Otherwise slanted surfaces would get holes, or stairs, in the other views."""
@@ -163,45 +151,6 @@ def test_a_slanted_plane_is_carried_exactly(baseline: tuple[float, float]) -> No
     beyond = np.maximum(-0.5 - at, at - (SIZE - 0.5)).max(axis=0)
     assert seen[beyond < -0.01].all()
     assert not seen[beyond > 0.01].any()
-
-
-def maps_of_views(maps: FloatMap, baselines: FloatArray, views: FloatArray) -> tuple[FloatMap, npt.NDArray[np.bool_]]:
-    """Disparity, and where it is extended, of views by maps of the views at the baselines."""
-    nothing, corners = np.empty((0, *maps.shape[1:], 3), np.float32), np.stack([corner_disparities(m) for m in maps])
-    disparity, confidence = np.empty((2, len(views), *maps.shape[1:]), np.float32)
-    extended, bars = np.empty(disparity.shape, bool), np.empty((len(views), 0, 0, 3), np.float32)
-    sources = Sources(maps, np.ones_like(maps), nothing, corners, baselines)
-    kernels.maps_of_views(sources, views, disparity, confidence, bars, extended)
-    return disparity, extended
-
-
-@pytest.mark.parametrize("axis", [1, 2])
-def test_mirrored_maps_give_mirrored_views(axis: int) -> None:
-    """Surfaces that land on whole pixels, and gaps along any direction: nothing prefers the right, or what is below."""
-    maps = np.random.default_rng(0).integers(0, 3, (3, 8, 9)).repeat(4, 1).repeat(4, 2).astype(np.float32)
-    baselines = np.array([(0, 0), (-2, -2), (2, 2)], float)
-    views = np.array([(0, 1), (1, 0), (-1, 2), (1, 1), (2, -1)], float)
-    turned = np.where(np.arange(1, 3) == axis, -1.0, 1.0)
-    plain = maps_of_views(maps, baselines, views)
-    mirrored = maps_of_views(np.ascontiguousarray(np.flip(maps, axis)), baselines * turned, views * turned)
-    assert plain[1].any()
-    for one, other in zip(plain, mirrored, strict=True):
-        np.testing.assert_array_equal(np.flip(other, axis), one)
-
-
-def test_gaps_open_and_hidden_surfaces_stay_hidden() -> None:
-    """Otherwise the background would show through what is before it."""
-    truth = truth_of(layers())
-    found = carried_map(truth[2, 2], (0, 2))
-    seen = np.isfinite(found)
-    # outlines are known to a pixel
-    around = np.ones((3, 3), np.uint8)
-    plain = seen & (cv2.dilate(truth[2, 4], around) - cv2.erode(truth[2, 4], around) < 0.3)
-    assert plain.mean() > 0.5
-    assert np.abs(found - truth[2, 4])[plain].mean() < 0.01
-    assert 0.05 < (~seen).mean() < 0.25
-    # a foreground that moves uncovers background, and the borders what comes in
-    assert (truth[2, 4][:, 4:-4] < 0)[~seen[:, 4:-4]].mean() > 0.9
 
 
 # --- all views --------------------------------------------------------------------------------------------------------
@@ -282,28 +231,6 @@ def test_what_no_map_shows_may_be_anywhere(from_the_reference_view: AllViews) ->
     assert (found.high - found.low)[~found.extended].max() < 0.76
 
 
-def test_a_pixel_that_changes_sides_may_be_of_either() -> None:
-    maps = barred(np.asarray(layers().ground_truth, np.float32))
-    before = ViewMaps((0, 0), maps.disparity, maps.confidence, np.zeros((SIZE, SIZE), bool), **maps.extra)
-    decided = np.roll(maps.disparity, 1, axis=1)
-    after = _with_doubt(layers(), before, decided)
-    np.testing.assert_array_equal(after.disparity, decided)
-    for disparity in (maps.disparity, decided):
-        assert (after.low <= disparity).all()
-        assert (disparity <= after.high).all()
-    moved = decided != maps.disparity
-    assert moved.any()
-    assert (after.sigma >= np.abs(decided - maps.disparity) / 2).all()
-    np.testing.assert_array_equal(after.sigma[~moved], maps.extra["sigma"][~moved])
-
-
-def test_maps_of_another_shape_are_refused() -> None:
-    """They would be of another light field."""
-    flat = np.zeros((8, 8), np.float32)
-    with pytest.raises(SepiError, match=r"maps must have the views' shape \(96, 96\), got \(8, 8\)"):
-        estimate_all_views(layers(), StageMaps(flat, flat))
-
-
 @pytest.mark.parametrize("geometry", ["closer rows", "off the grid", "one row"])
 def test_any_arrangement_of_views(geometry: str) -> None:
     """Views that stand otherwise, in grey, seen from a corner, or missing, must not move surfaces to elsewhere."""
@@ -327,15 +254,6 @@ def test_any_arrangement_of_views(geometry: str) -> None:
     assert np.median(np.abs(found.disparity - truth)[present]) < 0.03
 
 
-def test_anchors_see_round_things_from_all_sides() -> None:
-    """Without them nobody sees what the reference view does not."""
-    light_field = layers()
-    assert anchor_views(light_field) == [(2, 2), (0, 0), (0, 4), (4, 0), (4, 4)]
-    assert anchor_views(light_field.seen_from((0, 0))) == [(0, 0), (0, 4), (4, 0), (4, 4)]
-    row = replace(light_field, views=light_field.views[:1], present=None)
-    assert anchor_views(row) == [(0, 2), (0, 0), (0, 4)]
-
-
 # --- the command ------------------------------------------------------------------------------------------------------
 
 
@@ -351,9 +269,8 @@ def test_the_command_writes_a_map_of_every_view(tmp_path: Path) -> None:
     for folder, number, more in (("all", 1, ["--all-views"]), ("again", SEVERAL, ["--all-views"]), ("again", 1, [])):
         if not more:
             again = (tmp_path / "again" / "all_views.h5").read_bytes()
-        done = CliRunner().invoke(main, [*words, str(tmp_path / folder), "--threads", str(number), *more])
-        assert done.exit_code == 0, done.output
-        assert ("all_views.h5" in done.output) == bool(more)
+        called = done(*words, tmp_path / folder, "--threads", number, *more)
+        assert ("all_views.h5" in called.output) == bool(more)
     plain = {path.name: path.read_bytes() for path in (tmp_path / "again").iterdir()}
     both = {path.name: path.read_bytes() for path in (tmp_path / "all").iterdir()}
     assert both.pop("all_views.h5") == again
@@ -365,15 +282,6 @@ def test_the_command_writes_a_map_of_every_view(tmp_path: Path) -> None:
     assert other.pop("files") == "all_views.h5 " + one.pop("files")
     assert list(map(str, other.values())) == list(map(str, one.values()))
     with h5py.File(tmp_path / "all" / "all_views.h5") as file:
-        assert {name: file[name].shape for name in file} == {
-            "disparity": (3, 3, 64, 64),
-            "confidence": (3, 3, 64, 64),
-            "extended": (3, 3, 64, 64),
-            **dict.fromkeys(("sigma", "low", "high"), (3, 3, 64, 64)),
-            "present": (3, 3),
-            "baselines": (3, 3, 2),
-            "picture": (3, 3, 64, 64, 3),
-        }
         for name in ("disparity", "sigma", "low", "high"):
             assert file[name].attrs["units"] == "pixels per view step"
         assert file.attrs["variant"] == "fast"
@@ -389,26 +297,6 @@ def test_the_command_writes_a_map_of_every_view(tmp_path: Path) -> None:
             assert np.median(np.abs(file["disparity"][t, s] - truth)) < 0.03
 
 
-def test_all_views_are_made_as_the_command_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Within the same memory and with the same parameters as the centre view, or neither means anything."""
-    scene = tmp_path / "pyramids"
-    write_hci(render("pyramids", size=64, views=2), scene)
-    made = []
-
-    def estimate(light_field: LightField, *arguments: object) -> StageMaps:
-        made.append(arguments)
-        return sepi.estimate_depth(light_field, "no_occlusion_no_textureless")
-
-    monkeypatch.setattr("sepi.extensions.views.all_views.estimate_depth", estimate)
-    words = f"depth {scene} -o {tmp_path}/maps --all-views --memory 4000 --variant no_occlusion_no_textureless"
-    done = CliRunner().invoke(main, [*words.split(), "--threads", "1", "--set", "initial.sepi.num_disparities=21"])
-    assert done.exit_code == 0, done.output
-    assert len(made) == 3
-    for _, parameters, _, memory in made:
-        assert parameters == {"initial": {"num_disparities": 21}}
-        assert memory == 4000 * 2**20
-
-
 # --- what is made of them ---------------------------------------------------------------------------------------------
 
 CAMERA = Camera(scale=30.0, offset=6.0, focal_px=90.0)
@@ -422,11 +310,10 @@ def small() -> tuple[LightField, FloatMap]:
 
 
 @pytest.fixture
-def exact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FloatMap:
+def exact(here: Path) -> FloatMap:
     """A light field ``scene.h5``, ``maps`` with the truth of all its views, and ``corner``, that of view
     2,0 alone, in the current folder; the truth.
     """
-    monkeypatch.chdir(tmp_path)
     scene, truth = small()
     sure = np.full(scene.shape, 0.9, np.float32)
     nothing = np.zeros(scene.shape, bool)
@@ -446,9 +333,7 @@ def exact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FloatMap:
 
 
 def call(*words: str) -> str:
-    done = CliRunner().invoke(main, words)
-    assert done.exit_code == 0, done.output
-    return done.stdout
+    return done(*words).stdout
 
 
 def test_a_view_of_all_makes_what_a_result_of_that_view_makes(exact: FloatMap) -> None:
@@ -496,17 +381,3 @@ def test_poses_have_the_depth_of_every_view(exact: FloatMap, kind: str) -> None:
             sigma = CAMERA.depth_sigma(exact[t, s], barred(exact[t, s]).extra["sigma"])
             sigma[5, 6] = 0
             np.testing.assert_allclose(np.load(f"out/depth_sigmas/{name}.npy") / 1000, sigma, rtol=1e-6)
-
-
-@pytest.mark.usefixtures("exact")
-def test_maps_of_all_views_belong_to_their_light_field() -> None:
-    """Another one's pictures with these depths would look right."""
-    for words, complaint in {
-        "points maps --view 0,2": "all_views.h5: has no view 0,2; there are 8 of 3x3",
-        "points maps --view 3,0": "all_views.h5: has no view 3,0",
-        "convert corner x.pfm --view 0,0": "corner: holds the map of view 2,0 alone",
-        "poses other.h5 maps/all_views.h5": "depth of another light field",
-        "evaluate maps/all_views.h5 other.h5": "depth of another light field",
-        "evaluate maps/all_views.h5 corner/result.h5": "depth of another view",
-    }.items():
-        assert complaint in error_of(CliRunner().invoke(main, words.split()))

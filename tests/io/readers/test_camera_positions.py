@@ -1,7 +1,6 @@
 """Where cameras stood: a position that is off by a tenth of a step is off by pixels where views are far apart."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from sepi.io.readers.arrays import rearrange
 from sepi.io.readers.camera_positions import off_grid, positions_from_cameras, with_row_spacing
 from sepi.io.readers.options import ORDERS, ReadOptions
 from sepi.lightfield import LightField
-from sepi.reading import read_light_field
 
 RNG = np.random.default_rng(3)
 T, S = 4, 5
@@ -37,12 +35,6 @@ def test_positions_run_along_the_grid_in_steps_of_columns(down: float, across: f
     # the step is fitted, so that it differs by what the strays make of it
     np.testing.assert_allclose(positions - positions[0, 0], expected - expected[0, 0], rtol=0.05, atol=0.02)
     assert 0.05 < off_grid(positions, row_spacing, EVERY) < 0.25
-
-
-def test_a_turned_gantry_keeps_its_turn() -> None:
-    """The pictures do not turn with it: a step along a row moves the camera down as well."""
-    positions, _, _ = positions_from_cameras(cameras(10, 10, 0.1, 0 * STRAYS), EVERY)
-    np.testing.assert_allclose(positions[0, 1] - positions[0, 0], [-np.tan(0.1), 1], atol=1e-9)
 
 
 def test_missing_views_count_nothing_and_get_the_place_of_the_grid() -> None:
@@ -87,12 +79,6 @@ def test_numbers_that_are_no_grid_are_no_positions(case: str) -> None:
     assert positions_from_cameras(REFUSED[case], EVERY) is None
 
 
-def test_too_few_cameras_fit_everything() -> None:
-    assert positions_from_cameras(RNG.normal(size=(2, 2, 2)), np.ones((2, 2), bool)) is None
-    diagonal = np.eye(4, dtype=bool)
-    assert positions_from_cameras(np.indices((4, 4)).transpose(1, 2, 0) * 1.0, diagonal) is None
-
-
 VIEWS = RNG.integers(1, 255, (T, S, 6, 8, 1), np.uint8)
 
 
@@ -117,13 +103,6 @@ def test_every_view_stays_where_it_was_taken_in_every_order(order: str, central:
             moved = before[view] - reference
             distance = np.abs(moved[::-1] if "transpose" in order else moved)
             np.testing.assert_allclose(np.abs(place) * step, distance, atol=1e-9)
-
-
-@pytest.mark.parametrize("order", ["as-given", "transpose"])
-def test_the_row_spacing_that_is_given_is_that_of_the_final_grid(tmp_path: Path, order: str) -> None:
-    np.save(tmp_path / "a.npy", RNG.integers(1, 255, (3, 4, 16, 18, 3), np.uint8))
-    options = ReadOptions(row_spacing=0.4, order=order)
-    assert read_light_field(tmp_path / "a.npy", options=options, check_order=False).row_spacing == 0.4
 
 
 def test_the_row_spacing_that_is_given_stretches_known_positions() -> None:

@@ -52,15 +52,11 @@ def test_the_middle_views_are_read_pixel_for_pixel(tmp_path: Path, name: str) ->
 
 
 READ: dict[str, tuple[tuple[int, int], ReadOptions, Callable[[np.ndarray], np.ndarray]]] = {
-    "13x13": ((14, 14), ReadOptions(central=13), lambda views: views[1:14, 1:14]),
     "3x3": ((14, 14), ReadOptions(central=3), lambda views: views[6:9, 6:9]),
     "15 pixels under a lenslet": ((15, 15), ReadOptions(grid=(15, 15)), lambda views: views[3:12, 3:12]),
-    "15x15 all": ((15, 15), ReadOptions(grid=(15, 15), central=15), lambda views: views),
     "a small grid": ((4, 5), ReadOptions(grid=(4, 5)), lambda views: views[1:4, 1:4]),
-    "a small odd grid": ((3, 3), ReadOptions(grid=(3, 3)), lambda views: views),
     "a row": ((1, 5), ReadOptions(grid=(1, 5)), lambda views: views),
     "flipped": ((14, 14), ReadOptions(order="flip-rows", central=3), lambda views: views[6:9, 6:9][::-1]),
-    "transposed": ((14, 14), ReadOptions(order="transpose", central=3), lambda views: views[6:9, 6:9].swapaxes(0, 1)),
 }
 
 
@@ -98,20 +94,10 @@ def test_dark_views_are_named_with_the_flag_that_leaves_them_out(tmp_path: Path)
     assert len(lighter.notes) == 1
 
 
-def test_any_picture_is_read_when_said_to_be_one(tmp_path: Path) -> None:
-    views = stack((14, 14))
-    path = put(tmp_path / "plain.bmp", lenslets(views))
-    with pytest.raises(SepiError, match="--format mosaic or eslf"):
-        format_of(path)
-    np.testing.assert_array_equal(read(path, ReadOptions(), "eslf").views, views[3:12, 3:12])
-
-
 BAD: dict[str, tuple[tuple[int, int], ReadOptions, str]] = {
     "too low": ((27, 100), ReadOptions(), "views of 7x1 pixels"),
-    "smaller than a lenslet": ((5, 5), ReadOptions(), "views of 0x0 pixels"),
     "grid too large": ((100, 100), ReadOptions(grid=(60, 60)), "views of 1x1 pixels"),
     "huge grid": ((100, 100), ReadOptions(grid=(999_999, 999_999)), "a grid of 2 to 10000 views"),
-    "one view": ((100, 100), ReadOptions(grid=(1, 1)), "a grid of 2 to 10000 views"),
     "even middle": ((100, 100), ReadOptions(central=14), "odd number"),
 }
 

@@ -99,15 +99,6 @@ def test_a_crop_is_told_and_keeps_the_camera_of_the_scene(tmp_path: Path) -> Non
         ReadOptions(crop_of="64x64")
 
 
-def test_without_parameters_the_range_is_unknown(square: Path) -> None:
-    light_field = read_light_field(square)
-    assert light_field.disparity_range is None
-    assert light_field.ground_truth is None
-    assert light_field.masks == {}
-    assert light_field.name == "square"
-    assert light_field.source == str(square)
-
-
 def test_parameters_truth_and_masks_are_read(full: Path) -> None:
     light_field = read_light_field(full)
     assert light_field.grid == (2, 3)
@@ -120,20 +111,11 @@ def test_parameters_truth_and_masks_are_read(full: Path) -> None:
     assert light_field.masks["occluded"][2, 3]
 
 
-def test_given_range_wins(full: Path) -> None:
-    assert read_light_field(full, disparity_range=(-3, 3)).disparity_range == DisparityRange(-3, 3, "given")
-
-
 def test_masks_that_are_no_regions_of_the_views_are_left_out(full: Path) -> None:
     """Benchmark folders hold masks at ten times the size, and pictures of labels."""
     cv2.imwrite(str(full / "mask_planes_highres.png"), np.zeros((120, 160), np.uint8))
     cv2.imwrite(str(full / "mask_labels.png"), np.arange(192, dtype=np.uint8).reshape(12, 16))
     assert set(read_light_field(full).masks) == {"occluded", "planes_lowres"}
-
-
-def cut(path: Path) -> None:
-    data = path.read_bytes()
-    path.write_bytes(data[: len(data) // 2])
 
 
 def config(**changes: str) -> Callable[[Path], None]:
@@ -157,25 +139,15 @@ def mask(name: str, values: np.ndarray) -> Callable[[Path], object]:
 BAD_FOLDERS: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "centre view missing": (lambda f: (f / "input_Cam004.png").unlink(), "full", "(1, 1) is missing"),
     "view beyond the grid": (lambda f: put(f / "input_Cam006.png", pixels(6)), "input_Cam006.png", "2x3 grid"),
-    "view twice": (lambda f: put(f / "input_Cam2.png", pixels(2)), "input_Cam2.png", "twice"),
-    "view without number": (lambda f: put(f / "input_Cam.png", pixels(2)), "input_Cam.png", "input_Cam007.png"),
     "other size": (lambda f: put(f / "input_Cam004.png", pixels(4)[1:]), "input_Cam004.png", "16x11"),
     "range the wrong way round": (config(disp_min="3"), "parameters.cfg", "MIN < MAX"),
-    "range not a number": (config(disp_max="near"), "parameters.cfg", "'near'"),
-    "range NaN": (config(disp_max="nan"), "parameters.cfg", "finite"),
     "half a range": (parameters("[meta]\ndisp_min = 1"), "parameters.cfg", "both disp_min and disp_max"),
-    "fewer cameras than views": (config(num_cams_x="2"), "input_Cam005.png", "2x2 grid that parameters.cfg gives"),
     "parameters of another size": (config(image_resolution_x_px="512"), "parameters.cfg", "image_resolution"),
-    "parameters without section": (parameters("disp_min = 1"), "parameters.cfg", "section"),
-    "parameters twice": (parameters(CONFIG + "disp_min = 0"), "parameters.cfg", "disp_min"),
-    "parameters not text": (parameters("\xff\xfe\x00"), "parameters.cfg", "not a text file with"),
     "truth of another size": (
         lambda f: write_pfm(f / "gt_disp_lowres.pfm", np.zeros((12, 15), np.float32)),
         "gt_disp_lowres.pfm",
         "(12, 15)",
     ),
-    "truth cut off": (lambda f: cut(f / "gt_disp_lowres.pfm"), "gt_disp_lowres.pfm", "bytes"),
-    "mask of another size": (mask("occluded", np.zeros((5, 5), np.uint8)), "mask_occluded.png", "views' size"),
     "mask not black and white": (mask("textureless", pixels(0)), "mask_textureless.png", "black and white"),
 }
 
@@ -207,19 +179,12 @@ def test_count_that_makes_no_square(square: Path) -> None:
     assert "num_cams_x" in message
 
 
-def test_one_view_is_no_light_field(square: Path) -> None:
-    for path in sorted(square.glob("*.png"))[1:]:
-        path.unlink()
-    assert "at least two views" in reading_error(square)
-
-
 @pytest.mark.parametrize(("name", "low", "high"), [("cotton", -1.465, 1.364), ("antinous", -3.131, 2.689)])
 def test_real_scene(hci: Path, name: str, low: float, high: float) -> None:
     """Numbers, ground truth and parameters as the benchmark publishes them; antinous comes without parameters here."""
     light_field = read_light_field(hci / name)
     assert light_field.views.shape == (9, 9, 512, 512, 3)
     assert light_field.name == name
-    assert light_field.ground_truth is not None
     assert light_field.ground_truth.min() == pytest.approx(low, abs=1e-3)
     assert light_field.ground_truth.max() == pytest.approx(high, abs=1e-3)
     own = DisparityRange(-1.6, 1.5, "parameters") if name == "cotton" else None

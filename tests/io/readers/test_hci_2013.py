@@ -56,9 +56,7 @@ def test_the_range_of_the_truth_is_not_taken(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("view", [None, (0, 1), (2, 2)])
-def test_truth_is_that_of_the_view_whose_depth_is_wanted(
-    tmp_path: Path, order: str, view: tuple[int, int] | None
-) -> None:
+def test_truth_is_of_the_view_that_is_wanted(tmp_path: Path, order: str, view: tuple[int, int] | None) -> None:
     """Truth of another view is shifted by its parallax: every score would be wrong."""
     light_field = taken(write(tmp_path / "a.h5"), order=order, view=view, exclude=("0,0",))
     own = light_field.views[light_field.reference_position]
@@ -83,20 +81,6 @@ def test_truth_is_unknown_where_the_depth_is_none(tmp_path: Path) -> None:
     np.testing.assert_allclose(ground_truth[1:], TRUTH[1, 2, 1:], rtol=1e-5, atol=1e-6)
 
 
-def test_a_file_without_depth(tmp_path: Path) -> None:
-    light_field = taken(write(tmp_path / "a.h5", depth=None))
-    assert light_field.ground_truth is None
-    assert light_field.camera is not None
-
-
-@pytest.mark.parametrize("attributes", [{"dH": 0.0}, {"focalLength": -1.0}, {"shift": np.nan}, {"dH": np.inf}])
-def test_geometry_of_no_camera_gives_no_truth(tmp_path: Path, attributes: dict[str, float]) -> None:
-    light_field = taken(write(tmp_path / "a.h5", **attributes))
-    assert light_field.camera is None
-    assert light_field.ground_truth is None
-    assert any("no metric depth and no ground truth" in note for note in light_field.notes)
-
-
 def test_missing_attributes_are_named(tmp_path: Path) -> None:
     path = write(tmp_path / "a.h5")
     with h5py.File(path, "a") as file:
@@ -104,37 +88,3 @@ def test_missing_attributes_are_named(tmp_path: Path) -> None:
     light_field = taken(path)
     assert light_field.ground_truth is None
     assert light_field.notes == ("no metric depth and no ground truth: the file has no attribute dH, shift",)
-
-
-@pytest.mark.parametrize("value", ["near", [1.0, 2.0], []])
-def test_attributes_that_are_no_numbers_are_named(tmp_path: Path, value: object) -> None:
-    assert "attribute 'focalLength'" in refused(write(tmp_path / "a.h5", focalLength=value))
-
-
-@pytest.mark.parametrize("views", [LF[..., 0], LF[0, 0], np.concatenate([LF, LF], axis=4)])
-def test_views_of_another_layout_are_refused(tmp_path: Path, views: np.ndarray) -> None:
-    message = refused(write(tmp_path / "a.h5", views=views))
-    assert "expected" in message
-
-
-def test_depth_of_another_shape_is_refused(tmp_path: Path) -> None:
-    assert "'GT_DEPTH' has shape (3, 5, 8, 9)" in refused(write(tmp_path / "a.h5", depth=DEPTH[..., 1:]))
-
-
-@pytest.mark.parametrize("name", ["LF", "GT_DEPTH"])
-def test_no_memory_on_the_word_of_a_shape(tmp_path: Path, name: str) -> None:
-    """A file of 2 KB may claim terabytes of fill values."""
-    path = write(tmp_path / "a.h5")
-    with h5py.File(path, "a") as file:
-        del file[name]
-        file.create_dataset(name, (9, 9, 100_000, 100_000, 3) if name == "LF" else LF.shape[:4], np.uint8)
-    assert "cannot lie in 0 bytes" in refused(path)
-
-
-def test_a_group_or_nothing_in_place_of_the_views(tmp_path: Path) -> None:
-    with h5py.File(tmp_path / "group.h5", "w") as file:
-        file["LF/inner"] = LF
-    assert "'LF' is a group, not an array" in refused(tmp_path / "group.h5")
-    with h5py.File(tmp_path / "none.h5", "w") as file:
-        file["other"] = LF
-    assert "not a file of the first HCI benchmark" in refused(tmp_path / "none.h5")

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import cv2
 import imageio.v3 as imageio
 import numpy as np
 import pytest
@@ -77,7 +76,6 @@ def case(names: list[str], expected: Any, note: str = "", **options: Any) -> Cas
 NAMED: dict[str, Case] = {
     "rows and columns": case(by_place("view_{:02d}_{:02d}.png", range(3), range(3)), grid_of(3, 3), "order"),
     "counted from 5": case(by_place("{} {}.png", (5, 6, 7), (1, 2, 3)), grid_of(3, 3), "rows from 5"),
-    "counted from the middle": case(by_place("v_{}_{}.png", (-1, 0, 1), (-1, 0, 1)), grid_of(3, 3), "rows from -1"),
     "gantry": case(
         [
             f"out_{row:02d}_{column:02d}_{-381.909271 + row - column}_{1103.376221 * row - 1000.5}.png"
@@ -85,11 +83,6 @@ NAMED: dict[str, Case] = {
         ],
         grid_of(3, 4),
         "order",
-    ),
-    "dots between": case(by_place("{:02d}.{:02d}.png", range(3), range(2)), grid_of(3, 2)),
-    "spaces and braces": case(by_place("a b {{{}}} [{}].png", range(2), range(3)), grid_of(2, 3)),
-    "the same number twice": case(
-        [f"{t}_{s}_{t}.png" for t, s in itertools.product(range(2), range(3))], grid_of(2, 3)
     ),
     "steps": case(by_place("{}_{}.png", (0, 2, 4), (0, 2, 4)), grid_of(3, 3), "steps of 2"),
     "steps and a gap": case(
@@ -99,54 +92,17 @@ NAMED: dict[str, Case] = {
     "steps of rows alone": case(
         by_place("{}_{}.png", (0, 2), (0, 1, 2)), [[0, 1, 2], [-1, -1, -1], [3, 4, 5]], view=(0, 1)
     ),
-    "steps in a wide grid": case(
-        by_place("{}_{}.png", (0, 2), (0, 2)), [[0, -1, 1], [-1, -1, -1], [2, -1, 3]], grid=(3, 3), view=(0, 0)
-    ),
-    "steps in a tight grid": case(by_place("{}_{}.png", (0, 2), (0, 2)), [[0, 1], [2, 3]], "steps of 2", grid=(2, 2)),
     "missing views": case(["0_0.png", "0_2.png", "1_1.png", "2_2.png"], [[0, -1, 1], [-1, 2, -1], [-1, -1, 3]]),
-    "larger grid": case(by_place("{}_{}.png", range(2), range(2)), [[0, 1, -1], [2, 3, -1]], grid=(2, 3)),
     "running number": case(by_number("img{}.png", range(9)), grid_of(3, 3), "row by row", grid=(3, 3)),
-    "running number in steps": case(by_number("{}.png", range(0, 90, 10)), grid_of(3, 3), "steps of 10", grid=(3, 3)),
-    "running number with gaps": case(by_number("{}.png", (0, 2, 3)), [[0, -1], [1, 2]], grid=(2, 2)),
-    "first views missing": case(by_number("{}.png", (2, 3)), [[-1, -1], [0, 1]], "2 to 3", grid=(2, 2)),
-    "a scene's number": case(by_number("s_7_img_{:03d}.png", range(9)), grid_of(3, 3), "0 to 8", grid=(3, 3)),
     # --- no grid: the views say which
     "sequence": case(by_number("img{}.png", range(7)), grid_of(1, 7), "numbered 0 to 6"),
-    "sequence under a shared number": case(by_number("view_00_{:02d}.png", range(9)), grid_of(1, 9)),
     "sequence with gaps": case(
         by_number("img_{:03d}.png", (1, 2, 4, 5, 6, 9)),
         [[0, 1, -1, 2, 3, 4, -1, -1, 5]],
         "numbered 1 to 9, 3 of them missing",
     ),
     # the grid is not known, so a position in it means nothing yet
-    "sequence with options of the grid": case(
-        by_number("{}.png", range(1, 6)),
-        [[0, -1, 2, 3, 4]],
-        central=9,
-        order="transpose",
-        view=(3, 3),
-        exclude=("7,7", "2.png"),
-    ),
     "times": case(by_number("IMG_20150106_{}.png", (102134, 102138, 102143, 102148)), grid_of(1, 4), "count no views"),
-    "times and a grid": case(
-        by_number("IMG_20150106_{}.png", (102134, 102138, 102142, 102148)), grid_of(2, 2), "count no views", grid=(2, 2)
-    ),
-    "times over midnight": case(
-        [f"IMG_{time}.png" for time in ("20150106_235951", "20150106_235959", "20150107_000003", "20150107_000011")],
-        grid_of(1, 4),
-        "count no views",
-    ),
-    "minutes and seconds and a grid": case(
-        by_place("v_{}_{}.png", (10,), (3, 40))
-        + by_place("v_{}_{}.png", (11,), (9, 40))
-        + ["v_12_3.png", "v_12_57.png"],
-        grid_of(2, 3),
-        "count no views",
-        grid=(2, 3),
-    ),
-    "numbers beyond any count and a grid": case(
-        by_number("{}.png", (10**20, 10**20 + 5, 10**20 + 77, 10**21)), grid_of(2, 2), grid=(2, 2)
-    ),
     "running number and time": case(
         [f"{number}_{time}.png" for number, time in enumerate((34, 38, 61, 79), 1)],
         grid_of(2, 2),
@@ -154,69 +110,27 @@ NAMED: dict[str, Case] = {
         grid=(2, 2),
     ),
     # --- signs
-    "signs": case(by_place("v_{:+d}_{:+d}.png", (-1, 0, 1), (-2, -1, 0)), grid_of(3, 3), "columns from -2"),
     # a minus before each row's number is a sign where columns have signs
     "signs of one kind in the rows": case(
         by_place("v_{:+d}_{:+d}.png", (-1, -2, -3), (-1, 0, 1)), [[6, 7, 8], [3, 4, 5], [0, 1, 2]], "rows from -3"
-    ),
-    "signs without separators": case(by_place("v{:+03d}{:+03d}.png", (-1, 0, 1), (0, 1)), grid_of(3, 2)),
-    "minus after a hyphen": case(by_place("v-{}-{}.png", (-1, 0), (-1, 0, 1)), grid_of(2, 3), "rows from -1"),
-    "pattern with signs": case(
-        by_place("v_{:+d}_{:+d}_x7.png", (-1, 0, 1), (-1, 0)),
-        grid_of(3, 2),
-        "rows from -1",
-        pattern="v_{row}_{column}_x*.png",
-    ),
-    "a disc with signs": case(
-        ["v_-1_+0.png", "v_+0_-1.png", "v_+0_+0.png", "v_+0_+1.png", "v_+1_+0.png"],
-        [[-1, 0, -1], [1, 2, 3], [-1, 4, -1]],
     ),
     "a time for each view": case(
         [f"r{t}_c{s}_time{100 + 7 * t + s}.png" for t, s in itertools.product(range(3), range(2))],
         grid_of(3, 2),
         "as in 'r{row}_c{column}_time*.png'",
     ),
-    "frames alone": case(by_number("frame_{:04d}.png", range(5)), grid_of(1, 5), "numbered 0 to 4"),
     # --- more numbers than two
     "running number, row, column": case(
         [f"IMG_{3 * t + s:04d}_{t:02d}_{s:02d}.png" for t, s in itertools.product(range(3), range(3))],
         grid_of(3, 3),
         "as in 'IMG_*_{row}_{column}.png'",
     ),
-    "there and back": case(
-        [f"{3 * t + (2 - s if t % 2 else s)}_{t}_{s}.png" for t, s in itertools.product(range(3), range(3))],
-        grid_of(3, 3),
-        "as in '*_{row}_{column}.png'",
-    ),
-    "function of row and column": case(
-        [f"{t}_{s}_{5 * s + 11 * t}x.png" for t, s in itertools.product(range(2), range(3))],
-        grid_of(2, 3),
-        "as in '{row}_{column}_*x.png'",
-    ),
-    "row, column, millimetres": case(
-        [f"{t}_{s}_{10 * t}mm_{50 - 10 * s}mm.png" for t, s in itertools.product(range(3), range(3))], grid_of(3, 3)
-    ),
     "positions alone": case(by_place("cam_{}_{}.png", (0.0, 0.5, 1.0), (-1.5, 0.0)), grid_of(3, 2), "rows 0.333 steps"),
-    "positions with signs": case(
-        by_place("cam_{:+.2f}_{:+.2f}.png", (-0.15, -0.05, 0.05, 0.15), (-0.05, 0.05)),
-        grid_of(4, 2),
-        "rows 1 steps apart, on the grid",
-    ),
-    "running number and names such as 03.07": case(
-        [f"{3 * t + s}_{t:02d}.{s:02d}.png" for t, s in itertools.product(range(3), range(3))], grid_of(3, 3)
-    ),
-    "one row of 9, said so": case(by_number("view_00_{:02d}.png", range(9)), grid_of(1, 9), grid=(1, 9)),
     "pattern": case(
         by_place("x{}_y{}_7.png", range(2), range(3)), [[0, 3], [1, 4], [2, 5]], pattern="x{column}_y{row}_*.png"
     ),
     "pattern of a number": case(
         by_number("v1.{}.png", range(4)), grid_of(2, 2), pattern="v1.{number}.png", grid=(2, 2)
-    ),
-    "pattern with stars": case(
-        by_number("a12bcc{:03d}dd.png", range(4)), grid_of(2, 2), pattern="a*c{number}*.png", grid=(2, 2)
-    ),
-    "pattern with signs of expressions": case(
-        by_place("v(+)[{}].^{}$.png", range(2), range(2)), grid_of(2, 2), pattern="v(+)[{row}].^{column}$.png"
     ),
     "transposed": case(by_place("{}_{}.png", range(2), range(3)), [[0, 3], [1, 4], [2, 5]], order="transpose"),
     "central": case(by_place("{}_{}.png", range(4), range(5)), [[6, 7, 8], [11, 12, 13], [16, 17, 18]], central=3),
@@ -232,15 +146,6 @@ def test_views_stand_where_their_names_say(tmp_path: Path, case: str) -> None:
     light_field = read(folder, options)
     assert places_of(light_field) == expected
     assert note in " ".join(light_field.notes)
-    # what the user said is no assumption
-    notes = " ".join(light_field.notes)
-    told = "in that order" in notes or "the names say row and column" in notes
-    assert told == (
-        options.pattern is None
-        and "numbered" not in light_field.notes[0]
-        and "count no views" not in light_field.notes[0]
-    )
-    assert light_field.arranged == (options.grid is not None or told or "{row}" in (options.pattern or ""))
     assert light_field.name == "my scene"
     assert light_field.source == str(folder)
     if options.view and light_field.arranged:
@@ -281,44 +186,20 @@ def test_what_is_no_view_is_left_out_with_a_note(tmp_path: Path) -> None:
 PLACES = by_place("v_{}_{}.png", range(3), range(3))
 
 BAD: dict[str, Case] = {
-    "two sorts of names": case([*PLACES, *by_place("w_{}_{}.png", range(3), range(3))], "v_0_0.png as like"),
-    "every name another": case(["a1b.png", "b1a.png", "c3.png"], "--pattern"),
     "no numbers": case(["a.png", "b.png"], "expected names such as 'view_{row}_{column}.png'"),
     "several light fields": case(
         [f"f{f}_{t}_{s}.png" for f, t, s in itertools.product(range(2), range(3), range(3))],
         "such as 'f0_{row}_{column}.png'",
     ),
     "cameras and exposures": case(by_place("cam{:02d}_exp{}.png", range(9), range(3)), "after 'exp' count no"),
-    "frames of cameras": case(by_place("frame_{}_cam_{}.png", range(9), range(9)), "after 'frame' count no"),
     "times of cameras": case(by_place("t{}_c{}.png", range(3), range(9)), "after 't' count no views"),
-    "two settings of a grid": case(
-        [f"{t}_{s}_iso{i}_ch{c}.png" for t, s, i, c in itertools.product(range(2), range(2), (100, 400), range(3))],
-        "after 'iso' and 'ch' count no views",
-    ),
     "two running numbers": case(["1_3.png", "2_1.png", "3_2.png"], "--pattern, such as '{number}_*.png'"),
-    "times that do not fill the grid": case(
-        by_number("{}.png", (102134, 102138, 102143)),
-        "3 images; --grid gives 2x2",
-        grid=(2, 2),
-    ),
     "rows and columns of --grid exchanged": case(PLACES[:6], "--grid has 3x2", grid=(3, 2)),
-    "about as many of two sorts": case([*PLACES, *by_place("w_{}_{}.png", range(2), range(3))], "(9 and 6)"),
-    "one picture": case(["a1.png", "b.png"], "no number in the names counts"),
-    "one picture by pattern": case(["a1.png", "a.png"], "only one view, a1.png", pattern="a{number}.png"),
     "twice": case([*PLACES, "v_01_01.png"], "view 1, 1 is given twice, also as v_01_01.png"),
-    "twice by pattern": case(["a1b.png", "a1c.png"], "given twice", pattern="a{number}*"),
     "huge row": case([*PLACES, "v_999999999_1.png"], "1000000000x3"),
-    "huge numbers": case(["v_0_0.png", f"v_{10**17}_{10**17}.png", "v_1_0.png", f"v_1_{10**17}.png"], "--pattern"),
-    "huge running number": case(["0.png", "1.png", "999999999999.png"], "only sort", grid=(2, 2)),
-    "sparse": case(["0_0.png", "1_1.png", "300_1.png", "300_2.png"], "301x3"),
-    "huge grid": case(PLACES, "at most 10000 views", grid=(999_999, 999_999)),
-    "no grid": case(PLACES, "0x0", grid=(0, 0)),
-    "small grid, running": case(by_number("{}.png", range(1, 5)), "4.png: beyond the 1x3 views", grid=(1, 3)),
     "centre missing": case(["0_0.png", "0_1.png", "0_2.png", "2_2.png"], "centre view"),
     "pattern of other names": case(PLACES, "no file has a name like", pattern="u_{row}_{column}.png"),
     "pattern without column": case(PLACES, "{row} and {column} once each", pattern="v_{row}_*.png"),
-    "pattern with fields together": case(PLACES, "{row} and {column} once each", pattern="v{row}{column}.png"),
-    "pattern of a path": case(PLACES, "{row} and {column} once each", pattern="../v_{row}_{column}.png"),
     "long pattern": case(PLACES, "{row} and {column} once each", pattern="{number}" + "*" * 10**6),
 }
 
@@ -345,11 +226,6 @@ def outside(folder: Path) -> None:
 SPOILT: dict[str, tuple[Callable[[Path], object], str]] = {
     "empty file": (lambda f: (f / "v_1_2.png").write_bytes(b""), "v_1_2.png: not a PNG"),
     "another size": (lambda f: imageio.imwrite(f / "v_1_2.png", pixels(5)[1:]), "v_1_2.png: 5x3"),
-    "another depth": (
-        lambda f: cv2.imwrite(str(f / "v_1_2.png"), pixels(5).astype(np.uint16)),
-        "v_1_2.png: 5x4 RGB of 16 bit",
-    ),
-    "grey": (lambda f: imageio.imwrite(f / "v_1_2.png", pixels(5)[:, :, 0]), "v_1_2.png: 5x4 grey"),
     "link out": (outside, "v_0_0.png: a link out of the folder"),
     "link to nothing": (
         lambda f: ((f / "v_1_2.png").unlink(), (f / "v_1_2.png").symlink_to("gone.png")),
@@ -372,9 +248,7 @@ def test_bad_view_is_one_line_that_names_it(tmp_path: Path, case: str, capfd: py
 
 SURPLUS = {
     "a small picture beside the grid": ("v_9_9.png", True),
-    "a small picture numbered on": ("v_0_3.png", True),
     "a small picture of another name": ("thumb_7.png", True),
-    "a small picture of another scene": ("u_0_0.png", True),
     "a small view under another writing of its name": ("v_01_01.png", True),
     "a small picture at a corner": ("v_0_0.png", False),
     "a small picture within": ("v_1_2.png", False),
@@ -401,7 +275,7 @@ def test_a_picture_of_another_size_is_left_out_unless_the_grid_needs_it(tmp_path
     assert not any(name in note for note in excluded.notes)
 
 
-@pytest.mark.parametrize("name", ["v_7.png", "v_10.png", "depth.png", "v_1_1.png", "notes.txt"])
+@pytest.mark.parametrize("name", ["v_7.png", "v_10.png", "notes.txt"])
 def test_any_file_can_be_excluded(tmp_path: Path, name: str) -> None:
     """Nobody should have to know which pictures would have been left out anyhow."""
     folder = put(tmp_path / "f", by_number("v_{}.png", range(9)))
@@ -427,18 +301,6 @@ def test_views_of_a_sequence_can_be_excluded_by_name_and_by_place(tmp_path: Path
     np.testing.assert_array_equal(light_field.views[light_field.present], views.reshape(9, 64, 64, 3)[1:8])
 
 
-@pytest.mark.parametrize("at", [0, 8])
-def test_the_end_of_a_sequence_is_missing_where_it_then_fills_a_square(tmp_path: Path, at: int) -> None:
-    """Of 9 views without the first, 8 in a row would give no grid or a wrong one."""
-    folder = put(tmp_path / "f", by_number("{}.png", range(9)))
-    left = list(range(9))
-    left[at] = -1
-    assert places_of(read(folder, ReadOptions(exclude=(f"{at}.png",)))) == [left]
-    # and is none of the views where they fill one without it
-    imageio.imwrite(folder / "9.png", pixels(5))
-    assert places_of(read(folder, ReadOptions(exclude=("9.png",)))) == grid_of(1, 9)
-
-
 def test_an_edge_that_is_excluded_by_name_is_part_of_the_grid_still(tmp_path: Path) -> None:
     """Else the centre view, whose depth is made, would be another one."""
     folder = put(tmp_path / "f", PLACES)
@@ -446,17 +308,9 @@ def test_an_edge_that_is_excluded_by_name_is_part_of_the_grid_still(tmp_path: Pa
     assert places_of(light_field) == [[-1, -1, -1], [3, 4, 5], [6, 7, 8]]
 
 
-CHOICES = (
-    "several light fields",
-    "two running numbers",
-    "cameras and exposures",
-    "frames of cameras",
-    "times of cameras",
-    "two settings of a grid",
+@pytest.mark.parametrize(
+    "case", ["several light fields", "two running numbers", "cameras and exposures", "times of cameras"]
 )
-
-
-@pytest.mark.parametrize("case", CHOICES)
 def test_the_pattern_that_an_error_suggests_can_be_followed(tmp_path: Path, case: str) -> None:
     names = BAD[case].names
     folder = put(tmp_path / "f", names)
@@ -482,29 +336,6 @@ def test_camera_positions_in_names_are_those_of_the_views(tmp_path: Path) -> Non
     assert any(note.startswith("camera positions from the names; rows 0.9") for note in light_field.notes)
 
 
-@pytest.mark.parametrize("order", ["flip-rows", "flip-columns", "transpose", "transpose-flip-both"])
-def test_camera_positions_follow_the_order(tmp_path: Path, order: str) -> None:
-    """Each view keeps its place whatever the order, or its baseline points the wrong way."""
-    folder = put(tmp_path / "f", GANTRY.values())
-    names, ordered = read(folder, ReadOptions()), read(folder, ReadOptions(order=order))
-    spread = np.ptp(ordered.positions, axis=(0, 1))
-    assert (np.diff(ordered.positions[:, 0, 0]) > 0).all()
-    assert (np.diff(ordered.positions[0, :, 1]) > 0).all()
-    expected = np.ptp(names.positions, axis=(0, 1))
-    if "transpose" in order:
-        expected = expected[::-1] / names.row_spacing
-        assert ordered.row_spacing == pytest.approx(1 / names.row_spacing)
-    np.testing.assert_allclose(spread, expected)
-
-
-def test_decimals_that_fit_no_grid_count_nothing(tmp_path: Path) -> None:
-    """Exposures or temperatures must not move the views."""
-    names = [f"{t}_{s}_{0.1 * ((t * 7 + s * 5) % 4):.1f}_{(t * s) % 3:.1f}.png" for t, s in np.ndindex(3, 3)]
-    light_field = read(put(tmp_path / "f", names), ReadOptions())
-    assert light_field.positions is None
-    assert light_field.row_spacing == 1
-
-
 @pytest.mark.parametrize("pattern", [None, "img_0.{row}_0.{column}.png"])
 def test_decimals_that_are_row_and_column_are_no_positions(tmp_path: Path, pattern: str | None) -> None:
     """They would say how far apart rows are, which the views tell."""
@@ -524,8 +355,6 @@ def test_link_out_of_the_folder_is_followed_when_asked_for(tmp_path: Path) -> No
 ROWS: dict[str, Case] = {
     "words": case(by_place("row_{}/col_{}.png", range(3), range(4)), grid_of(3, 4)),
     "numbers": case(by_place("{}/{}.png", range(3), range(3)), grid_of(3, 3)),
-    "ten rows": case(by_place("a_row{}/v{:02}.png", range(1, 11), range(2)), grid_of(10, 2)),
-    "row in both": case(by_place("r{0}/r{0}_c{1}.png", range(3), range(2)), grid_of(3, 2)),
     "a view left out": case(by_place("{}/{}.png", range(2), range(3)), [[0, 1, 2], [3, 4, -1]], exclude=("1/2.png",)),
     "columns": case(
         by_place("col_{}/row_{}.png", range(2), range(3)),
@@ -620,25 +449,6 @@ def test_lytro_views_are_read(real_data: Path) -> None:
     assert light_field.grid == (9, 9)
     assert light_field.present.all()
     np.testing.assert_array_equal(light_field.views[2, 6], imageio.imread(folder / "2067_03_07.png")[:, :, :3])
-
-
-def test_names_with_decimals_in_different_places_are_read(tmp_path: Path) -> None:
-    """One name with a whole number where others have decimals used to end in a traceback."""
-    names = [f"{468.125 + 4.5 * s}_{-703.25 + 4.5 * t}.png" for t in range(3) for s in range(3)]
-    assert len(infer_view_numbers("folder", ["4294967295_-703.25.png", *names[1:]]).numbers) == 9
-
-
-def test_names_that_command_a_terminal_are_shown_without(tmp_path: Path) -> None:
-    """A folder from elsewhere must not clear the screen of who looks at it, or write lines of its own there."""
-    folder = tmp_path / "two\nlines"
-    folder.mkdir()
-    for number in range(4):
-        assert cv2.imwrite(str(folder / f"view\x1b[2J_{number // 2}_{number % 2}.png"), np.full((8, 9, 3), 7))
-    assert cv2.imwrite(str(folder / "other\x1b.png"), np.full((8, 9, 3), 7))
-    light_field = read(folder, ReadOptions())
-    shown = (light_field.name, light_field.source, *light_field.notes)
-    assert all(map(str.isprintable, shown))
-    assert light_field.name == "two lines"
 
 
 @pytest.mark.parametrize("names", [("left.png", "right.png"), ("L.png", "R.png"), ("a_left_1.png", "a_right_1.png")])

@@ -1,10 +1,8 @@
 """NumPy files: the arrays in them, pixel for pixel, and nothing taken on the word of a header."""
 
 import functools
-import io
 import resource
 import struct
-import tracemalloc
 import zipfile
 from pathlib import Path
 
@@ -31,11 +29,9 @@ CASES = {
     "Fortran order": np.asfortranarray(LF),
     "HWTSC": LF.transpose(2, 3, 0, 1, 4),
     "grey": LF[..., 0],
-    "16 bit": LF.astype(np.uint16) * 257,
     "big-endian": LF.astype(">u2") * 257,
     "float32": (LF / 255).astype(np.float32),
     "float64": LF / 255,
-    "even grid": RNG.integers(1, 256, (4, 4, 8, 10, 3), np.uint8),
 }
 
 
@@ -83,26 +79,20 @@ class _Trap:
         return Path.touch, (Path("trapped"),)
 
 
-def test_pickles_are_never_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pickles_are_never_opened(here: Path) -> None:
     """A file of Python objects can run any program."""
-    monkeypatch.chdir(tmp_path)
     trap = np.array([_Trap()], object).reshape(1, 1, 1, 1)
-    np.save(tmp_path / "trap.npy", trap)
-    np.savez(tmp_path / "trap.npz", LF=trap)
-    assert "Python objects, which may be any program" in refused(tmp_path / "trap.npy")
-    assert "Python objects, which may be any program" in refused(tmp_path / "trap.npz", variable="LF")
-    refused(tmp_path / "trap.npz")
-    assert not (tmp_path / "trapped").exists()
+    np.save(here / "trap.npy", trap)
+    np.savez(here / "trap.npz", LF=trap)
+    assert "Python objects, which may be any program" in refused(here / "trap.npy")
+    assert "Python objects, which may be any program" in refused(here / "trap.npz", variable="LF")
+    refused(here / "trap.npz")
+    assert not (here / "trapped").exists()
 
 
 def header(shape: tuple[int, ...], descr: str = "|u1", version: int = 1) -> bytes:
     text = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
     return b"\x93NUMPY" + bytes([version, 0]) + struct.pack("<H" if version == 1 else "<I", len(text)) + text
-
-
-def test_header_of_version_2(tmp_path: Path) -> None:
-    (tmp_path / "two.npy").write_bytes(header(LF.shape, version=2) + LF.tobytes())
-    np.testing.assert_array_equal(taken(tmp_path / "two.npy").views, LF)
 
 
 @pytest.mark.parametrize(
@@ -121,19 +111,6 @@ def test_shapes_that_the_file_does_not_hold(tmp_path: Path, shape: tuple[int, ..
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000  # KB
 
 
-def test_an_archive_that_claims_more_than_it_holds(tmp_path: Path) -> None:
-    """The sizes in an archive's directory are claims too."""
-    file = io.BytesIO()
-    np.savez_compressed(file, LF=LF)
-    content = file.getvalue()
-    with zipfile.ZipFile(file) as archive:
-        size = archive.infolist()[0].file_size
-    # in the directory at the end, where the size in bytes stands once
-    at = content.rindex(struct.pack("<I", size))
-    (tmp_path / "lie.npz").write_bytes(content[:at] + struct.pack("<I", 2**32 - 2) + content[at + 4 :])
-    assert "cannot lie in" in refused(tmp_path / "lie.npz")
-
-
 def test_records_and_other_content_are_refused(tmp_path: Path) -> None:
     np.save(tmp_path / "records.npy", np.zeros((2, 3, 8, 10), [("r", "u1"), ("g", "u1")]))
     assert "found: records 2x3x8x10 of [" in refused(tmp_path / "records.npy")
@@ -143,13 +120,3 @@ def test_records_and_other_content_are_refused(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "pictures.npz", "w") as archive:
         archive.writestr("readme.txt", "views")
     assert "found: nothing" in refused(tmp_path / "pictures.npz")
-
-
-def test_a_header_longer_than_the_file_takes_no_memory(tmp_path: Path) -> None:
-    (tmp_path / "long.npy").write_bytes(b"\x93NUMPY\x02\x00" + struct.pack("<I", 2**32 - 1) + b" " * 100)
-    tracemalloc.start()
-    try:
-        assert "a header of 4294967295 bytes" in refused(tmp_path / "long.npy")
-        assert tracemalloc.get_traced_memory()[1] < 10**7
-    finally:
-        tracemalloc.stop()

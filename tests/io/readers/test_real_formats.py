@@ -7,16 +7,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import scipy.io
-from click.testing import CliRunner
+from error_lines import done
 from real_scenes import final_scores, part
 
-from sepi.cli.main import main
 from sepi.io.hdf5 import write_light_field
 from sepi.io.pfm import read_pfm
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field
-from sepi.scenes import render, write_hci
 from sepi.scoring.scores import score
 
 
@@ -40,23 +38,6 @@ def test_every_format_gives_the_same_light_field(hci: Path, tmp_path: Path) -> N
     own = read_light_field(tmp_path / "own.h5")
     assert own.disparity_range == folder.disparity_range
     np.testing.assert_array_equal(own.ground_truth, folder.ground_truth)
-
-
-def test_one_map_from_a_folder_and_from_an_array(tmp_path: Path) -> None:
-    """By the command, byte for byte, what does not name the source or need a camera."""
-    light_field = render("curved_occluders", size=64, views=5)
-    write_hci(light_field, tmp_path / "folder")
-    np.save(tmp_path / "array.npy", light_field.views)
-    found = []
-    for source in (tmp_path / "folder", tmp_path / "array.npy"):
-        out = tmp_path / f"{source.stem}-maps"
-        words = ["depth", source, "-o", out, "--disparity-range", "-2.5", "2.5"]
-        words += ["--variant", "no_occlusion_no_textureless", "--set", "initial.sepi.num_disparities=31"]
-        called = CliRunner().invoke(main, [str(word) for word in words])
-        assert (called.exit_code, called.stderr) == (0, "")
-        names = ("confidence.png", "disparity.npy", "disparity.pfm", "disparity.png", "disparity_16bit.png")
-        found.append({name: (out / name).read_bytes() for name in names})
-    assert found[0] == found[1]
 
 
 def small_map(whole: LightField, views: np.ndarray) -> np.ndarray:
@@ -100,8 +81,7 @@ def test_lytro_picture_with_one_command(real_data: Path, tmp_path: Path) -> None
         cv2.imwrite(str(tmp_path / "in" / picture.name), cv2.imread(str(picture))[40:270, 40:400])
     started = time.process_time()
     words = ["depth", str(tmp_path / "in"), "-o", str(tmp_path / "out")]
-    called = CliRunner().invoke(main, words)
-    assert called.exit_code == 0, called.output
+    called = done(*words)
     # the order of real views is right, and no reader may doubt it
     assert called.stderr == ""
     assert time.process_time() - started <= 25

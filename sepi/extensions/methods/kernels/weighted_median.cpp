@@ -9,7 +9,7 @@
 namespace sepi::weighted_median {
 namespace {
 
-// As sepi.extensions.methods.weighted_median; values, weight and out (H, W), guide (H, W, 3).
+// As sepi.extensions.methods.costs.weighted_median; values, weight and out (H, W), guide (H, W, 3).
 void weighted_medians(Array<const float, 2> values, Array<const float, 3> guide, Index radius, double sigma, Array<const float, 2> weight,
                       Array<float, 2> out) {
     const Index H = values.shape[0], W = values.shape[1];

@@ -1,8 +1,9 @@
-"""COLMAP models [1]_ of light fields, with exact poses: no features are matched, no cameras adjusted.
+"""Light fields with exact poses as COLMAP models [1]_ and nerfstudio data sets [2]_, which instant-ngp [3]_ reads, too.
 
-Structure from motion rarely works on light fields, because their views are too close together. Their poses are known.
+Structure from motion rarely works on light fields, because their views are too close together. Their poses are known:
+no features are matched, no cameras adjusted. Each view has its own ``PINHOLE`` camera, with its principal point.
 
-The folder is a COLMAP workspace::
+A COLMAP workspace::
 
     images/view_04_04.png                                     each view, RGB of 8 bit
     sparse/0/cameras.txt, images.txt, points3D.txt            the model as text, where other programs look for it
@@ -11,37 +12,57 @@ The folder is a COLMAP workspace::
     stereo/normal_maps/view_04_04.png.geometric.bin           surface normals, 0 where unknown
     stereo/fusion.cfg                                         the views, for stereo_fusion
 
-Each view has its own ``PINHOLE`` camera, with its principal point. Origin and axes are those of the reference view's
-camera, so there is no rotation; for calibrated cameras they are those of their world. The points are those of the
-reference view. The track of a point lists its pixel in each view that sees it. Its error is the mean reprojection error
-over the track in pixels, from the standard deviation of the disparity; 0 where that is unknown.
+Origin and axes are those of the reference view's camera, so there is no rotation; for calibrated cameras they are those
+of their world. The points are those of the reference view. The track of a point lists its pixel in each view that sees
+it. Its error is the mean reprojection error over the track in pixels, from the standard deviation of the disparity; 0
+where that is unknown.
+
+A data set of nerfstudio::
+
+    transforms.json              cameras: `w h fl_x fl_y cx cy` of each view, camera-to-world matrices
+    images/view_04_04.png        each view, RGB of 8 bit
+    depths/view_04_04.npy        depth of each view in millimetres, float32; 0 where unknown
+    depth_sigmas/view_04_04.npy  its standard deviation in millimetres; only if the map has error bars
+    points.ply                   coloured points, for methods that start from points
+
+A camera's axes point right, up and back. The world's z points up, y in the viewing direction; the origin is the
+reference view's camera. Principal points are counted from the corner of the image. Neither program has a key for the
+error of depth; ``depth_sigma_file_path`` is for programs that weight depth by it.
 
 References
 ----------
 .. [1] COLMAP's documentation, "Output Format", https://colmap.github.io/format.html: poses go from the world to the
        camera, whose axes point right, down and forward; depth maps begin with ``width&height&channels&``. The middle of
        the first pixel is (0.5, 0.5).
+.. [2] "Data conventions", https://docs.nerf.studio/quickstart/data_conventions.html: the axes; depth of 16 or 32 bit in
+       millimetres, zero where unknown, for every frame or for none.
+.. [3] ``src/nerf_loader.cu`` of https://github.com/NVlabs/instant-ngp: principal points of single frames need `w` and
+       `h` beside them; it ignores this depth.
 """
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from sepi.camera.rig import WORLD
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.images import write_png
+from sepi.io.ply import write_ply
+from sepi.io.point_cloud import PointCloud
 from sepi.lightfield import FloatMap
 from sepi.stage import Progress, no_progress
 
 if TYPE_CHECKING:
-    from sepi.extensions.cameras.posed_views import PosedViews
+    from sepi.extensions.cameras.posed_views import Points, PosedViews
 
-Points = npt.NDArray[np.float64]
+
 Flags = npt.NDArray[np.bool_]
 """Which of the views sees which of the points, (N, P)."""
 
@@ -147,3 +168,84 @@ def _points(posed: PosedViews, sees: Flags) -> Iterator[str]:
         views = np.flatnonzero(sees[:, point])
         track = " ".join(f"{view + 1} {places[view, point]}" for view in views.tolist())
         yield f"{point + 1} {x!r} {y!r} {z!r} {r} {g} {b} {error:.6g} {track}"
+
+
+_MILLIMETRES = 1000
+_CLOUD = "points.ply"
+_AXES = "x right, y the way that the cameras look, z up"
+
+
+def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress = no_progress) -> None:
+    """Write views, poses, points and depth as a data set of nerfstudio; equal content gives equal bytes.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Must not exist, or be empty.
+    posed : PosedViews
+        From :func:`sepi.extensions.cameras.posed_views.posed_views`.
+    progress : callable
+        Receives the fraction done.
+
+    Raises
+    ------
+    SepiError
+        If the folder exists and is not empty, or cannot be written.
+    """
+    with atomic_folder(Path(folder)) as temporary:
+        for view, name in enumerate(posed.names):
+            carried = posed.carried(view)
+            _write_millimetres(temporary / "depths" / f"{name}.npy", posed.depth(carried))
+            if posed.sure:
+                _write_millimetres(temporary / "depth_sigmas" / f"{name}.npy", posed.depth_sigma(view, carried))
+            write_png(temporary / "images" / f"{name}.png", posed.picture(view))
+            if posed.incomplete:
+                write_png(temporary / "masks" / f"{name}.png", posed.shown(view))
+            progress((view + 1) / len(posed.poses))
+        if posed.chosen.any():
+            cloud = PointCloud(_world(posed, posed.points).astype(np.float32), posed.colours, metric=True)
+            axes = _AXES, f"{posed.units}; origin: camera of the reference view"
+            write_ply(temporary / _CLOUD, cloud, axes if posed.rig is None else (WORLD, posed.units))
+        with atomic_path(temporary / "transforms.json") as path:
+            path.write_text(json.dumps(_transforms(posed), indent=1) + "\n", encoding="ascii")
+
+
+def _write_millimetres(path: Path, metres: FloatMap) -> None:
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.save(file, (metres * np.float32(_MILLIMETRES)).astype("<f4"), allow_pickle=False)
+
+
+def _transforms(posed: PosedViews) -> dict[str, Any]:
+    height, width = posed.poses.shape
+    focal = posed.poses.focal_px
+    frames = [
+        {
+            "file_path": f"images/{name}.png",
+            "depth_file_path": f"depths/{name}.npy",
+            # nerfstudio wants it for all views or for none
+            **({"depth_sigma_file_path": f"depth_sigmas/{name}.npy"} if posed.sure else {}),
+            **({"mask_path": f"masks/{name}.png"} if posed.incomplete else {}),
+            **dict(zip(("w", "h", "fl_x", "fl_y", "cx", "cy"), (width, height, focal, focal, x, y), strict=True)),
+            "transform_matrix": _camera_to_world(posed, centre),
+        }
+        for name, (x, y), centre in zip(
+            posed.names, posed.poses.from_corner.tolist(), _world(posed, posed.poses.centres).tolist(), strict=True
+        )
+    ]
+    cloud = {"ply_file_path": _CLOUD} if posed.chosen.any() else {}
+    return {"camera_model": "OPENCV", "units": posed.units, **cloud, "frames": frames}
+
+
+def _world(posed: PosedViews, points: Points) -> Points:
+    """Points from the reference view's axes to those of the world: the calibrated cameras', or right, forward, up."""
+    if posed.rig is not None:
+        return posed.in_world(points)
+    return np.column_stack([points[:, 0], points[:, 2], 0.0 - points[:, 1]])
+
+
+def _camera_to_world(posed: PosedViews, centre: list[float]) -> list[list[float]]:
+    """Camera-to-world matrix; columns: the camera's right, up and back in the world, and its centre."""
+    axes = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+    if posed.rig is not None:
+        axes = (posed.rotation * [[1], [-1], [-1]]).T.tolist()
+    return [*([*axis, place] for axis, place in zip(axes, centre, strict=True)), [0.0, 0.0, 0.0, 1.0]]
