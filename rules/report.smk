@@ -22,7 +22,7 @@ rule plan:
 
 # All numbers of a report in one table with facts about the scenes beside it, and what is made of them alone: tables, and
 # charts in print quality. The parts of variant best have files of their own, since `all` does not run those variants.
-for which, (folder, plan) in NUMBERS.items():
+for which, (_, plan) in NUMBERS.items():
 
     rule:
         name:
@@ -34,7 +34,7 @@ for which, (folder, plan) in NUMBERS.items():
         output:
             report(table_files(which, ["csv"]), caption="captions/tables.rst", category="Tables"),
             table_files(which, ["md", "tex"]),
-            *map(as_chart, plan.charts),
+            charts=[file for name in plan.charts for file in as_chart(name)],
             numbers=multiext(f"reports/report{which}", ".json", ".csv"),
         log:
             f"logs/report{which}.log",
@@ -47,15 +47,15 @@ for which, (folder, plan) in NUMBERS.items():
             runtime=5 + sum(scene.minutes(0.1) for scene in scenes_of(which)) // 5,
         params:
             results=placed(RESULTS),
-            tables=placed(folder),
-            charts=placed(CHARTS),
+            tables=folder_of_output,
+            charts=flags_of_charts,
             code=code_digest("sepi.report.tables"),
         message:
             "numbers, tables and charts of the report"
         shell:
             command(
                 "sepi.report.tables --results {params.results:q} --plan {input.plan:q} --output {output.numbers[0]:q} "
-                "--tables {params.tables:q} --charts {params.charts:q} 2> {log:q}"
+                "--tables {params.tables:q} {params.charts:q} 2> {log:q}"
             )
 
 

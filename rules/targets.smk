@@ -26,6 +26,11 @@ def as_chart(name):
     return report(multiext(f"{CHARTS}/{name}", ".png", ".pdf"), caption=caption, category="Charts")
 
 
+def flags_of_charts(wildcards, output):
+    """Folder of the charts of a report that has some, as flags of the command that draws them."""
+    return ["--charts", os.path.dirname(output.charts[0])] if output.charts else []
+
+
 def report_files(name=""):
     """Files of a report: page if there is one, numbers, tables, and images of every scene."""
     plan = REPORTS[name]

@@ -24,19 +24,22 @@ from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sepi.camera import Camera
-    from sepi.errors import SepiError, SepiWarning
+    from sepi.camera import Camera as Camera
+    from sepi.errors import SepiError as SepiError
+    from sepi.errors import SepiWarning as SepiWarning
     from sepi.extensions.cameras.reader import read_cameras as read_cameras
     from sepi.extensions.views.all_views import AllViews as AllViews
     from sepi.extensions.views.all_views import estimate_all_views as estimate_all_views
     from sepi.extensions.views.refocusing import all_in_focus as all_in_focus
     from sepi.extensions.views.refocusing import refocus as refocus
-    from sepi.io.readers.options import ReadOptions
-    from sepi.io.result_folder import read_result, write_result
-    from sepi.lightfield import DisparityRange, LightField
-    from sepi.pipeline import estimate_depth
-    from sepi.reading import read_light_field
-    from sepi.stage import StageMaps
+    from sepi.io.readers.options import ReadOptions as ReadOptions
+    from sepi.io.result_folder import read_result as read_result
+    from sepi.io.result_folder import write_result as write_result
+    from sepi.lightfield import DisparityRange as DisparityRange
+    from sepi.lightfield import LightField as LightField
+    from sepi.pipeline import estimate_depth as estimate_depth
+    from sepi.reading import read_light_field as read_light_field
+    from sepi.stage import StageMaps as StageMaps
 
     __version__: str
     """Version of the installed package; ``"unknown"`` in a source tree that was never installed.
@@ -49,21 +52,6 @@ if TYPE_CHECKING:
     >>> f"sepi {sepi.__version__}"  # doctest: +ELLIPSIS
     'sepi ...'
     """
-
-__all__ = [
-    "Camera",
-    "DisparityRange",
-    "LightField",
-    "ReadOptions",
-    "SepiError",
-    "SepiWarning",
-    "StageMaps",
-    "__version__",
-    "estimate_depth",
-    "read_light_field",
-    "read_result",
-    "write_result",
-]
 
 _HOME = {
     "Camera": "sepi.camera",
@@ -78,6 +66,7 @@ _HOME = {
     "read_result": "sepi.io.result_folder",
     "write_result": "sepi.io.result_folder",
 }
+__all__ = [*_HOME, "__version__"]
 
 
 def __getattr__(name: str) -> Any:

@@ -5,11 +5,13 @@ The history of a map is the list of entries (:func:`sepi.stage.entry`) of the st
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
@@ -199,10 +201,19 @@ def _reading(path: Path, record: str) -> tuple[ReadOptions, str | None]:
 
 def package_version() -> str:
     """Version of the installed package; ``"unknown"`` in a source tree that is not installed."""
+    return version_of("sepi") or "unknown"
+
+
+@functools.cache
+def version_of(name: str) -> str:
+    """Version of a distribution; empty if it is not installed."""
     try:
-        return version("sepi")
+        text = distribution(name).read_text("METADATA") or ""
     except PackageNotFoundError:
-        return "unknown"
+        return ""
+    # the first lines alone: to read the others takes a job as long as a small stage
+    told = re.search(r"^Version: (.+)$", text, re.MULTILINE)
+    return told[1] if told else ""
 
 
 def stage_attributes(light_field: LightField, history: Sequence[Entry]) -> dict[str, Attribute]:

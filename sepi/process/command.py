@@ -202,21 +202,9 @@ def peak_memory_mb() -> float:
         status = Path("/proc/self/status").read_text(encoding="ascii")
         # ru_maxrss below would count the parent's memory
         return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")) / 2**10
-    try:
-        import resource
+    import resource
 
-        return megabytes(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-    except ImportError:
-        # Windows
-        import psutil
-
-        memory = psutil.Process().memory_info()
-        return float(getattr(memory, "peak_wset", memory.rss)) / 2**20
-
-
-def megabytes(maxrss: int) -> float:
-    """A peak memory as the system states it (``ru_maxrss``), in MB."""
-    return maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
 def write_timing(path: Path, started: float, threads: int, **more: Any) -> None:

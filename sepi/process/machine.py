@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import platform
-import re
-from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
+from sepi.io.provenance import package_version, version_of
 from sepi.process.threads import available_cores
 
 LIBRARIES = (
-    "sepi",
     "numpy",
     "scipy",
     "scikit-image",
@@ -32,32 +28,17 @@ def this_machine() -> dict[str, Any]:
     return {
         "processor": _processor(),
         "cores": available_cores(),
-        "memory_gb": round(_memory() / 2**30, 1),
+        "memory_gb": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1),
         "system": platform.system(),
         "python": platform.python_version(),
         **versions(),
     }
 
 
-@functools.cache
 def versions() -> dict[str, str]:
     """Versions of the package, ``"unknown"`` if it is not installed, and of its libraries."""
-    found = {"sepi": "unknown"}
-    for name in LIBRARIES:
-        with suppress(PackageNotFoundError):
-            # the first lines alone: to read the others takes every job as long as a small stage
-            told = re.search(r"^Version: (.+)$", distribution(name).read_text("METADATA") or "", re.MULTILINE)
-            found |= {} if told is None else {name: told[1]}
-    return found
-
-
-def _memory() -> int:
-    """Memory of the machine, bytes."""
-    if hasattr(os, "sysconf"):
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    import psutil
-
-    return int(psutil.virtual_memory().total)
+    found = {name: version_of(name) for name in LIBRARIES}
+    return {"sepi": package_version()} | {name: told for name, told in found.items() if told}
 
 
 def _processor() -> str:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from matplotlib.patches import Patch
 
+from sepi.report import published
+from sepi.report.comparison import mean_by_region
 from sepi.report.drawing import new_figure, save, save_sentence
-from sepi.report.page_data import BarGroup, StageTimes, ablation_bars, part_bars, stage_times
 from sepi.report.properties import variants_with_bars
-from sepi.report.runs import Runs, own_key
+from sepi.report.runs import Runs, count_note, datasets_of, own_key
+from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 INTERVAL = 90
 """Percentage of the pixels whose truth an interval should hold."""
@@ -63,8 +68,104 @@ _OURS, _PUBLISHED = "#4a7fae", "#b9bfc5"
 _STAGES = ("#3b5b92", "#2a8c8c", "#7ab648", "#d9b430", "#b25d2c", "#7d4f9e")
 
 
+@dataclass(frozen=True)
+class Bar:
+    """MSE x100 of a variant (None if not available), with a note if ours is over fewer scenes than the group's."""
+
+    variant: str
+    ours: float | None
+    published: float | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class BarGroup:
+    """Bars with one scale.
+
+    Attributes
+    ----------
+    dataset, region : str
+        Dataset and region of the figures.
+    scenes, available : int
+        Number of scenes in our averages, and number available; not all have each region.
+    rows : list of Bar
+    """
+
+    dataset: str
+    region: str
+    scenes: int
+    available: int
+    rows: list[Bar]
+
+    @property
+    def over(self) -> str:
+        """Text on the scenes in our averages; empty if there is one scene or none."""
+        if self.scenes in (0, self.available):
+            return f"{self.scenes} scenes" if self.scenes > 1 else ""
+        return f"{self.scenes} of {self.available} scenes"
+
+    @property
+    def figures(self) -> list[float]:
+        """All figures that are available."""
+        return [figure for row in self.rows for figure in (row.ours, row.published) if figure is not None]
+
+    @property
+    def largest(self) -> float:
+        """The largest figure; 1 if all are zero."""
+        return max(self.figures) or 1.0
+
+
+def ablation_bars(runs: Runs) -> list[BarGroup]:
+    """Average MSE x100 of each listed variant beside the published one, a group per dataset and region."""
+    groups = []
+    variants = list(runs.plan.variants)
+    for dataset in datasets_of(runs.plan):
+        means, counts = mean_by_region(runs, dataset, variants)
+        in_paper = published.table4().loc[dataset] if dataset in published.DATASETS else published.table4().iloc[:0]
+        theirs = in_paper.reindex(variants)
+        for region in REGIONS:
+            most = int(counts.loc[region].max())
+            rows = [
+                Bar(v, known(mean), known(theirs.at[v, region]), count_note([int(counts.at[region, v])], most))
+                for v, mean in means.loc[region].items()
+            ]
+            title = "whole map" if region == WHOLE_MAP else region
+            groups.append(BarGroup(dataset, title, most, len(runs.scored(dataset)), rows))
+    return [group for group in groups if group.figures]
+
+
+def part_bars(parts: Runs) -> list[BarGroup]:
+    """MSE x100 of the variants in the ablation of ``best``, a group per scene."""
+    found = {pair: parts.of("mse100", pair[0]).loc[pair[1]] for pair in parts.scored_pairs}
+    return [
+        BarGroup("/".join(pair), "whole map", 1, 1, [Bar(v, known(errors[own_key(v)])) for v in parts.plan.variants])
+        for pair, errors in found.items()
+    ]
+
+
+def stage_times(runs: Runs) -> pd.DataFrame:
+    """Seconds and peak memory, MB, of the compared variants' stages, 0 of those that are switched off.
+
+    Returns
+    -------
+    DataFrame
+        Rows ``(scene, variant)``, columns ``(score, stage)``.
+    """
+    return pd.DataFrame(
+        {
+            ("/".join(pair), variant): runs.took(pair, variant).fillna(0.0).unstack()
+            for pair in runs.plan.pairs
+            for variant in runs.plan.compared
+        }
+    ).T
+
+
+def known(figure: float) -> float | None:
+    return None if math.isnan(figure) else float(figure)
+
+
 def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
-    """Write bars for each group of :func:`sepi.report.page_data.ablation_bars`; without groups, a sentence."""
+    """Write bars for each group of :func:`ablation_bars`; without groups, a sentence."""
     if not groups:
         save_sentence(folder, name, "no scene with ground truth")
         return
@@ -96,22 +197,21 @@ def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
     save(figure, folder, name)
 
 
-def write_times(folder: Path, name: str, rows: Sequence[StageTimes]) -> None:
+def write_times(folder: Path, name: str, rows: pd.DataFrame) -> None:
     """Write stacked seconds of the stages beside their peak memory, a bar per scene and variant."""
     figure = new_figure(9, 1.2 + 0.3 * len(rows))
     time, memory = figure.subplots(1, 2, sharey=True)
     positions = np.arange(len(rows))
     left = np.zeros(len(rows))
-    stages = list(rows[0].seconds)
+    stages = list(rows["seconds"])
     for number, stage in enumerate(stages):
-        seconds = np.array([row.seconds[stage] for row in rows])
-        peaks = [row.memory[stage] for row in rows]
+        seconds, peaks = (rows[score, stage].to_numpy() for score in ("seconds", "peak_memory_mb"))
         colour = _STAGES[number % len(_STAGES)]
         time.barh(positions, seconds, 0.7, left=left, color=colour, label=stage)
         shift = (number + 0.5) / len(stages) - 0.5
         memory.barh(positions + 0.7 * shift, peaks, 0.6 / len(stages), color=colour)
         left += seconds
-    time.set_yticks(positions, [f"{row.scene}, {row.variant}" for row in rows], fontsize=7, parse_math=False)
+    time.set_yticks(positions, list(map(", ".join, rows.index)), fontsize=7, parse_math=False)
     time.invert_yaxis()
     time.set_xlabel("seconds", fontsize=8)
     memory.set_xlabel("peak memory / MB", fontsize=8)

@@ -67,18 +67,19 @@ _PATH = click.Path(path_type=Path)
 )
 @click.option("--output", type=_PATH, required=True, help="JSON file to write, a CSV beside it.")
 @click.option("--tables", "folder", type=_PATH, required=True, help="Folder for the tables.")
-@click.option("--charts", "figures", type=_PATH, required=True, help="Folder for the charts.")
-def command(results: Path, path: Path, output: Path, folder: Path, figures: Path) -> None:
+@click.option("--charts", "figures", type=_PATH, help="Folder for the charts; default: none are drawn.")
+def command(results: Path, path: Path, output: Path, folder: Path, figures: Path | None) -> None:
     """Write all numbers of a report, its tables, and its charts."""
     told = read_json(path, {"scenes", "variants"}, "the plan of a report", "snakemake")
     write_numbers(collect(Plan.from_json(results, json.dumps(told))), output)
     # as a page reads them
     runs = read_numbers(output)
     write_tables(runs, folder)
-    for name in runs.plan.charts:
+    if figures is not None:
         from sepi.report.charts import CHARTS
 
-        CHARTS[name](figures, name, runs)
+        for name in runs.plan.charts:
+            CHARTS[name](figures, name, runs)
 
 
 if __name__ == "__main__":

@@ -16,9 +16,10 @@ from matplotlib.colors import Colormap
 
 from sepi.io.files import atomic_path
 from sepi.process.command import SepiCommand
-from sepi.report import page_data, published
+from sepi.report import charts, published
+from sepi.report.charts import known
 from sepi.report.pictures import error_scale, scale_colours
-from sepi.report.runs import Runs, read_json, read_numbers
+from sepi.report.runs import Runs, count_note, own_key, read_json, read_numbers
 from sepi.report.tables import table
 from sepi.workflow.rendered_scenes import DATASET
 
@@ -63,6 +64,78 @@ def colour_scales() -> dict[str, str]:
     return {name: base64.b64encode(scale_colours(scale).tobytes()).decode("ascii") for name, scale in scales.items()}
 
 
+def headline(runs: Runs) -> list[dict[str, Any]]:
+    """Our figures beside the published ones for the paper's scenes, then averages over the other scenes.
+
+    Returns
+    -------
+    list of dict
+        ``scene``; ``published``: MSE x100 and Q25 x100; ``ours``: variant to the same two; ``notes``: variant to the
+        number of scenes, if lower than in the row.
+    """
+
+    def ours(dataset: str, scenes: list[str]) -> dict[str, Any]:
+        found = [runs.of(score, dataset).loc[scenes] for score in ("mse100", "q25")]
+        keys = {variant: own_key(variant) for variant in runs.plan.compared}
+        return {
+            "ours": {variant: [known(one[key].mean()) for one in found] for variant, key in keys.items()},
+            "notes": {v: count_note([int(one[key].count()) for one in found], len(scenes)) for v, key in keys.items()},
+        }
+
+    rows: list[dict[str, Any]] = []
+    for dataset in published.DATASETS:
+        for scene in runs.scored(dataset):
+            name = published.paper_scene(dataset, scene)
+            if name is not None:
+                tables = (published.table1(), published.table2())
+                theirs = [known(table.at[(dataset, name), published.PAPERS_METHOD]) for table in tables]
+                rows.append({"scene": f"{dataset}/{scene}", "published": theirs, **ours(dataset, [scene])})
+    for dataset in runs.plan.scenes:
+        others = [scene for scene in runs.scored(dataset) if published.paper_scene(dataset, scene) is None]
+        if others:
+            title = f"{dataset}, average of {len(others)}" if len(others) > 1 else f"{dataset}/{others[0]}"
+            rows.append({"scene": title, "published": [None, None], **ours(dataset, others)})
+    return rows
+
+
+def missing_scenes(runs: Runs) -> dict[str, list[str]]:
+    """Scenes of the paper that are not available, by dataset."""
+    found = {}
+    for dataset in published.DATASETS:
+        here = {published.paper_scene(dataset, scene) for scene in runs.plan.scenes.get(dataset, ())}
+        found[dataset] = [scene for scene in published.scenes(dataset) if scene not in here]
+    return found
+
+
+def total_seconds(*reports: Runs) -> float:
+    """Total seconds of all stages in these numbers, each counted once."""
+    seconds = {
+        (row.dataset, row.scene, runs.plan.stage_key(row.variant, row.stage)): row.value
+        for runs in reports
+        for row in runs.numbers[runs.numbers["score"] == "seconds"].itertuples()
+    }
+    return float(sum(seconds.values()))
+
+
+def parameter_rows(runs: Runs) -> list[tuple[str, list[tuple[str, Any]]]]:
+    """Stage and choice with its parameters; repeated if scenes have different ones."""
+    return [
+        (
+            f"{stage}: {choice}",
+            [(name, "by range and grid" if value is None else value) for name, value in values.items()],
+        )
+        for stage, choices in runs.facts["parameters"].items()
+        for choice, found in choices.items()
+        for values in found
+    ]
+
+
+def first_scene(runs: Runs) -> str:
+    """The scene to show first: one of the paper's, else the last one, by the order of built-in scenes."""
+    known = [pair for pair in runs.plan.pairs if published.paper_scene(*pair) is not None]
+    return "/".join(known[0] if known else runs.plan.pairs[-1])
+
+
 def page_of(
     runs: Runs,
     scenes: Sequence[Mapping[str, Any]],
@@ -86,7 +159,7 @@ def page_of(
     """
     # averages over rendered scenes and levels of noise mean nothing, and no published figures exist
     averaged = runs.plan.report != DATASET
-    first_title = page_data.first_scene(runs)
+    first_title = first_scene(runs)
     shown = [scene for scene in scenes if f"{scene['dataset']}/{scene['scene']}" == first_title] or scenes
     tables = {name: table(name, found) for found in (runs, parts) if found is not None for name in found.plan.tables}
     return (
@@ -96,16 +169,16 @@ def page_of(
             title="sepi: light field depth by stitched epipolar plane images",
             numbers=runs.facts,
             report=runs.plan.report,
-            variants=page_data.shown_variants(runs, parts),
+            variants={**runs.plan.variants, **({} if parts is None else parts.plan.variants)},
             tables=tables,
-            headline=page_data.headline(runs) if averaged else [],
-            missing=page_data.missing_scenes(runs) if averaged else {},
+            headline=headline(runs) if averaged else [],
+            missing=missing_scenes(runs) if averaged else {},
             dataset_titles=published.DATASETS,
-            bars=page_data.ablation_bars(runs) if averaged else [],
-            part_bars=[] if parts is None else page_data.part_bars(parts),
-            times=page_data.stage_times(runs),
-            total_seconds=page_data.total_seconds(*filter(None, (runs, parts))),
-            parameters=page_data.parameter_rows(runs),
+            bars=charts.ablation_bars(runs) if averaged else [],
+            part_bars=[] if parts is None else charts.part_bars(parts),
+            times=charts.stage_times(runs),
+            total_seconds=total_seconds(*filter(None, (runs, parts))),
+            parameters=parameter_rows(runs),
             scenes=embedded_scenes(scenes),
             first=shown[0] if shown else None,
             first_title=first_title,

@@ -23,7 +23,7 @@ from sepi.extensions.page.scene import page_json
 from sepi.extensions.page.viewer import OTHER, PRECISE, STEPS, viewer_json
 from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
-from sepi.report import charts, figures, page_data, published
+from sepi.report import charts, figures, published
 from sepi.report.panels import Kind, Panel, SceneResults, panels_of
 from sepi.report.runs import Runs
 from sepi.scoring.scores import REGIONS
@@ -191,7 +191,7 @@ def score_of(
 
 def test_headline_figures(runs: Runs, example: Example) -> None:
     """Ours beside the paper's, for the scenes that the paper has; then the others."""
-    row, other = page_data.headline(runs)
+    row, other = page.headline(runs)
     assert other["scene"] == "builtin/dots"
     assert other["published"] == [None, None]
     assert other["ours"]["paper"] == [score_of(example, DOTS, "paper", "all", name) for name in ("mse100", "q25")]
@@ -203,7 +203,7 @@ def test_headline_figures(runs: Runs, example: Example) -> None:
 
 def test_ablation_bars(runs: Runs, example: Example) -> None:
     """Averages over the scenes available, beside the published averages of the same variant and region."""
-    groups = {(group.dataset, group.region): group for group in page_data.ablation_bars(runs)}
+    groups = {(group.dataset, group.region): group for group in charts.ablation_bars(runs)}
     assert {region for _, region in groups} == {"whole map", *REGIONS[1:]}
     whole = groups["hci", "whole map"]
     bars = {bar.variant: bar for bar in whole.rows}
@@ -225,11 +225,11 @@ def test_averages_name_the_scenes_that_have_no_such_region(runs: Runs) -> None:
     wall = runs.numbers[runs.numbers["scene"] == "dots"].assign(scene="wall")
     wall.loc[(wall["region"] == "occluded") & (wall["score"] == "mse100"), "value"] = np.nan
     changed = Runs(facts, pd.concat([runs.numbers, wall]))
-    groups = {group.region: group for group in page_data.ablation_bars(changed) if group.dataset == "builtin"}
+    groups = {group.region: group for group in charts.ablation_bars(changed) if group.dataset == "builtin"}
     assert (groups["whole map"].over, groups["occluded"].over) == ("2 scenes", "1 of 2 scenes")
     wall.loc[wall["score"] == "mse100", "value"] = np.nan
     changed = Runs(facts, pd.concat([runs.numbers, wall]))
-    assert page_data.headline(changed)[-1]["notes"]["paper"] == "1/2 scenes"
+    assert page.headline(changed)[-1]["notes"]["paper"] == "1/2 scenes"
 
 
 def test_charts_are_written(example: Example, tmp_path: Path) -> None:
