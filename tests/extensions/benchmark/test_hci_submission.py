@@ -14,8 +14,7 @@ from click.testing import CliRunner, Result
 from error_lines import error_of
 
 from sepi.errors import SepiError
-from sepi.extensions.benchmark.commands import check_submission, submission
-from sepi.extensions.benchmark.hci_submission import SCENES, problems_of
+from sepi.extensions.benchmark.hci_submission import SCENES, check_submission, problems_of, submission
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
 from sepi.stage import StageMaps

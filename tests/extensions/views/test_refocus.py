@@ -16,7 +16,7 @@ from several_threads import threads
 import sepi
 from sepi.cli.main import main
 from sepi.extensions.views import refocusing
-from sepi.extensions.views.refocused_folder import stack_names
+from sepi.extensions.views.refocus import stack_names
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import read_picture
 from sepi.io.pfm import write_pfm

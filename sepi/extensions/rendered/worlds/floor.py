@@ -11,26 +11,19 @@ import numpy as np
 from sepi.extensions.rendered import patterns
 from sepi.extensions.rendered.shapes import ball, bevelled, box, joined, leaf, moved, rectangle, rod, sheet, turned_body
 from sepi.extensions.rendered.staging import chair, lamp_towards, seen_from
-from sepi.extensions.rendered.world import Material, Mesh, Pattern, Thing, World
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Paths, Pattern, Thing, World
 
 _WALL = 4.1
 
 
 def world() -> World:
     """A hall without a ceiling, lit from the upper left."""
+    lamp = lamp_towards((-2.6, -3.2, 0.8), (0.1, -0.3, 3.0), 1.7, (26.0, 24.0, 21.0))
     hall = World(
         [*_hall(), *_curtain(), *_chairs(), *_pots(), *_agave()],
-        near=1.81,
-        far=4.17,
-        at_near=2.0,
-        at_far=-1.7,
-        sky=(0.75, 0.8, 0.88),
-        lamps=[lamp_towards((-2.6, -3.2, 0.8), (0.1, -0.3, 3.0), 1.7, (26.0, 24.0, 21.0))],
-        exposure=1.25,
-        field_of_view=36,
-        depth=7,
-        roulette=5,
-        paths=0.39,
+        Cameras(1.81, 4.17, 2.0, -1.7, 36),
+        Light(sky=(0.75, 0.8, 0.88), lamps=[lamp], exposure=1.25),
+        Paths(7, 5, 0.39),
     )
     return seen_from(hall, (0.05, -0.95, 0.0), below=12)
 

@@ -23,7 +23,7 @@ from sepi.extensions.rendered.shapes import (
     turned_body,
 )
 from sepi.extensions.rendered.staging import house, seen_from
-from sepi.extensions.rendered.world import Material, Mesh, Pattern, Sun, Thing, World
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Pattern, Sun, Thing, World
 
 _FAR = 900.0
 # where houses stand: those in front, and the village behind
@@ -35,15 +35,8 @@ def world() -> World:
     """The valley on a morning in summer."""
     valley = World(
         [*_terrain(), *_sky(), *_village(), *_trees(), *_lane()],
-        near=56.0,
-        far=890.0,
-        at_near=0.6,
-        at_far=-0.55,
-        sky=(0.7, 0.85, 1.1),
-        suns=[Sun((0.85, 0.75, 0.35), (6.5, 6.0, 5.0))],
-        exposure=0.95,
-        field_of_view=32,
-        depth=6,
+        Cameras(56.0, 890.0, 0.6, -0.55, 32),
+        Light(sky=(0.7, 0.85, 1.1), suns=[Sun((0.85, 0.75, 0.35), (6.5, 6.0, 5.0))], exposure=0.95),
     )
     return seen_from(valley, (0.0, -31.0, 0.0), below=5.5)
 

@@ -9,19 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from sepi.extensions.rendered import patterns
-from sepi.extensions.rendered.shapes import (
-    ball,
-    bevelled,
-    box,
-    joined,
-    moved,
-    painted_from,
-    rectangle,
-    rod,
-    turned_body,
-)
-from sepi.extensions.rendered.staging import book, crate, leaning, seen_from
-from sepi.extensions.rendered.world import Lamp, Material, Thing, Vector, World
+from sepi.extensions.rendered.shapes import ball, bevelled, box, joined, moved, rectangle, rod, turned_body
+from sepi.extensions.rendered.staging import book, crate, leaning, of_boards, seen_from
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Thing, Vector, World
 
 _WALL = 3.0
 _LIFT = 0.002
@@ -29,33 +19,24 @@ _LIFT = 0.002
 
 def world() -> World:
     """The heap, by a window on the left."""
-    things = [*_room(), *_boxes(), *_books(), *_balls(), *_sticks()]
+    lamp = Lamp((-1.9, -2.9, 2.4), (-0.6, 0.0, -2.2), (-0.4, 1.5, 0.0), (22.0, 20.5, 18.5))
     heap = World(
-        things,
-        near=1.46,
-        far=2.86,
-        at_near=1.9,
-        at_far=-1.8,
-        sky=(0.75, 0.78, 0.83),
-        lamps=[Lamp((-1.9, -2.9, 2.4), (-0.6, 0.0, -2.2), (-0.4, 1.5, 0.0), (22.0, 20.5, 18.5))],
-        exposure=1.0,
-        field_of_view=38,
-        depth=6,
+        [*_room(), *_boxes(), *_books(), *_balls(), *_sticks()],
+        Cameras(1.46, 2.86, 1.9, -1.8, 38),
+        Light(sky=(0.75, 0.78, 0.83), lamps=[lamp]),
     )
     return seen_from(heap, (0.02, -1.0, 0.3), below=19)
 
 
 def _room() -> list[Thing]:
-    planks = [
-        painted_from(rectangle((-3 + 0.14 * n, 0, -1), (0, 0, 4), (0.137, 0, 0)), 0.37 * n, 0.14 * n) for n in range(44)
-    ]
+    planks = [rectangle((-3 + 0.14 * n, 0, -1), (0, 0, 4), (0.137, 0, 0)) for n in range(44)]
     under = rectangle((-4, _LIFT, -1), (0, 0, 4.1), (8, 0, 0))
     wall = rectangle((-4, -4, _WALL), (8, 0, 0), (0, 4, 0))
     skirting = box((0, -0.05, _WALL - 0.009), (8, 0.1, 0.018))
     plaster = patterns.noise(11, (0.62, 0.6, 0.52), 0.06, 1.1, finest=3, coarsest=300, chroma=0.25)
     boards = patterns.wood(12, 1.3, (0.6, 0.45, 0.3), (0.38, 0.26, 0.17))
     return [
-        Thing(joined(planks), Material(boards)),
+        Thing(of_boards(planks, 0.37, 0.14), Material(boards)),
         Thing(under, Material((0.08, 0.06, 0.05))),
         Thing(wall, Material(plaster)),
         Thing(skirting, Material((0.75, 0.73, 0.68))),

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sepi.extensions.rendered import patterns, shapes
-from sepi.extensions.rendered.world import Material, Mesh, Sun, Thing, Vector, World
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Paths, Sun, Thing, Vector, World
 
 GROUND = 4.0
 _PANE = Material((0.1, 0.12, 0.14), "glossy")
@@ -59,16 +59,10 @@ def world() -> World:
     for number, (x, z) in enumerate([(0.2, 17.5), (2.9, 15.5), (-0.9, 20.5), (3.9, 20.0)]):
         things += _parasol((x, GROUND, z), red_white if number % 2 else green)
     return World(
-        things=things,
-        near=6.6,
-        far=26.0,
-        at_near=2.2,
-        at_far=-1.5,
-        sky=(0.36, 0.44, 0.56),
-        suns=[Sun((0.36, 0.72, 0.55), (2.0, 1.86, 1.62))],
-        exposure=1.6,
-        field_of_view=50,
-        depth=4,
+        things,
+        Cameras(6.6, 26.0, 2.2, -1.5, 50),
+        Light(sky=(0.36, 0.44, 0.56), suns=[Sun((0.36, 0.72, 0.55), (2.0, 1.86, 1.62))], exposure=1.6),
+        Paths(4),
     )
 
 
@@ -107,12 +101,8 @@ def _front(front: Front) -> list[Thing]:
             awnings += _awning(x, 1.7 * front.pitch)
     panes = [_slab((0, -front.floors * front.storey), (length, 0), 0.05, 0.27)]
     blind = Material(patterns.stripes(0.3, [(0.8, 0.76, 0.66), (0.7, 0.66, 0.56)], across=False))
-    parts: list[tuple[list[Mesh], Material | None]] = [
-        (wall, front.wall),
-        (sills, _SILL),
-        (bars, _WHITE),
-        (panes, _PANE),
-    ]
+    parts: list[tuple[list[Mesh], Material | None]]
+    parts = [(wall, front.wall), (sills, _SILL), (bars, _WHITE), (panes, _PANE)]
     parts += [(blinds, blind), (leaves, front.shutters), (iron, _IRON), (awnings, front.awnings)]
     return [
         Thing(shapes.moved(shapes.joined(meshes), (0, front.turn, 0), front.corner), material, thin=meshes is iron)
