@@ -100,12 +100,8 @@ def render_world(
     rig = rig_of(world, options.size, options.grid, options.baseline)
     count = math.prod(options.grid)
     parts = _parts(path)
-    _take_over(
-        parts,
-        json.dumps(
-            {**made_by(name, options), "world": hashlib.sha256(pickle.dumps(world)).hexdigest()}, sort_keys=True
-        ),
-    )
+    digest = hashlib.sha256(pickle.dumps(world)).hexdigest()
+    _take_over(parts, json.dumps({**made_by(name, options), "world": digest}, sort_keys=True))
     files = [parts / f"view_{number:03d}.npz" for number in range(count)]
     missing = [number for number, file in enumerate(files) if not _is_whole(file)]
     for done, (number, values) in enumerate(_views(world, rig, options, missing), count - len(missing) + 1):

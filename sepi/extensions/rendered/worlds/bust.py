@@ -29,23 +29,20 @@ def world() -> World:
     clay = Material(_amphora_paint())
     fruit = Material(patterns.noise(51, (0.72, 0.26, 0.14), 0.05, 0.12, finest=3))
     lamp = Lamp((-2.5, -1.0, 0.3), (0, 0, 1.3), (0.6, -1.2, 0), (15.0, 14.2, 13.0))
-    return World(
-        [
-            Thing(shapes.moved(_bust(), (0, 0.5, 0), (0.03, TABLE - 0.59, 1.62)), marble),
-            Thing(shapes.turned_body(staging.profile(_FOOT), (0.03, TABLE - 0.06, 1.62)), marble),
-            Thing(shapes.box((0.03, TABLE - 0.03, 1.62), (0.26, 0.06, 0.26), (0, 0.12, 0)), limestone),
-            Thing(shapes.box((0, TABLE + 0.06, 2.05), (3.6, 0.12, 1.8)), limestone),
-            Thing(_wall(0.48, -0.12), plaster),
-            Thing(_niche(0.48, -0.12), paint),
-            Thing(_amphora((-0.4, TABLE, 1.85)), clay),
-            Thing(_urn((0.37, TABLE, 1.78)), Material(patterns.noise(61, (0.7, 0.68, 0.62), 0.05, 0.3))),
-            Thing(staging.vessel(_BOWL, 0.005, (-0.26, TABLE, 1.41)), glaze),
-            *(Thing(staging.fruit((x, TABLE - y, z), 0.038, n), fruit) for n, (x, y, z) in enumerate(_FRUIT)),
-        ],
-        Cameras(1.15, 2.83, 2.1, -1.9, 31),
-        Light(sky=(0.22, 0.23, 0.26), lamps=[lamp], exposure=1.35),
-        Paths(4),
-    )
+    things = [
+        Thing(shapes.moved(_bust(), (0, 0.5, 0), (0.03, TABLE - 0.59, 1.62)), marble),
+        Thing(shapes.turned_body(staging.profile(_FOOT), (0.03, TABLE - 0.06, 1.62)), marble),
+        Thing(shapes.box((0.03, TABLE - 0.03, 1.62), (0.26, 0.06, 0.26), (0, 0.12, 0)), limestone),
+        Thing(shapes.box((0, TABLE + 0.06, 2.05), (3.6, 0.12, 1.8)), limestone),
+        Thing(_wall(0.48, -0.12), plaster),
+        Thing(_niche(0.48, -0.12), paint),
+        Thing(_amphora((-0.4, TABLE, 1.85)), clay),
+        Thing(_urn((0.37, TABLE, 1.78)), Material(patterns.noise(61, (0.7, 0.68, 0.62), 0.05, 0.3))),
+        Thing(staging.vessel(_BOWL, 0.005, (-0.26, TABLE, 1.41)), glaze),
+        *(Thing(staging.fruit((x, TABLE - y, z), 0.038, n), fruit) for n, (x, y, z) in enumerate(_FRUIT)),
+    ]
+    light = Light(sky=(0.22, 0.23, 0.26), lamps=[lamp], exposure=1.35)
+    return World(things, Cameras(1.15, 2.83, 2.1, -1.9, 31), light, Paths(4))
 
 
 _FOOT = [(0.001, 0.125), (0.05, 0.125), (0.052, 0.112), (0.036, 0.09), (0.034, 0.07), (0.05, 0.05), (0.075, 0.035),
@@ -118,11 +115,8 @@ def _amphora_paint() -> Pattern:
     key = key[(6 * 24 * y).astype(int) % 6, (6 * 24 * x).astype(int) % 6]
     tongue = np.cos(2 * np.pi * 48 * x) > 0.2
     band = (y * 24).astype(int)
-    black = np.select(
-        [np.isin(band, (5, 14)), np.isin(band, (4, 6, 13, 15)), np.isin(band, (9, 18, 19)), band % 4 == 0],
-        [key, 0 * y, tongue, 1 + 0 * y],
-        0,
-    )
+    kinds = [np.isin(band, (5, 14)), np.isin(band, (4, 6, 13, 15)), np.isin(band, (9, 18, 19)), band % 4 == 0]
+    black = np.select(kinds, [key, 0 * y, tongue, 1 + 0 * y], 0)
     worn = 1 + 0.06 * patterns.field(71, 3, 120)
     colour = np.where(black[..., None] > 0, [0.17, 0.13, 0.12], [0.74, 0.42, 0.24]) * worn[..., None]
     return patterns.painted(colour, 0.6)
@@ -174,11 +168,8 @@ def _without(a: Array, b: Array, width: float) -> Array:
 def _head(p: Array) -> Array:
     """Distance from the head, whose face looks along ``z``, ``y`` up; the ears are at height 0."""
     q = np.stack([np.abs(p[..., 0]), p[..., 1], p[..., 2]], axis=-1)
-    d = _blend(
-        _ellipsoid(q, (0, 0.03, -0.012), (0.074, 0.088, 0.1)),
-        _ellipsoid(q, (0, -0.03, 0.03), (0.06, 0.085, 0.064)),
-        0.02,
-    )
+    d = _ellipsoid(q, (0, 0.03, -0.012), (0.074, 0.088, 0.1))
+    d = _blend(d, _ellipsoid(q, (0, -0.03, 0.03), (0.06, 0.085, 0.064)), 0.02)
     d = _blend(d, _ellipsoid(q, (0, -0.072, 0.035), (0.051, 0.042, 0.054)), 0.02)
     d = _blend(d, _ellipsoid(q, (0, -0.1, 0.077), (0.021, 0.017, 0.018)), 0.02)
     d = _blend(d, _ellipsoid(q, (0.044, -0.022, 0.06), (0.02, 0.016, 0.02)), 0.025)
@@ -237,10 +228,8 @@ def _hair(p: Array) -> Array:
 def _locks(p: Array) -> Array:
     """Waves of hair that run from the crown down, -1..1."""
     rng = np.random.default_rng(5)
-    warp = sum(
-        np.sin(p @ (frequency * rng.standard_normal(3)) + rng.uniform(0, 6)) * 40 / frequency
-        for frequency in (40, 40, 60, 60, 110)
-    )
+    waves = (40, 40, 60, 60, 110)
+    warp = sum(np.sin(p @ (wave * rng.standard_normal(3)) + rng.uniform(0, 6)) * 40 / wave for wave in waves)
     around = np.arctan2(p[..., 0], p[..., 2] + 0.01)
     found: Array = 1 - 2 * np.abs(np.sin(10 * around + 30 * p[..., 1] + warp))
     return found

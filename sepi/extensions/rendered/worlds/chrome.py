@@ -23,6 +23,7 @@ _VASE = [(0.06, 0.36), (0.066, 0.355), (0.04, 0.32), (0.036, 0.27), (0.09, 0.2),
          (0.05, 0.03), (0.075, 0.015), (0.078, 0.0)]  # fmt: skip
 _STICK = [(0.018, 0.26), (0.022, 0.255), (0.014, 0.235), (0.011, 0.2), (0.02, 0.17), (0.012, 0.14), (0.014, 0.08),
           (0.03, 0.04), (0.02, 0.03), (0.055, 0.012), (0.058, 0.0)]  # fmt: skip
+_QUINCES = [(0.02, 1.34), (-0.22, 1.22)]
 _CUP = [(0.045, 0.07), (0.047, 0.068), (0.044, 0.04), (0.03, 0.01), (0.026, 0.0)]
 
 
@@ -39,10 +40,7 @@ def world() -> World:
         Thing(shapes.box((-0.42, TABLE - 0.05, 1.42), (0.24, 0.1, 0.17), (0, 0.35, 0)), lacquer),
         Thing(shapes.box((-0.42, TABLE - 0.112, 1.42), (0.25, 0.02, 0.18), (0, 0.35, 0)), lacquer),
         Thing(staging.vessel(_CUP, 0.003, (0.3, TABLE, 1.47)), Material(_china(), "glossy")),
-        *(
-            Thing(staging.fruit((x, TABLE - 0.033, z), 0.036, n), _QUINCE)
-            for n, (x, z) in enumerate([(0.02, 1.34), (-0.22, 1.22)])
-        ),
+        *(Thing(staging.fruit((x, TABLE - 0.033, z), 0.036, n), _QUINCE) for n, (x, z) in enumerate(_QUINCES)),
         *_books((0.43, TABLE, 1.4), 31, [0.024, 0.03, 0.018]),
         *_bookcase(),
         *_porthole((0.34, -0.3, WALL - 0.02)),
@@ -51,7 +49,8 @@ def world() -> World:
         things.append(Thing(shapes.turned_body(staging.profile(_STICK), (x, TABLE, z)), CHROME))
         candle = [(0.0005, 0.42), (0.008, 0.418), (0.0105, 0.41), (0.0105, 0.25)]
         things.append(Thing(shapes.turned_body(staging.profile(candle), (x, TABLE, z)), Material((0.9, 0.86, 0.76))))
-    return World(things, Cameras(1.0, WALL, 2.0, -1.8, 38), Light(sky=_room(), exposure=1.65), Paths(6, 4, 0.55))
+    light = Light(sky=_room(), exposure=1.65)
+    return World(things, Cameras(1.0, WALL, 2.0, -1.8, 38), light, Paths(6, 4, 0.55))
 
 
 def _plane() -> Mesh:
@@ -131,11 +130,8 @@ def _room() -> npt.NDArray[np.float32]:
     """Radiance of ceiling, walls, floor, and of windows with bars in the wall behind and on the left."""
     down, across = (np.mgrid[:256, :512] + 0.5) / 256
     room = np.empty((256, 512, 3))
-    room[:] = np.where(
-        (down < 0.3)[..., None],
-        [0.5, 0.49, 0.46],
-        np.where((down < 0.66)[..., None], [0.3, 0.27, 0.22], [0.1, 0.075, 0.05]),
-    )
+    below = np.where((down < 0.66)[..., None], [0.3, 0.27, 0.22], [0.1, 0.075, 0.05])
+    room[:] = np.where((down < 0.3)[..., None], [0.5, 0.49, 0.46], below)
     for left, width in ((0.28, 0.22), (0.54, 0.18), (1.4, 0.16)):
         inside = (across > left) & (across < left + width) & (down > 0.27) & (down < 0.55)
         bars = ((across - left) / width * 3 % 1 < 0.08) | ((down - 0.27) / 0.07 % 1 < 0.1)

@@ -19,6 +19,7 @@ _CAN = [(0.003, 0.2), (0.004, 0.17), (0.011, 0.11), (0.014, 0.1), (0.045, 0.075)
 
 STEEL = Material(kind="mirror", metal="Cr", roughness=0.3)
 IRON = Material((0.16, 0.16, 0.17), "glossy", 0.2)
+_SPANNERS = [(0.19, 0.2), (0.235, 0.165), (0.275, 0.13)]
 _HANDLE = [(0.0005, 0.1), (0.008, 0.099), (0.014, 0.09), (0.015, 0.07), (0.0105, 0.045), (0.014, 0.015), (0.01, 0.0)]
 
 
@@ -41,10 +42,7 @@ def world() -> World:
         *_hammer((0.09, -0.12, HUNG), (0, 0, 0), beech),
         *_vice((-0.42, BENCH, 1.36), red),
         *_plane((0.3, BENCH, 1.36), beech),
-        *(
-            Thing(_spanner(length, (x, 0.05, HUNG), 0.08), STEEL)
-            for x, length in ((0.19, 0.2), (0.235, 0.165), (0.275, 0.13))
-        ),
+        *(Thing(_spanner(length, (x, 0.05, HUNG), 0.08), STEEL) for x, length in _SPANNERS),
         Thing(staging.vessel(_CAN, 0.001, (0.03, BENCH, 1.6)), Material(kind="mirror", metal="Cu", roughness=0.2)),
         Thing(_cable((-0.68, -0.2, HUNG - 0.02)), IRON, thin=True),
         Thing(_plan(), Material(patterns.printed(51, 0.36, 18, (0.86, 0.82, 0.7), 0.25))),
@@ -53,12 +51,8 @@ def world() -> World:
         *_brushes((-0.16, BENCH, 1.66), beech),
     ]
     lamp = Lamp((-0.65, -0.88, 1.12), (0, 0, 0.42), (0.7, 0, 0), (4.6, 3.8, 2.7))
-    return World(
-        things,
-        Cameras(1.1, WALL, 1.8, -1.8, 44),
-        Light(sky=(0.022, 0.025, 0.034), lamps=[lamp], exposure=4.5, share=0.1),
-        Paths(5),
-    )
+    light = Light(sky=(0.022, 0.025, 0.034), lamps=[lamp], exposure=4.5, share=0.1)
+    return World(things, Cameras(1.1, WALL, 1.8, -1.8, 44), light, Paths(5))
 
 
 def _boards() -> Mesh:
@@ -86,9 +80,8 @@ def _shelf_ware() -> list[Thing]:
         label = patterns.stripes(0.08, [*colours[number], colours[number][1]], across=False)
         found.append(Thing(staging.vessel(_TIN, 0.001, (x, shelf, z)), Material(label)))
     for number, x in enumerate((0.42, 0.64, 0.735)):
-        content = patterns.noise(
-            41 + 5 * number, (0.5 - 0.1 * number, 0.4, 0.3 + 0.06 * number), 0.12, 0.12, finest=3, coarsest=40
-        )
+        colour = (0.5 - 0.1 * number, 0.4, 0.3 + 0.06 * number)
+        content = patterns.noise(41 + 5 * number, colour, 0.12, 0.12, finest=3, coarsest=40)
         found.append(Thing(staging.vessel(_JAR, 0.002, (x, shelf, z)), Material(content, "glossy")))
     return found
 
@@ -136,9 +129,8 @@ def _brushes(foot: Vector, wood: Material) -> list[Thing]:
     sticks, hairs = [], []
     for angle, rise in ((0.3, 0.2), (2.2, 0.23), (4.0, 0.18), (5.2, 0.25)):
         out = np.array([np.cos(angle), 0, np.sin(angle)])
-        path = np.array(foot) + np.array(
-            [0.01 * out, 0.03 * out + [0, -0.11, 0], 0.03 * out * rise / 0.1 + [0, -rise, 0]]
-        )
+        ends = [0.01 * out, 0.03 * out + [0, -0.11, 0], 0.03 * out * rise / 0.1 + [0, -rise, 0]]
+        path = np.array(foot) + np.array(ends)
         sticks.append(shapes.tube(path, 0.004, 8))
         tip = path[-1] + (path[-1] - path[-2]) / np.linalg.norm(path[-1] - path[-2]) * np.linspace(0, 0.04, 6)[:, None]
         hairs.append(shapes.tube(tip, np.array([0.006, 0.008, 0.009, 0.009, 0.006, 0.001])))
@@ -168,26 +160,19 @@ def _saw(at: Vector, wood: Material) -> list[Thing]:
 
 def _hammer(at: Vector, turn: Vector, wood: Material) -> list[Thing]:
     face = shapes.turned_body(np.array([[0.0005, 0.0], [0.015, 0.0], [0.015, -0.035]]), (0, 0, 0), 24)
-    head = [
-        shapes.box((0.01, -0.13, 0), (0.06, 0.026, 0.026)),
-        shapes.box((-0.035, -0.127, 0), (0.05, 0.012, 0.026), (0, 0, 0.15)),
-        shapes.moved(face, (0, 0, np.pi / 2), (0.065, -0.13, 0)),
-    ]
-    handle = shapes.tube(
-        np.array([[0, -0.15, 0], [0, -0.05, 0], [0, 0.06, 0], [0, 0.14, 0]]), np.array([0.009, 0.01, 0.012, 0.014])
-    )
+    head = [shapes.box((0.01, -0.13, 0), (0.06, 0.026, 0.026))]
+    head += [shapes.box((-0.035, -0.127, 0), (0.05, 0.012, 0.026), (0, 0, 0.15))]
+    head += [shapes.moved(face, (0, 0, np.pi / 2), (0.065, -0.13, 0))]
+    along = np.array([[0, -0.15, 0], [0, -0.05, 0], [0, 0.06, 0], [0, 0.14, 0]])
+    handle = shapes.tube(along, np.array([0.009, 0.01, 0.012, 0.014]))
     return [Thing(_set(head, at, turn), IRON), Thing(_set([handle], at, turn), wood)]
 
 
 def _spanner(length: float, at: Vector, lean: float) -> Mesh:
     angle = np.linspace(0.5, 2 * np.pi - 0.5, 30)
     jaw = 0.12 * length * np.stack([np.sin(angle), -np.cos(angle)], 1)
-    ends = [
-        shapes.moved(
-            shapes.plate(np.concatenate([jaw, [[0, 0.0]]]), 0.007), (0, 0, np.pi * side), (0, length * (0.5 - side), 0)
-        )
-        for side in (0, 1)
-    ]
+    end = shapes.plate(np.concatenate([jaw, [[0, 0.0]]]), 0.007)
+    ends = [shapes.moved(end, (0, 0, np.pi * side), (0, length * (0.5 - side), 0)) for side in (0, 1)]
     return _set([*ends, shapes.box((0, 0, 0), (0.09 * length, 0.85 * length, 0.005))], at, (0, 0, lean))
 
 
@@ -196,10 +181,8 @@ def _vice(at: Vector, paint: Material) -> list[Thing]:
     body = [shapes.box((0, -0.02, 0), (0.16, 0.04, 0.13)), shapes.box((-0.03, -0.075, 0), (0.06, 0.09, 0.1))]
     body += [shapes.box((-0.025, -0.13, 0), (0.045, 0.04, 0.13)), shapes.box((0.075, -0.125, 0), (0.04, 0.05, 0.13))]
     body += [shapes.box((0.06, -0.075, 0), (0.12, 0.05, 0.06)), shapes.box((0.075, -0.09, 0), (0.035, 0.06, 0.09))]
-    bright = [
-        _bar((0.1, -0.075, 0), (0.2, -0.075, 0), 0.012),
-        _bar((0.185, -0.075, 0.09), (0.185, -0.075, -0.09), 0.006),
-    ]
+    bright = [_bar((0.1, -0.075, 0), (0.2, -0.075, 0), 0.012)]
+    bright += [_bar((0.185, -0.075, 0.09), (0.185, -0.075, -0.09), 0.006)]
     bright += [shapes.ball((0.185, -0.075, z), 0.01, None, 16) for z in (-0.09, 0.09)]
     turn = (0, 0.35, 0)
     return [Thing(_set(body, at, turn), paint), Thing(_set(bright, at, turn), STEEL)]
@@ -207,10 +190,8 @@ def _vice(at: Vector, paint: Material) -> list[Thing]:
 
 def _plane(at: Vector, wood: Material) -> list[Thing]:
     """A block with a slanting iron, a wedge, a knob before and a grip behind."""
-    block = [
-        shapes.box((0, -0.032, 0), (0.24, 0.064, 0.065)),
-        shapes.box((0.035, -0.085, 0), (0.012, 0.09, 0.045), (0, 0, 0.75)),
-    ]
+    block = [shapes.box((0, -0.032, 0), (0.24, 0.064, 0.065))]
+    block += [shapes.box((0.035, -0.085, 0), (0.012, 0.09, 0.045), (0, 0, 0.75))]
     block += [shapes.ball((-0.085, -0.085, 0), 0.02, None, 32), _bar((-0.085, -0.06, 0), (-0.085, -0.08, 0), 0.01)]
     block += [_bar((0.09, -0.06, 0), (0.105, -0.13, 0), 0.014)]
     iron = shapes.box((0.022, -0.09, 0), (0.005, 0.13, 0.05), (0, 0, 0.75))

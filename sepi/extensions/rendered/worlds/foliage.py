@@ -44,11 +44,9 @@ class _Habit:
 
 def world() -> World:
     """The wall of a garden."""
-    garden = World(
-        [*_ground(), *_shrubs()],
-        Cameras(1.13, 2.75, 2.2, -1.6, 42),
-        Light(sky=(0.75, 0.86, 1.0), suns=[Sun((0.6, 0.9, 0.75), (7.5, 6.9, 5.8))], exposure=0.85),
-    )
+    things = [*_ground(), *_shrubs()]
+    light = Light(sky=(0.75, 0.86, 1.0), suns=[Sun((0.6, 0.9, 0.75), (7.5, 6.9, 5.8))], exposure=0.85)
+    garden = World(things, Cameras(1.13, 2.75, 2.2, -1.6, 42), light)
     return seen_from(garden, (-0.05, -0.92, 0.42), below=5)
 
 

@@ -51,12 +51,8 @@ def world() -> World:
         things.append(Thing(shapes.tube(path, 0.0035, 8), Material(colour), thin=True))
     things += _twig((-0.24, COUNTER, 1.22))
     lamp = Lamp((-2.4, -1.6, -0.6), (0, 0, 2.2), (1.4, -1.2, 0), (3.0, 2.9, 2.7))
-    return World(
-        things,
-        Cameras(0.95, WALL, 2.1, -1.6, 33),
-        Light(sky=(0.45, 0.46, 0.48), lamps=[lamp], exposure=1.75),
-        Paths(10, 6, 0.66),
-    )
+    light = Light(sky=(0.45, 0.46, 0.48), lamps=[lamp], exposure=1.75)
+    return World(things, Cameras(0.95, WALL, 2.1, -1.6, 33), light, Paths(10, 6, 0.66))
 
 
 def _poster(number: int, tint: Vector) -> Pattern:

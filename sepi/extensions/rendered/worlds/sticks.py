@@ -20,11 +20,9 @@ _LIFT = 0.002
 def world() -> World:
     """The heap, by a window on the left."""
     lamp = Lamp((-1.9, -2.9, 2.4), (-0.6, 0.0, -2.2), (-0.4, 1.5, 0.0), (22.0, 20.5, 18.5))
-    heap = World(
-        [*_room(), *_boxes(), *_books(), *_balls(), *_sticks()],
-        Cameras(1.46, 2.86, 1.9, -1.8, 38),
-        Light(sky=(0.75, 0.78, 0.83), lamps=[lamp]),
-    )
+    things = [*_room(), *_boxes(), *_books(), *_balls(), *_sticks()]
+    light = Light(sky=(0.75, 0.78, 0.83), lamps=[lamp])
+    heap = World(things, Cameras(1.46, 2.86, 1.9, -1.8, 38), light)
     return seen_from(heap, (0.02, -1.0, 0.3), below=19)
 
 
@@ -72,10 +70,8 @@ def _boxes() -> list[Thing]:
 def _books() -> list[Thing]:
     rng = np.random.default_rng(3)
     colours: list[Vector] = [(0.5, 0.12, 0.1), (0.12, 0.26, 0.42), (0.16, 0.34, 0.22), (0.75, 0.66, 0.42)]
-    covers = [
-        Material(patterns.printed(30 + n, 0.24, 16, paper=colour, ink=0.85 if n < 3 else 0.2))
-        for n, colour in enumerate(colours)
-    ]
+    inks = (0.85, 0.85, 0.85, 0.2)
+    covers = [Material(patterns.printed(30 + n, 0.24, 16, colours[n], ink)) for n, ink in enumerate(inks)]
     paper = Material(patterns.noise(35, (0.82, 0.78, 0.68), 0.05, 0.2, finest=3, coarsest=12, chroma=0.1))
     found = []
     for x, y, z, count in ((-0.6, 0.0, 1.98, 5), (0.38, 0.0, 1.98, 7), (0.64, -0.3, 2.5, 5), (0.06, -0.52, 2.72, 3)):
@@ -103,16 +99,11 @@ def _balls() -> list[Thing]:
 
 def _sticks() -> list[Thing]:
     rng = np.random.default_rng(5)
+    draws = [rng.uniform(-1.3, 1.3, 16), rng.normal(0, 0.25, 16)]
+    draws += [rng.uniform(*span, 16) for span in ((0.1, 0.3), (0.9, 1.7), (0.005, 0.012))]
     wall = [
         leaning((x, 0, _WALL - back), (x + lean, -height, _WALL - 0.02), 0.01, radius)
-        for x, lean, back, height, radius in zip(
-            rng.uniform(-1.3, 1.3, 16),
-            rng.normal(0, 0.25, 16),
-            rng.uniform(0.1, 0.3, 16),
-            rng.uniform(0.9, 1.7, 16),
-            rng.uniform(0.005, 0.012, 16),
-            strict=True,
-        )
+        for x, lean, back, height, radius in zip(*draws, strict=True)
     ]
     # upper edges on which sticks can lie: two points of each
     edges = [((-0.66, -0.63, 2.43), (-0.32, -0.63, 2.46)), ((-0.14, -0.52, 2.54), (0.28, -0.52, 2.56))]

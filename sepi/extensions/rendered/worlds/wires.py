@@ -34,11 +34,9 @@ _LENGTH, _HEIGHT, _MESH = 2.1, 1.45, 0.03
 
 def world() -> World:
     """The yard, in the sun of an afternoon."""
-    yard = World(
-        [*_ground(), *_wall(), *_bricks(), *_store(), *_fence(), *_cables()],
-        Cameras(1.62, 6.6, 2.0, -1.6, 50),
-        Light(sky=(0.62, 0.76, 1.0), suns=[Sun((0.55, 0.75, 0.6), (7.0, 6.3, 5.2))]),
-    )
+    things = [*_ground(), *_wall(), *_bricks(), *_store(), *_fence(), *_cables()]
+    light = Light(sky=(0.62, 0.76, 1.0), suns=[Sun((0.55, 0.75, 0.6), (7.0, 6.3, 5.2))])
+    yard = World(things, Cameras(1.62, 6.6, 2.0, -1.6, 50), light)
     return seen_from(yard, (0.0, -1.15, 0.0), below=5)
 
 
