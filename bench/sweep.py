@@ -1,6 +1,6 @@
 """Scores of a parameter's values over scenes, and the best value with each scene left out in turn.
 
-Rendered scenes that are held out from choosing (:data:`sepi.extensions.rendered.catalogue.RENDERED`) are refused.
+Rendered scenes that are held out from choosing (:data:`sepi.extensions.rendered.worlds.RENDERED`) are refused.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 from tabulate import tabulate
 
 from sepi.errors import SepiError
-from sepi.extensions.rendered.catalogue import RENDERED
+from sepi.extensions.rendered.worlds import RENDERED
 from sepi.inspection.coded_views import comparable
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import has_dataset

@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 from PIL import Image
 
-from sepi.extensions.rendered.catalogue import RENDERED
+from sepi.extensions.rendered.worlds import RENDERED
 from sepi.io.hdf5 import read_stage
 from sepi.io.truth import read_with_truth
 from sepi.lightfield import FloatMap, LightField

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sepi.extensions.rendered.masks import MASKS
-from sepi.extensions.rendered.render_file import Render, write_render
+from sepi.extensions.rendered.render_file import MASKS, Render, write_render
 from sepi.scenes import render
 
 CAMERA = {"focal_length_mm": 100.0, "baseline_mm": 25.0, "focus_distance_m": 4.25, "sensor_size_mm": 35.0}

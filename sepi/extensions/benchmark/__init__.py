@@ -4,7 +4,7 @@ from sepi.registry import Extension
 
 EXTENSION = Extension(
     commands={
-        "check-submission": (f"{__name__}.commands", "Check a submission to the HCI 4D benchmark."),
-        "submission": (f"{__name__}.commands", "Pack results as a submission to the HCI 4D benchmark."),
+        "check-submission": (f"{__name__}.hci_submission", "Check a submission to the HCI 4D benchmark."),
+        "submission": (f"{__name__}.hci_submission", "Pack results as a submission to the HCI 4D benchmark."),
     }
 )

@@ -1,4 +1,4 @@
-"""Light fields with exact poses as COLMAP models [1]_ and nerfstudio data sets [2]_, which instant-ngp [3]_ reads, too.
+"""Light fields with exact poses as COLMAP models [1]_ and data sets of nerfstudio [2]_ and instant-ngp [3]_.
 
 Structure from motion rarely works on light fields, because their views are too close together. Their poses are known:
 no features are matched, no cameras adjusted. Each view has its own ``PINHOLE`` camera, with its principal point.

@@ -15,12 +15,11 @@ import json
 import math
 import signal
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
-from functools import partial
 from math import prod
 from pathlib import Path, PureWindowsPath
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
@@ -29,7 +28,7 @@ from scipy.spatial.transform import Rotation
 
 from sepi.camera.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Lens, Shot
 from sepi.errors import SepiError
-from sepi.extensions.cameras.model import UNITS_OF_MODEL, CameraModel, Pictures, mask_of
+from sepi.extensions.cameras.model import UNITS_OF_MODEL, CameraModel, Picture, Pictures, mask_of
 from sepi.io.files import naming, reading
 from sepi.validation import require_known
 from sepi.validation.models import AS_PAIR, CheckedModel, validated
@@ -66,27 +65,6 @@ _COLMAP: dict[str, tuple[str, tuple[int, int, int, int], tuple[int, ...]]] = {
 """COLMAP's models: lens, and indices of its parameters: fx, fy, cx, cy, then OpenCV's coefficients."""
 LENS_MODELS = tuple(_COLMAP)
 """COLMAP's names of the lens models that can be read."""
-
-
-class _Picture(NamedTuple):
-    """A picture as a file of cameras tells it: name, file, mask, and how to make its camera."""
-
-    name: str
-    file: Path
-    shot: Callable[[], Shot]
-    mask: Path | None = None
-
-
-def _model(
-    path: Path, told: Sequence[_Picture], points: Floats | None = None, units: str = UNITS_OF_MODEL
-) -> CameraModel:
-    shots = []
-    for picture in told:
-        with naming(f"{path}: {picture.name}"):
-            shots.append(picture.shot())
-    none = np.zeros((0, 3))
-    files, masks = tuple(picture.file for picture in told), tuple(picture.mask for picture in told)
-    return CameraModel(path, tuple(shots), files, none if points is None else points, units, masks)
 
 
 class _Camera(CheckedModel):
@@ -135,9 +113,11 @@ def read_table(path: Path, pictures: Pictures) -> CameraModel:
         raise SepiError(f"{path}: a grid of {prod(table.grid)} cameras, but {len(table.cameras)} are listed")
     entries = [{**table.shared, **entry} for entry in table.cameras]
     cameras = [validated(_Camera, entry, f"{path}: camera {n}") for n, entry in enumerate(entries, 1)]
-    files = [(camera, pictures.find(camera.file)) for camera in cameras]
-    found = [_Picture(camera.file, file, partial(camera.shot, pictures, file)) for camera, file in files]
-    return _model(path, found, units=METRES if table.units == "metres" else UNITS_OF_MODEL)
+    found = []
+    for camera, file in [(camera, pictures.find(camera.file)) for camera in cameras]:
+        with naming(f"{path}: {camera.file}"):
+            found.append(Picture(camera.shot(pictures, file), file))
+    return CameraModel(path, tuple(found), units=METRES if table.units == "metres" else UNITS_OF_MODEL)
 
 
 def _rows(text: str) -> list[dict[str, Any]]:
@@ -211,8 +191,10 @@ def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
         name = name.removeprefix("./")
         file = _found(pictures, name)
         covered = _found(pictures, mask) if isinstance(mask, str) and mask else None
-        found.append(_Picture(name, file, partial(_shot_of_frame, name, entry, pictures, file), covered))
-    return _model(path, found, _points(path, told), METRES if told.get("units") == METRES else UNITS_OF_MODEL)
+        with naming(f"{path}: {name}"):
+            found.append(Picture(_shot_of_frame(name, entry, pictures, file), file, covered))
+    units = METRES if told.get("units") == METRES else UNITS_OF_MODEL
+    return CameraModel(path, tuple(found), _points(path, told), units)
 
 
 def _found(pictures: Pictures, name: str) -> Path:
@@ -252,15 +234,15 @@ def _shot_of_frame(name: str, entry: Mapping[str, Any], pictures: Pictures, file
     return Shot(name, pictures.fitted(file, lens, size), rotation_of((matrix[:3, :3] @ _TURN).T), matrix[:3, 3].copy())
 
 
-def _points(path: Path, told: Mapping[str, Any]) -> Floats | None:
+def _points(path: Path, told: Mapping[str, Any]) -> Floats:
     """Points of the PLY file that it names, if they can be read."""
     name = told.get("ply_file_path")
     if not isinstance(name, str) or Path(name).is_absolute() or ".." in Path(name).parts:
-        return None
+        return np.zeros((0, 3))
     from sepi.io.ply import read_positions
 
     file = path.parent / name
-    return read_positions(file) if file.is_file() else None
+    return read_positions(file) if file.is_file() else np.zeros((0, 3))
 
 
 def read_colmap(path: Path, pictures: Pictures) -> CameraModel:
@@ -284,10 +266,11 @@ def read_colmap(path: Path, pictures: Pictures) -> CameraModel:
     points = np.array([point.xyz for point in model.points3D.values()], np.float64).reshape(-1, 3)
     found = []
     for image in images:
-        file, camera = pictures.find(image.name), model.cameras[image.camera_id]
-        shot = partial(_shot_of_image, pictures, file, image, camera)
-        found.append(_Picture(image.name, file, shot, mask_of(file, image.name)))
-    return _model(path, found, points)
+        file = pictures.find(image.name)
+        with naming(f"{path}: {image.name}"):
+            shot = _shot_of_image(pictures, file, image, model.cameras[image.camera_id])
+        found.append(Picture(shot, file, mask_of(file, image.name)))
+    return CameraModel(path, tuple(found), points)
 
 
 def require_pycolmap(where: str) -> Any:

@@ -224,7 +224,7 @@ def rectified_view(seeing: Seeing, frame: Frame, view: int) -> tuple[FloatMap, B
     at = seeing.pixels(view, pixels)[:, ::-1].T
     absent = np.isnan(at[0])
     at = np.where(absent, 0, at)
-    picture, unusable = as_unit_float(read_picture(seeing.model.pictures[view])), _masked(seeing, view)
+    picture, unusable = as_unit_float(read_picture(seeing.model.pictures[view].file)), _masked(seeing, view)
     if np.abs(at - np.rint(at)).max() < _ON_PIXEL:
         row, column = np.rint(at).astype(int)
         found = picture[row, column]
@@ -253,8 +253,7 @@ def completed(view: FloatMap, missing: BoolMap) -> FloatMap:
 
 def _masked(seeing: Seeing, view: int) -> npt.NDArray[np.uint8]:
     """Mask of a picture: 1 where it is not to be used, else 0."""
-    lens, masks = seeing.model.shots[view].lens, seeing.model.masks
-    path = masks[view] if masks else None
+    lens, path = seeing.model.shots[view].lens, seeing.model.pictures[view].mask
     if path is None:
         return np.zeros((lens.height, lens.width), np.uint8)
     mask = read_picture(path)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +27,22 @@ _MOST_TURNED = 60.0
 _BEFORE = 0.5
 
 
+class Picture(NamedTuple):
+    """A picture of a calibrated camera.
+
+    Attributes
+    ----------
+    shot : Shot
+    file : Path
+    mask : Path or None
+        Picture that is black where the picture is not to be used.
+    """
+
+    shot: Shot
+    file: Path
+    mask: Path | None = None
+
+
 @dataclass(frozen=True)
 class CameraModel:
     """Calibrated cameras, and their pictures.
@@ -33,31 +51,31 @@ class CameraModel:
     ----------
     path : Path
         File or folder of the model, for messages.
-    shots : tuple of Shot
-    pictures : tuple of Path
-        Picture of each shot.
+    pictures : tuple of Picture
     points : ndarray, shape (N, 3), float64
         Points of the scene in the world; most files have none.
     units : str
         Unit of the world.
-    masks : tuple of Path or None
-        Pictures that are black where a picture is not to be used, None for a picture without one; empty: no masks.
     notes : tuple of str
         Assumptions that were made.
     """
 
     path: Path
-    shots: tuple[Shot, ...]
-    pictures: tuple[Path, ...]
-    points: Floats
+    pictures: tuple[Picture, ...]
+    points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     units: str = UNITS_OF_MODEL
-    masks: tuple[Path | None, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
     def files(self) -> tuple[Path, ...]:
         """All pictures and their masks."""
-        return (*self.pictures, *(mask for mask in self.masks if mask is not None))
+        masks = (picture.mask for picture in self.pictures)
+        return (*(picture.file for picture in self.pictures), *(mask for mask in masks if mask is not None))
+
+    @cached_property
+    def shots(self) -> tuple[Shot, ...]:
+        """The cameras."""
+        return tuple(picture.shot for picture in self.pictures)
 
     @property
     def centres(self) -> Floats:
@@ -84,8 +102,7 @@ class CameraModel:
 
     def of(self, kept: list[int]) -> CameraModel:
         """The model with only these cameras."""
-        shots, pictures = tuple(self.shots[n] for n in kept), tuple(self.pictures[n] for n in kept)
-        return replace(self, shots=shots, pictures=pictures, masks=tuple(self.masks[n] for n in kept))
+        return replace(self, pictures=tuple(self.pictures[n] for n in kept))
 
     def require_sound(self) -> None:
         """Raise for cameras whose poses do not suit a light field.

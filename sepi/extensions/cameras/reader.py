@@ -79,7 +79,7 @@ def files_of(path: Path, options: ReadOptions) -> tuple[Sequence[Path], Sequence
     found = cameras_in(path)
     assert found is not None
     model = read_model(path, options.images, options.part)
-    return (*described_by(found), *model.files), model.pictures
+    return (*described_by(found), *model.files), [picture.file for picture in model.pictures]
 
 
 def read_cameras(

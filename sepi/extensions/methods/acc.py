@@ -43,14 +43,23 @@ References
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar, NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
+from scipy import fft
 
-from sepi.extensions.methods.costs import GuidedFilter, disparity_of, distinctness, least_costs, weighted_median
+from sepi.extensions.methods.costs import (
+    GuidedFilter,
+    disparity_of,
+    distinctness,
+    least_costs,
+    maps_of,
+    weighted_median,
+)
 from sepi.extensions.methods.markov_field import labels_of_least_energy
 from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap, LightField, as_unit_float
@@ -134,16 +143,10 @@ def acc(
     volume = CostVolume(disparities, np.empty(costs.shape, np.float16))
     for k, costs_of_candidate in enumerate(costs):
         volume.costs[k] = smooth(cv2.blur(costs_of_candidate, window, borderType=cv2.BORDER_REFLECT))
-    labels = least_costs(volume)
-    disparity = weighted_median(
-        disparity_of(volume, labels),
-        guide,
-        parameters.median_radius,
-        parameters.median_sigma,
-        np.ones(guide.shape[:2], np.float32),
-    )
     progress(1.0)
-    return StageMaps(disparity, distinctness(volume, labels), cost_volume=volume)
+    found = maps_of(volume)
+    median = weighted_median(found.disparity, guide, parameters.median_radius, parameters.median_sigma)
+    return replace(found, disparity=median)
 
 
 def phase_shift_costs(
@@ -293,8 +296,6 @@ class PhaseShift:
     """
 
     def __init__(self, pictures: FloatMap, farthest: float | None) -> None:
-        from scipy import fft
-
         if farthest is not None:
             margin = 2 * int(np.ceil(farthest)) + _SEAM
             pictures = _seamless(_seamless(pictures, 1, margin), 2, margin)
@@ -314,8 +315,6 @@ class PhaseShift:
         ndarray, shape (M, C, H or more, W or more), float32
             Values beyond the images' height and width are meaningless.
         """
-        from scipy import fft
-
         rows, columns = (_phases(length, offsets[:, axis]) for axis, length in enumerate(self._size))
         turned = self._spectrum * (rows[:, None, :, None] * columns[:, None, None, : self._spectrum.shape[2]])
         moved = fft.irfft2(turned, s=self._size, overwrite_x=True, workers=thread_count())
@@ -333,8 +332,6 @@ def _phases(length: int, offsets: npt.NDArray[np.float64]) -> npt.NDArray[np.com
 
 def _seamless(pictures: FloatMap, axis: int, margin: int) -> FloatMap:
     """Images extended at the end of an axis by their mirror image, blended into that of the start."""
-    from scipy import fft
-
     length = pictures.shape[axis]
     extra = fft.next_fast_len(length + margin, real=True) - length
     along = np.moveaxis(pictures, axis, -1)

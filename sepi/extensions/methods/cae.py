@@ -49,7 +49,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.costs import GuidedFilter, disparity_of, distinctness, least_costs
+from sepi.extensions.methods.costs import GuidedFilter, maps_of
 from sepi.kernels import cae as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
@@ -107,8 +107,7 @@ def cae(
     smooth = GuidedFilter(light_field.reference_view, parameters.filter_radius, parameters.filter_epsilon)
     volume = CostVolume(disparities, np.stack([smooth(one).astype(np.float16) for one in costs]))
     progress(1.0)
-    labels = least_costs(volume)
-    return StageMaps(disparity_of(volume, labels), distinctness(volume, labels), cost_volume=volume)
+    return maps_of(volume)
 
 
 def entropies_and_responses(

@@ -117,6 +117,12 @@ def distinctness(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
     return np.asarray(np.clip((mean - chosen) / spread, 0, 1), np.float32)
 
 
+def maps_of(volume: CostVolume) -> StageMaps:
+    """Disparity and confidence of the candidates of least cost, with the cost volume."""
+    labels = least_costs(volume)
+    return StageMaps(disparity_of(volume, labels), distinctness(volume, labels), cost_volume=volume)
+
+
 def _costs_round(
     volume: CostVolume, labels: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
@@ -194,17 +200,23 @@ class GuidedFilter:
         -------
         ndarray, shape (H, W), float32
         """
+        slopes, offsets = self._lines(values)
+        return np.asarray((slopes * self._guide).sum(axis=2) + offsets, np.float32)
+
+    def _lines(self, values: FloatMap) -> tuple[FloatMap, FloatMap]:
+        """The linear functions of the guide's centred colours: slopes (H, W, 3) and offsets (H, W)."""
         mean = self._box(values)
         covariance = self._box(self._guide * values[..., None]) - self._mean * mean[..., None]
-        slope = np.einsum("hwij,hwj->hwi", self._inverse, covariance)
-        offset = mean - (slope * self._mean).sum(axis=2)
-        return np.asarray((self._box(slope) * self._guide).sum(axis=2) + self._box(offset), np.float32)
+        slopes = np.einsum("hwij,hwj->hwi", self._inverse, covariance)
+        return self._box(slopes), self._box(mean - (slopes * self._mean).sum(axis=2))
 
     def _box(self, values: FloatMap) -> FloatMap:
         return np.asarray(cv2.blur(values, self._size, borderType=cv2.BORDER_REFLECT))
 
 
-def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float, weight: FloatMap) -> FloatMap:
+def weighted_median(
+    values: FloatMap, guide: FloatMap, radius: int, sigma: float, weight: FloatMap | None = None
+) -> FloatMap:
     """The value in each window at which half of the weight lies below [1]_.
 
     Parameters
@@ -217,8 +229,8 @@ def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float
         The window is ``2 radius + 1`` pixels wide; it is cropped at the image border.
     sigma : float
         RGB distance at which a pixel's weight falls to ``exp(-1/2)``, colours in 0..1.
-    weight : ndarray, shape (H, W), float32
-        Additional weight of each pixel, not negative, such as its confidence; ones for none. Pixels whose window has no
+    weight : ndarray, shape (H, W), float32, optional
+        Additional weight of each pixel, not negative, such as its confidence. Pixels whose window has no
         weight keep their value.
 
     Returns
@@ -244,6 +256,7 @@ def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0]
     """
     out = np.empty(values.shape, np.float32)
+    weight = np.ones(values.shape, np.float32) if weight is None else weight
     kernels.weighted_medians(values, guide, radius, sigma, weight, out)
     return out
 
@@ -274,8 +287,8 @@ def guided_costs(
         filtered[k] = smooth(costs.astype(np.float32))
         progress((k + 1) / len(filtered))
     result = CostVolume(volume.disparities, filtered)
-    labels = least_costs(result)
-    return before.updated(disparity_of(result, labels), distinctness(result, labels)).without_costs()
+    best = maps_of(result)
+    return before.updated(best.disparity, best.confidence).without_costs()
 
 
 CHOICES = {"optimize": {"guided_costs": Choice(GuidedCostsParameters, guided_costs)}}

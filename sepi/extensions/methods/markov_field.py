@@ -80,17 +80,6 @@ def labels_of_least_energy(
     return labels
 
 
-def energy(
-    labels: npt.NDArray[np.int64], costs: npt.NDArray[np.floating], across: FloatMap, down: FloatMap, truncation: float
-) -> float:
-    """The energy of a labelling; arguments as for :func:`labels_of_least_energy`."""
-    data = np.take_along_axis(costs, labels[None], axis=0).sum(dtype=np.float64)
-    jumps_across = np.minimum(np.abs(np.diff(labels, axis=1)), truncation)
-    jumps_down = np.minimum(np.abs(np.diff(labels, axis=0)), truncation)
-    smoothness = (across[:, :-1] * jumps_across).sum(dtype=np.float64) + (down[:-1] * jumps_down).sum(dtype=np.float64)
-    return float(data + smoothness)
-
-
 class MarkovFieldParameters(Parameters):
     """Parameters of the multi-label optimisation."""
 

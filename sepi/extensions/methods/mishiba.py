@@ -243,12 +243,8 @@ class LatticeFit(GuidedFilter):
 
     def functions(self, values: FloatMap) -> tuple[FloatMap, FloatMap]:
         """Slopes (H, W, 3) and constants (H, W), float32; filtered values are slopes times colours + constants."""
-        mean = self._box(values)
-        covariance = self._box(self._guide * values[..., None]) - self._mean * mean[..., None]
-        slopes = np.einsum("hwij,hwj->hwi", self._inverse, covariance)
-        constants = self._box(mean - (slopes * self._mean).sum(axis=2))
-        slopes = self._box(slopes)
-        return slopes, constants - slopes @ self._origin
+        slopes, offsets = self._lines(values)
+        return slopes, offsets - slopes @ self._origin
 
 
 def neighbour_weights(parameters: MedianDescentParameters, noise: float) -> tuple[npt.NDArray[np.int32], float]:

@@ -58,10 +58,8 @@ from pydantic import Field
 from sepi.extensions.methods.costs import (
     GuidedCostsParameters,
     colour_differences,
-    disparity_of,
-    distinctness,
     guided_costs,
-    least_costs,
+    maps_of,
     weighted_median,
 )
 from sepi.lightfield import FloatMap, LightField
@@ -120,9 +118,7 @@ def oavc(
     thresholds = vote_thresholds(
         views, light_field.shape, disparities, parameters, lambda fraction: progress(fraction / 2)
     )
-    volume = votes(views, disparities, thresholds, lambda fraction: progress((1 + fraction) / 2))
-    labels = least_costs(volume)
-    return StageMaps(disparity_of(volume, labels), distinctness(volume, labels), cost_volume=volume)
+    return maps_of(votes(views, disparities, thresholds, lambda fraction: progress((1 + fraction) / 2)))
 
 
 def vote_thresholds(
@@ -215,10 +211,8 @@ def guided_median(
         Without the cost volume.
     """
     maps = guided_costs(light_field, previous, parameters, progress)
-    equal = np.ones_like(maps.disparity)
-    disparity = weighted_median(
-        maps.disparity, light_field.reference_view, parameters.median_radius, parameters.median_sigma, equal
-    )
+    radius, sigma = parameters.median_radius, parameters.median_sigma
+    disparity = weighted_median(maps.disparity, light_field.reference_view, radius, sigma)
     return maps.updated(disparity, maps.confidence)
 
 

@@ -132,13 +132,6 @@ class OccFieldParameters(CandidateParameters):
     iterations: int = Field(8, ge=1, le=100, description="passes of the messages, there and back")
 
 
-class Found(NamedTuple):
-    """Disparity and confidence from costs ``(K, ...)``; both of shape (...), float32."""
-
-    disparity: FloatMap
-    confidence: FloatMap
-
-
 def occ(
     light_field: LightField, previous: StageMaps | None, parameters: OccParameters, progress: Progress
 ) -> StageMaps:
@@ -176,10 +169,11 @@ def occ_split(
     width = float(disparities[-1] - disparities[0])
     edges = edges_to_split(view, parameters, parameters.edge_reach * width * light_field.reach)
     costs, cues = split_costs(light_field, disparities, edges, parameters.colour_tolerance, progress)
-    found, known = least_cost(disparities, costs), np.isfinite(costs).any(axis=0)
+    halves, certain = least_cost(disparities, costs)
+    known = np.isfinite(costs).any(axis=0)
     disparity, confidence = before.disparity.copy(), before.confidence.copy()
-    disparity[edges.near] = np.where(known, found.disparity, disparity[edges.near])
-    confidence[edges.near] = np.where(known, found.confidence, confidence[edges.near])
+    disparity[edges.near] = np.where(known, halves, disparity[edges.near])
+    confidence[edges.near] = np.where(known, certain, confidence[edges.near])
     predicted = np.zeros(light_field.shape, np.float32)
     predicted[edges.near] = predicted_occlusion(slope(disparity)[edges.near] / np.float32(width), cues)
     return before.updated(disparity, confidence, occlusion_candidates=edges.near, predicted_occlusion=predicted)
@@ -209,7 +203,7 @@ def occ_field(
     return before.updated(disparity_of(volume, labels), before.confidence)
 
 
-def least_cost(disparities: FloatMap, costs: FloatMap) -> Found:
+def least_cost(disparities: FloatMap, costs: FloatMap) -> tuple[FloatMap, FloatMap]:
     """Candidates of least cost, refined by a parabola, and how far their costs are below the mean.
 
     Parameters
@@ -220,7 +214,7 @@ def least_cost(disparities: FloatMap, costs: FloatMap) -> Found:
 
     Returns
     -------
-    Found
+    disparity, confidence : ndarray, shape (...), float32
         The confidence is 0 where all candidates are rejected.
     """
     last = len(disparities) - 1
@@ -237,9 +231,8 @@ def least_cost(disparities: FloatMap, costs: FloatMap) -> Found:
     mean = np.sum(costs, axis=0, where=kept) / np.maximum(1, np.sum(kept, axis=0))
     certain = np.isfinite(here) & (mean > 0)
     confidence = np.where(certain, 1 - np.where(certain, here, 0) / np.where(certain, mean, 1), 0)
-    return Found(
-        np.asarray(disparities[label] + step * offset, np.float32), np.clip(confidence, 0, 1).astype(np.float32)
-    )
+    disparity = np.asarray(disparities[label] + step * offset, np.float32)
+    return disparity, np.clip(confidence, 0, 1).astype(np.float32)
 
 
 def split_costs(

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self
 
@@ -106,13 +107,13 @@ def onnx(
     """
     session = _session(parameters)
     views, reference = _chosen_views(light_field, parameters)
-    height, width = light_field.shape
-    disparity = np.empty((height, width), np.float32)
-    pieces = list(_pieces(height, width, parameters))
-    for number, (window, inner, target) in enumerate(pieces, start=1):
-        given = _arrays(views[:, :, window[0][:, None], window[1]], reference, parameters.inputs)
-        disparity[target] = _run(session, given, window, parameters)[inner]
-        progress(number / len(pieces))
+    disparity = np.empty(light_field.shape, np.float32)
+    tiles = list(product(*(_spans(length, parameters) for length in light_field.shape)))
+    for number, ((rows, inner_y, to_y), (columns, inner_x, to_x)) in enumerate(tiles, start=1):
+        given = _arrays(views[:, :, rows[:, None], columns], reference, parameters.inputs)
+        shape = len(rows), len(columns)
+        disparity[to_y, to_x] = _run(session, given, shape, parameters)[inner_y, inner_x]
+        progress(number / len(tiles))
     disparity = disparity * np.float32(parameters.disparity_scale) + np.float32(parameters.disparity_offset)
     # the network's view step is between columns of views
     disparity /= np.float32(grid_steps(light_field)[1])
@@ -171,28 +172,9 @@ def _chosen_views(light_field: LightField, parameters: OnnxParameters) -> tuple[
     return views, (reference[0], reference[1])
 
 
-_Window = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
-_Part = tuple[slice, slice]
-
-
-def _pieces(height: int, width: int, parameters: OnnxParameters) -> Iterator[tuple[_Window, _Part, _Part]]:
-    """Tiles that cover the image: rows and columns of views, the part of the output that is kept, and its position.
-
-    All have the same size, since a network may have a fixed input size; views are extended by their border pixels.
-    """
-    margin = parameters.margin
-    for (rows, inner_y, to_y), (columns, inner_x, to_x) in (
-        (down, across)
-        for down in _spans(height, margin, parameters.tile, parameters.overlap)
-        for across in _spans(width, margin, parameters.tile, parameters.overlap)
-    ):
-        yield (rows, columns), (inner_y, inner_x), (to_y, to_x)
-
-
-def _spans(
-    length: int, margin: int, tile: int | None, overlap: int
-) -> Iterator[tuple[npt.NDArray[np.intp], slice, slice]]:
+def _spans(length: int, parameters: OnnxParameters) -> Iterator[tuple[npt.NDArray[np.intp], slice, slice]]:
     """Tiles along one axis: indices of the views' pixels, the part of the output that is kept, and its position."""
+    margin, tile, overlap = parameters.margin, parameters.tile, parameters.overlap
     if tile is None:
         yield np.clip(np.arange(-margin, length + margin), 0, length - 1), np.s_[:length], np.s_[:length]
         return
@@ -205,7 +187,7 @@ def _spans(
 
 
 def _run(
-    session: onnxruntime.InferenceSession, given: list[FloatMap], window: _Window, parameters: OnnxParameters
+    session: onnxruntime.InferenceSession, given: list[FloatMap], shape: tuple[int, int], parameters: OnnxParameters
 ) -> FloatMap:
     """The network's output for a window of the views; its shape is checked."""
     wanted = session.get_inputs()
@@ -225,12 +207,12 @@ def _run(
     except Exception as error:
         shapes = ", ".join(f"{key} {array.shape}" for key, array in named.items())
         raise SepiError(f"{parameters.model}: the network does not take {shapes} ({error})") from error
-    size = tuple(len(indices) - 2 * parameters.margin for indices in window)
+    size = tuple(length - 2 * parameters.margin for length in shape)
     squeezed = tuple(n for n in found.shape if n != 1)
     if squeezed != tuple(n for n in size if n != 1):
         raise SepiError(
-            f"{parameters.model}: output '{name}' of shape {found.shape} for views of {window[0].size}x"
-            f"{window[1].size} pixels; expected {size[0]}x{size[1]} (initial.onnx.margin is {parameters.margin})"
+            f"{parameters.model}: output '{name}' of shape {found.shape} for views of {shape[0]}x{shape[1]} "
+            f"pixels; expected {size[0]}x{size[1]} (initial.onnx.margin is {parameters.margin})"
         )
     return found.reshape(size)
 

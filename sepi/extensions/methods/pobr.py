@@ -52,7 +52,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.costs import GuidedFilter, colour_differences, disparity_of, distinctness, least_costs
+from sepi.extensions.methods.costs import GuidedFilter, colour_differences, maps_of
 from sepi.image.noise import noise_level
 from sepi.image.superpixels import Superpixels, superpixels
 from sepi.lightfield import FloatMap, LightField
@@ -140,9 +140,7 @@ def pobr_cost(
     for k, sheared in views.over(disparities):
         costs[k] = smooth(photo_consistency(sheared, views.reference, parameters.truncation))
         progress((k + 1) / len(disparities))
-    volume = CostVolume(disparities, costs)
-    labels = least_costs(volume)
-    return StageMaps(disparity_of(volume, labels), distinctness(volume, labels))
+    return maps_of(CostVolume(disparities, costs)).without_costs()
 
 
 def photo_consistency(sheared: FloatMap, reference: int, truncation: float) -> FloatMap:
@@ -166,7 +164,9 @@ def pobr_regions(
     """
     before = require_previous(previous)
     image = light_field.reference_view
-    segments = superpixels(image, _superpixel_size(light_field.shape, parameters.superpixels), COMPACTNESS)
+    segments = superpixels(
+        image, max(LEAST_SIZE, round(math.sqrt(image[..., 0].size / parameters.superpixels))), COMPACTNESS
+    )
     deviation = label_deviation(before.disparity, segments)
     regions = deviation > parameters.tau_1
     cut = np.exp(-np.minimum(parameters.tau_0 * np.maximum(deviation - parameters.tau_1, 0), 80))
@@ -223,11 +223,6 @@ def squared_steps(image: FloatMap, segments: Superpixels) -> FloatMap:
     means = np.stack([segments.means(channel)[segments.labels] for channel in np.moveaxis(image, 2, 0)], axis=2)
     # the central difference is half the step
     return np.asarray(4 * squared_gradient(means.astype(np.float32)), np.float32)
-
-
-def _superpixel_size(shape: tuple[int, int], number: int) -> int:
-    """Side of a superpixel in pixels, for a number of them in an image."""
-    return max(LEAST_SIZE, round(math.sqrt(shape[0] * shape[1] / number)))
 
 
 CHOICES = {

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, field_validator
 
-from sepi.extensions.rendered.catalogue import RENDERED
+from sepi.extensions.rendered.worlds import RENDERED
 from sepi.validation import require_known
 from sepi.variants import VARIANTS, needing_files
 from sepi.workflow.datasets import Dataset as ADataset

@@ -4,19 +4,61 @@ from __future__ import annotations
 
 import math
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
 
 from sepi.camera import camera_from
-from sepi.extensions.rendered.options import NOISE, Exposure
+from sepi.extensions.rendered.patterns import srgb_encoded
 from sepi.extensions.rendered.render_file import Render, read_render
 from sepi.extensions.rendered.render_file import read_truth as read_truth
-from sepi.extensions.rendered.srgb import srgb_encoded
 from sepi.lightfield import DisparityRange, LightField
-from sepi.validation.models import validated
-from sepi.workflow.rendered_scenes import exposed_name
+from sepi.validation.models import CheckedModel, validated
+from sepi.workflow.rendered_scenes import NoiseLevel, exposed_name
+
+
+@dataclass(frozen=True)
+class Electrons:
+    """A sensor: electrons of a white pixel, and standard deviation of the read noise in electrons."""
+
+    white: float
+    read: float
+
+
+NOISE: dict[NoiseLevel, Electrons | None] = {
+    "off": None,
+    # standard deviations of 3 and 9 of 255 in grey of 18 %
+    "low": Electrons(2000.0, 4.0),
+    "high": Electrons(250.0, 4.0),
+}
+"""Noise level to sensor; None without noise."""
+
+
+class Exposure(CheckedModel):
+    """Options of the sensor."""
+
+    noise: NoiseLevel = Field(
+        "off", description="photons and reading of a sensor that holds 2,000 (low) or 250 (high) electrons at white"
+    )
+    noise_seed: int = Field(1, ge=1, lt=2**31, description="of the noise, and of what differs from view to view")
+    vignetting: float = Field(0.0, ge=0, le=1, description="part of the light that the corners lack")
+    exposure_spread: float = Field(
+        0.0,
+        ge=0,
+        allow_inf_nan=False,
+        description="standard deviation of the exposures of views but the reference view, in stops",
+    )
+    bits: Literal[8, 16] = Field(8, description="of each value")
+    gamma: float | None = Field(
+        None,
+        gt=0,
+        allow_inf_nan=False,
+        description="exponent of the curve from light to values is 1 / gamma; 1: linear; null: sRGB",
+    )
 
 
 def read_scene(path: Path, noise: str = "off", seed: int = 1) -> LightField:

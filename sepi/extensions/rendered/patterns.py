@@ -1,4 +1,4 @@
-"""Seeded patterns: noise, wood, stone, bricks, tiles, weave, stripes, print.
+"""Seeded patterns: noise, wood, stone, bricks, tiles, weave, stripes, print; and sRGB.
 
 A pattern has 1024 texels a side by default, and repeats without a seam.
 """
@@ -6,6 +6,7 @@ A pattern has 1024 texels a side by default, and repeats without a seam.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -166,3 +167,17 @@ def painted(colours: npt.ArrayLike, width: float, height: float | None = None) -
 def _between(first: npt.NDArray[np.float64], second: npt.NDArray[np.float64], share: Field) -> Field:
     mixed: Field = first + share[..., None] * (second - first)
     return mixed
+
+
+def srgb_encoded(values: FloatArray) -> FloatArray:
+    """Values in sRGB of linear ones, both 0..1."""
+    found: FloatArray = np.where(
+        values <= 0.0031308, 12.92 * values, 1.055 * np.maximum(values, 1e-9) ** (1 / 2.4) - 0.055
+    )
+    return found
+
+
+def srgb_decoded(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Linear values of sRGB ones, both 0..1."""
+    found: npt.NDArray[Any] = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+    return found

@@ -5,29 +5,30 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import pickle
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
 
-from sepi.extensions.rendered.masks import seen_bits, surface_bits
-from sepi.extensions.rendered.options import RenderOptions
-from sepi.extensions.rendered.render_file import Render, write_render
-from sepi.extensions.rendered.rig import Rig, rig_of
-from sepi.extensions.rendered.sampling import Plan, pictured, planned
-from sepi.extensions.rendered.shared_light import with_shared_light
+from sepi.extensions.rendered.render_file import Render, seen_bits, surface_bits, write_render
+from sepi.extensions.rendered.sampling import Plan, pictured, planned, with_shared_light
 from sepi.extensions.rendered.tracing import Position, Tracer
-from sepi.extensions.rendered.world import FloatArray, World
+from sepi.extensions.rendered.world import FloatArray, Rig, World, rig_of
 from sepi.io.files import atomic_path
 from sepi.io.provenance import package_version
 from sepi.process.threads import threads_used, use_threads
 from sepi.stage import no_progress
+from sepi.validation.models import CheckedModel
+
+_Share = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+_Rows = Annotated[int, Field(ge=1, le=33)]
 
 # arrays of a view that are kept until all views are finished
 _TYPES = {
@@ -40,6 +41,32 @@ _TYPES = {
     "things": np.int16,
     "whole": np.bool_,
 }
+
+
+class RenderOptions(CheckedModel):
+    """Options of rendering."""
+
+    size: int = Field(512, ge=32, le=4096, description="height and width of a view in pixels; disparities stay")
+    grid: tuple[_Rows, _Rows] = Field((9, 9), description="rows and columns of views")
+    samples: int = Field(64, ge=1, le=65536, description="paths of light for each pixel; few leave their own noise")
+    baseline: float = Field(
+        1.0, gt=0, allow_inf_nan=False, description="distance of views, and so disparity, as part of the scene's own"
+    )
+    lens: _Share = Field(
+        0.0, description="radius of the lens in view steps; 0: a pinhole. Disparity d is a disc 2 lens |d| pixels wide"
+    )
+    position_error: _Share = Field(
+        0.0, description="standard deviation of where views but the reference view stand, in view steps"
+    )
+    rotation_error: _Share = Field(
+        0.0, description="standard deviation of how they are turned about each axis, in degrees"
+    )
+    seed: int = Field(0, ge=0, lt=2**31, description="of the light's paths and of these errors")
+
+    @property
+    def shares_light(self) -> bool:
+        """Whether views share the light of matte surfaces, which needs sharp views without turns."""
+        return not (self.lens or self.rotation_error)
 
 
 def made_by(name: str, options: RenderOptions) -> dict[str, Any]:
@@ -73,7 +100,8 @@ def render_world(
     rig = rig_of(world, options.size, options.grid, options.baseline)
     count = math.prod(options.grid)
     parts = _parts(path)
-    _take_over(parts, json.dumps({**made_by(name, options), "world": _digest(world)}, sort_keys=True))
+    digest = hashlib.sha256(pickle.dumps(world)).hexdigest()
+    _take_over(parts, json.dumps({**made_by(name, options), "world": digest}, sort_keys=True))
     files = [parts / f"view_{number:03d}.npz" for number in range(count)]
     missing = [number for number, file in enumerate(files) if not _is_whole(file)]
     for done, (number, values) in enumerate(_views(world, rig, options, missing), count - len(missing) + 1):
@@ -83,11 +111,6 @@ def render_world(
     write_render(path, _assembled(name, world, rig, options, files))
     shutil.rmtree(parts)
     progress(1.0)
-
-
-def views_done(path: Path) -> int:
-    """Number of finished views of a scene that is being rendered into this file."""
-    return len(list(_parts(path).glob("view_*.npz")))
 
 
 def _parts(path: Path) -> Path:
@@ -137,7 +160,7 @@ def _looked_at(world: World, tracer: Tracer, rig: Rig, options: RenderOptions, n
     count = math.prod(options.grid)
     plan = None
     if options.shares_light:
-        plan = planned(tracer, at, seen, disparity, options.samples, count, seed, world.paths)
+        plan = planned(tracer, at, seen, disparity, options.samples, count, seed, world.paths.gloss)
     truth = {
         "albedo": plan.albedo if plan else np.zeros((*disparity.shape, 3)),
         "whole": plan.whole if plan else np.zeros(disparity.shape),
@@ -190,29 +213,9 @@ def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files:
         positions=positions,
         turns=turns,
         settings=rig.settings,
-        light=world.light,
+        light=world.light.share,
         made_by=made_by(name, options),
     )
-
-
-def _digest(world: World) -> str:
-    """Digest of a world's contents, so that views of a changed world are not mixed with older ones."""
-    digest = hashlib.sha256()
-
-    def add(part: Any) -> None:
-        if is_dataclass(part):
-            for member in fields(part):
-                add(getattr(part, member.name))
-        elif isinstance(part, np.ndarray):
-            digest.update(np.ascontiguousarray(part).data)
-        elif isinstance(part, Sequence) and not isinstance(part, str):
-            for member in part:
-                add(member)
-        else:
-            digest.update(repr(part).encode())
-
-    add(world)
-    return digest.hexdigest()
 
 
 def _take_over(parts: Path, made_by: str) -> None:

@@ -20,7 +20,8 @@ rule render:
         mem_mb=of_render(lambda scene: scene.memory_mb(bytes_per_sample=80, bytes_per_pixel=1000)),
         runtime=of_render(lambda scene: scene.minutes(2 * RENDERING.samples)),
     params:
-        flags=f"--size {RENDERING.size} --views {RENDERING.views} --samples {RENDERING.samples}",
+        flags=f"--set size={RENDERING.size} --set 'grid=[{RENDERING.views},{RENDERING.views}]' "
+        f"--set samples={RENDERING.samples}",
         code=lambda wildcards: code_digest(
             "sepi.extensions.rendered.rendering", f"sepi.extensions.rendered.worlds.{wildcards.world}"
         ),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
-from contextlib import closing
+from collections.abc import Iterable, Sequence
 from inspect import cleandoc
 from pathlib import Path
 from typing import Any
@@ -15,14 +14,12 @@ from click.core import ParameterSource
 from sepi.camera import camera_from
 from sepi.cli.export import list_scenes, require_new
 from sepi.errors import SepiError
-from sepi.extensions.rendered.catalogue import RENDERED
-from sepi.extensions.rendered.exposure import exposed
-from sepi.extensions.rendered.options import Exposure, RenderOptions
+from sepi.extensions.rendered.exposure import Exposure, exposed
 from sepi.extensions.rendered.render_file import Render, read_render
-from sepi.extensions.rendered.rendering import made_by
-from sepi.extensions.rendered.side_by_side import render_scenes
+from sepi.extensions.rendered.rendering import RenderOptions, made_by, render_world
 from sepi.extensions.rendered.tracing import require_mitsuba
-from sepi.process.command import SepiCommand
+from sepi.extensions.rendered.worlds import RENDERED, world_of
+from sepi.process.command import SepiCommand, progress_bar
 from sepi.scenes.folder import write_hci
 from sepi.validation import require_known, settings_of
 from sepi.validation.models import validated
@@ -71,56 +68,47 @@ def extended(command: SepiCommand) -> SepiCommand:
             list_scenes({name: f"{entry.description}: {entry.tests}" for name, entry in RENDERED.items()})
         else:
             usual = context.get_parameter_source("size") is ParameterSource.DEFAULT
-            size = 512 if usual else given["size"]
-            values = {"grid": [given["views"]] * 2, "size": size, **settings_of(own["settings"], "lens=0.5")}
+            values = {"grid": [given["views"]] * 2, "size": 512 if usual else given["size"]}
+            values |= settings_of(own["settings"], "lens=0.5")
             if own["samples"] is not None:
                 values.setdefault("samples", own["samples"])
             levels = dict.fromkeys(own["levels"] or (WITHOUT_NOISE,))
-            _write_rendered(given["names"], given["output"], values, list(levels), own["all_views"])
+            _write_rendered(given["names"], given["output"], values, levels, own["all_views"])
 
     help_text = f"{cleandoc(command.help or '')}\n{_TEXT}"
     return SepiCommand(command.name, params=[*command.params, *_FLAGS], callback=scenes, help=help_text)
 
 
 def _write_rendered(
-    names: Sequence[str],
-    output: Path,
-    settings: dict[str, Any],
-    levels: Sequence[str],
-    all_views: bool,
+    names: Sequence[str], output: Path, settings: dict[str, Any], levels: Iterable[str], all_views: bool
 ) -> None:
     require_known("path-traced scenes", names, RENDERED)
-    chosen = list(dict.fromkeys(names or RENDERED))
     require_known("--set", settings, (*RenderOptions.model_fields, *Exposure.model_fields))
-    of_render, of_sensor = (
-        {key: value for key, value in settings.items() if key in model.model_fields}
-        for model in (RenderOptions, Exposure)
-    )
-    options = validated(RenderOptions, of_render, "--set")
+    of_sensor = {key: settings.pop(key) for key in Exposure.model_fields if key in settings}
+    options = validated(RenderOptions, settings, "--set")
     exposures = [validated(Exposure, {"noise": level, **of_sensor}, "--set") for level in levels]
-    folders = [exposed_name(name, one.noise, one.noise_seed) for name in chosen for one in exposures]
-    require_new(output, folders)
+    folders = {
+        name: [(output / exposed_name(name, one.noise, one.noise_seed), one) for one in exposures]
+        for name in dict.fromkeys(names or RENDERED)
+    }
+    require_new(output, (folder.name for of_name in folders.values() for folder, _ in of_name))
     require_mitsuba()
-    with closing(_renders(chosen, options, output)) as renders:
-        for render in renders:
-            for exposure in exposures:
-                folder = output / exposed_name(render.name, exposure.noise, exposure.noise_seed)
-                _write_folder(render, exposure, folder, all_views)
-                click.echo(f"written: {folder}/")
+    for name, of_name in folders.items():
+        render = _rendered(name, options, output / f"{name}.h5")
+        for folder, exposure in of_name:
+            _write_folder(render, exposure, folder, all_views)
+            click.echo(f"written: {folder}/")
 
 
-def _renders(names: Sequence[str], options: RenderOptions, output: Path) -> Generator[Render]:
-    """Renders from existing files if made with the same options; others are computed."""
-    files = {name: output / f"{name}.h5" for name in names}
-    missing = [name for name, path in files.items() if not path.is_file()]
-    for name, path in files.items():
-        if name not in missing:
-            known = read_render(path)
-            if known.made_by != made_by(name, options):
-                raise SepiError(f"{path}: was rendered with other options; remove it, or choose another folder with -o")
-            yield known
-    with closing(render_scenes(missing, options, output)) as rendered:
-        yield from (read_render(files[name]) for name in rendered)
+def _rendered(name: str, options: RenderOptions, path: Path) -> Render:
+    """The render of a scene, from its file if that is there and was made with these options."""
+    if not path.is_file():
+        with progress_bar(name) as progress:
+            render_world(name, world_of(name), options, path, progress)
+    render = read_render(path)
+    if render.made_by != made_by(name, options):
+        raise SepiError(f"{path}: was rendered with other options; remove it, or choose another folder with -o")
+    return render
 
 
 def _write_folder(render: Render, exposure: Exposure, folder: Path, all_views: bool) -> None:

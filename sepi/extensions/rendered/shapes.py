@@ -213,15 +213,20 @@ def leaf(length: float, width: float, bend: float, fold: float = 0.3, rows: int 
 
 def moved(mesh: Mesh, turn: Vector = (0, 0, 0), by: Vector = (0, 0, 0), scale: float = 1.0) -> Mesh:
     """The mesh scaled, turned about the x, then y, then z axis by angles in radians, and shifted."""
-    rotation = np.eye(3)
+    vertices = scale * np.asarray(mesh.vertices, float) @ rotation(turn).T + np.array(by)
+    return _mesh(vertices, mesh.faces, scale * mesh.uv, mesh.smooth)
+
+
+def rotation(turn: Vector) -> Points:
+    """Rotation matrix about the x, then y, then z axis by angles in radians, shape (3, 3)."""
+    found = np.eye(3)
     for axis, angle in enumerate(turn):
         i, j = (axis + 1) % 3, (axis + 2) % 3
         step = np.eye(3)
         step[i, i] = step[j, j] = np.cos(angle)
         step[i, j], step[j, i] = -np.sin(angle), np.sin(angle)
-        rotation = step @ rotation
-    vertices = scale * np.asarray(mesh.vertices, float) @ rotation.T + np.array(by)
-    return _mesh(vertices, mesh.faces, scale * mesh.uv, mesh.smooth)
+        found = step @ found
+    return found
 
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:

@@ -1,4 +1,4 @@
-"""Furniture of scenes (books, crates, chairs, tables, houses), and a world seen from any place in it."""
+"""Furniture of scenes (books, crates, chairs, tables, vessels, fruit), and a world seen from any place in it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
 
-from sepi.extensions.rendered.shapes import box, joined, moved, painted_from, plate, rod
-from sepi.extensions.rendered.world import Lamp, Material, Mesh, Sun, Thing, Vector, World
+from sepi.extensions.rendered.shapes import Points, ball, box, joined, moved, painted_from, plate, rod, turned_body
+from sepi.extensions.rendered.world import Lamp, Material, Mesh, Thing, Vector, World
 
 
 def seen_from(world: World, eye: Vector, below: float = 0.0, rightwards: float = 0.0) -> World:
@@ -40,14 +41,13 @@ def seen_from(world: World, eye: Vector, below: float = 0.0, rightwards: float =
         vertices = (old.vertices.astype(np.float64) - np.array(eye)) @ axes.T
         return replace(old, vertices=vertices.astype(np.float32))
 
-    return replace(
-        world,
-        things=[replace(thing, mesh=mesh(thing.mesh)) for thing in world.things],
-        lamps=[
-            Lamp(shifted(lamp.corner), turned(lamp.across), turned(lamp.down), lamp.radiance) for lamp in world.lamps
-        ],
-        suns=[Sun(turned(sun.direction), sun.irradiance) for sun in world.suns],
-    )
+    lamps = [
+        replace(lamp, corner=shifted(lamp.corner), across=turned(lamp.across), down=turned(lamp.down))
+        for lamp in world.light.lamps
+    ]
+    suns = [replace(sun, direction=turned(sun.direction)) for sun in world.light.suns]
+    things = [replace(thing, mesh=mesh(thing.mesh)) for thing in world.things]
+    return replace(world, things=things, light=replace(world.light, lamps=lamps, suns=suns))
 
 
 def lamp_towards(middle: Vector, target: Vector, size: float, radiance: Vector) -> Lamp:
@@ -92,9 +92,9 @@ def crate(size: Vector, rows: int, turn: float, by: Vector) -> Mesh:
     return moved(of_boards([*slats, *ends, bottom]), (0, turn, 0), by)
 
 
-def of_boards(parts: Sequence[Mesh]) -> Mesh:
-    """Boards as one mesh, each with different grain."""
-    return joined([painted_from(part, 0.137 * n, 0.091 * n) for n, part in enumerate(parts)])
+def of_boards(parts: Sequence[Mesh], across: float = 0.137, down: float = 0.091) -> Mesh:
+    """Boards as one mesh, the pattern of each these metres further than that of the one before."""
+    return joined([painted_from(part, across * n, down * n) for n, part in enumerate(parts)])
 
 
 def chair(turn: float, by: Vector, slats: int = 4) -> Mesh:
@@ -152,3 +152,34 @@ def leaning(foot: npt.ArrayLike, over: npt.ArrayLike, beyond: float, radius: flo
     along = (rest - start) / np.linalg.norm(rest - start)
     lift = np.array([0.0, -radius, 0.0])
     return rod(start + lift, rest + lift + beyond * along, radius)
+
+
+def profile(points: list[tuple[float, float]], count: int = 120) -> Points:
+    """A curve through points ``(radius, height)`` of a body of revolution, given from the top down."""
+    given = np.array(points, float)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(given, axis=0), axis=1))])
+    found: Points = PchipInterpolator(length, given)(np.linspace(0, length[-1], count))
+    return found
+
+
+def vessel(points: list[tuple[float, float]], wall: float, foot: Vector, floor: float = 0.006, sides: int = 96) -> Mesh:
+    """An open vessel of an outline, its inside ``wall`` metres within and ``floor`` above ``foot``, where it stands."""
+    outer = profile(points)
+    low = outer[-1, 1]
+    inner = np.stack([np.maximum(outer[:, 0] - wall, 1e-5), np.maximum(outer[:, 1], low + floor)], 1)
+    shares = np.linspace(0, 1, 12, endpoint=False)[:, None]
+    within = shares * [inner[-1, 0], 0] + [1e-5, low + floor]
+    below = shares[::-1] * [outer[-1, 0], 0] + [1e-5, low]
+    return turned_body(np.concatenate([within, inner[::-1], outer, below]), foot, sides)
+
+
+def fruit(centre: Vector, radius: float, seed: int) -> Mesh:
+    """A ball with dimples above and below, not quite round."""
+    lean = np.random.default_rng(seed).normal(0, 0.03, 3)
+
+    def relief(direction: Points) -> Points:
+        dimple = np.exp(-(((np.arccos(np.clip(np.abs(direction[..., 1]), 0, 1))) / 0.25) ** 2))
+        found: Points = direction @ lean - 0.12 * dimple + 0.03 * np.cos(5 * direction[..., 0] + 3 * direction[..., 2])
+        return found
+
+    return ball(centre, radius, relief, 40)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sepi.extensions.rendered.srgb import srgb_decoded
+from sepi.extensions.rendered.patterns import srgb_decoded
 from sepi.extensions.rendered.world import FloatArray, Material, Mesh, Pattern, Vector, World
 from sepi.kernels import triangles as kernels
 from sepi.lightfield import BoolMap
@@ -73,7 +73,7 @@ class Surfaces:
 
     def __init__(self, world: World) -> None:
         parts = [(number, thing.mesh, period(thing.material)) for number, thing in enumerate(world.things)]
-        for lamp in world.lamps:
+        for lamp in world.light.lamps:
             corners = np.array([[0, 0, 0], lamp.across, np.add(lamp.across, lamp.down), lamp.down]) + lamp.corner
             sheet = Mesh(corners.astype(np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.uint32), _unpainted(4))
             parts.append((-1, sheet, (1.0, 1.0)))

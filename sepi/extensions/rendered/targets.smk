@@ -1,6 +1,6 @@
 # Files of the rendered scenes, and what a render needs.
 
-from sepi.extensions.rendered.catalogue import RENDERED
+from sepi.extensions.rendered.worlds import RENDERED
 from sepi.extensions.rendered.dataset import render_file
 from sepi.workflow.datasets import Scene
 from sepi.workflow.rendered_scenes import DATASET

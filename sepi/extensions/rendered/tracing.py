@@ -16,11 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.extensions.rendered.rig import Rig
-from sepi.extensions.rendered.shapes import normals
-from sepi.extensions.rendered.srgb import srgb_decoded
+from sepi.extensions.rendered.patterns import srgb_decoded
+from sepi.extensions.rendered.shapes import normals, rotation
 from sepi.extensions.rendered.surfaces import FirstSurface, Surfaces, period
-from sepi.extensions.rendered.world import FloatArray, Lamp, Material, Mesh, Pattern, Vector, World
+from sepi.extensions.rendered.world import FloatArray, Lamp, Light, Material, Mesh, Pattern, Rig, Vector, World
 from sepi.process.threads import threads_used
 
 # metres at which rays begin; much less would lose digits of their directions
@@ -84,15 +83,7 @@ class Position:
     @property
     def rotation(self) -> npt.NDArray[np.float64]:
         """Rotation matrix from the camera to the world, shape (3, 3)."""
-        matrix = np.eye(3)
-        for axis, angle in enumerate(self.turn):
-            i, j = (axis + 1) % 3, (axis + 2) % 3
-            about = np.eye(3)
-            about[i, i] = about[j, j] = np.cos(angle)
-            about[j, i] = np.sin(angle)
-            about[i, j] = -about[j, i]
-            matrix = about @ matrix
-        return matrix
+        return rotation(self.turn)
 
 
 def require_mitsuba() -> None:
@@ -134,7 +125,8 @@ class Tracer:
     def __init__(self, world: World, rig: Rig, lens: float = 0.0, lens_points: int = 32) -> None:
         self._mi = _mitsuba()
         self._rig, self._lens, self._lens_points = rig, lens, lens_points if lens else 1
-        self._exposure, self._bounces = world.exposure, {"max_depth": world.depth, "rr_depth": world.roulette}
+        light, paths = world.light, world.paths
+        self._exposure, self._bounces = light.exposure, {"max_depth": paths.depth, "rr_depth": paths.roulette}
         self.surfaces = Surfaces(world)
         parts: dict[str, Any] = {}
         # things with the same material share its textures
@@ -142,12 +134,12 @@ class Tracer:
         loaded = {key: self._mi.load_dict(self._surface(material)) for key, material in surfaces.items()}
         for number, thing in enumerate(world.things):
             parts[f"thing{number}"] = self._shape(thing.mesh, thing.material, {"bsdf": loaded[id(thing.material)]})
-        for number, lamp in enumerate(world.lamps):
+        for number, lamp in enumerate(light.lamps):
             parts[f"lamp{number}"] = self._lamp(lamp)
-        for number, sun in enumerate(world.suns):
-            light = {"type": "rgb", "value": list(sun.irradiance)}
-            parts[f"sun{number}"] = {"type": "directional", "direction": list(sun.direction), "irradiance": light}
-        self._scene = self._mi.load_dict({"type": "scene", **parts, **self._sky(world)})
+        for number, sun in enumerate(light.suns):
+            irradiance = {"type": "rgb", "value": list(sun.irradiance)}
+            parts[f"sun{number}"] = {"type": "directional", "direction": list(sun.direction), "irradiance": irradiance}
+        self._scene = self._mi.load_dict({"type": "scene", **parts, **self._sky(light)})
 
     def position(self, down: float, across: float, turn: Vector = (0.0, 0.0, 0.0)) -> Position:
         """The camera of the view ``(down, across)`` view steps from the centre."""
@@ -331,15 +323,15 @@ class Tracer:
         # without interpolation, for a fifth of the time: pixels are at least texels, and paths spread over them
         return {"type": "bitmap", "bitmap": raster, "raw": True, "format": "fp16", "filter_type": "nearest"}
 
-    def _sky(self, world: World) -> dict[str, Any]:
+    def _sky(self, light: Light) -> dict[str, Any]:
         # each path samples one light at a time, and a sun contributes more than the sky
-        asked = {"sampling_weight": _SKY_BESIDE_SUN if world.suns else 1.0}
-        if not isinstance(world.sky, np.ndarray):
-            light = {"type": "rgb", "value": list(world.sky)}
-            return {"sky": {"type": "constant", "radiance": light, **asked}} if any(world.sky) else {}
+        asked = {"sampling_weight": _SKY_BESIDE_SUN if light.suns else 1.0}
+        if not isinstance(light.sky, np.ndarray):
+            radiance = {"type": "rgb", "value": list(light.sky)}
+            return {"sky": {"type": "constant", "radiance": radiance, **asked}} if any(light.sky) else {}
         # Mitsuba's panoramas have y up
         upright = self._mi.ScalarTransform4f().rotate([0, 0, 1], 180.0)
-        bitmap = self._mi.Bitmap(world.sky.astype(np.float32))
+        bitmap = self._mi.Bitmap(light.sky.astype(np.float32))
         return {"sky": {"type": "envmap", "bitmap": bitmap, "to_world": upright, **asked}}
 
 

@@ -1,7 +1,9 @@
-"""Contents of a path-traced scene: meshes with materials, light, and depths.
+"""Contents of a path-traced scene: meshes with materials, light, depths, and its cameras.
 
 Lengths are in metres. The reference camera stands at the origin and looks along ``z``; ``x`` points right, ``y`` down.
-Colours are sRGB, 0..1.
+Colours are sRGB, 0..1. Cameras stand on a grid with spacing ``b``, sheared so that points at the focus distance ``F``
+have disparity zero, as in the HCI 4D benchmark. With the focal length ``f`` in pixels, depth ``Z`` has disparity
+``d = b f (1 / Z - 1 / F)``.
 """
 
 from __future__ import annotations
@@ -12,6 +14,8 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+
+from sepi.camera import Camera, camera_from
 
 FloatArray = npt.NDArray[np.float32]
 Vector = tuple[float, float, float]
@@ -134,17 +138,32 @@ class Sun:
 
 
 @dataclass(frozen=True)
-class World:
-    """A scene.
+class Cameras:
+    """What the cameras see of a scene.
 
     Attributes
     ----------
-    things : sequence of Thing
-        They must fill the pictures, since a ray that meets nothing has no disparity.
     near, far : float
         Depths with the disparities ``at_near`` and ``at_far``, metres.
     at_near, at_far : float
         Pixels per view step, for any size of the pictures.
+    field_of_view : float
+        Degrees from the left to the right border.
+    """
+
+    near: float
+    far: float
+    at_near: float
+    at_far: float
+    field_of_view: float = 40.0
+
+
+@dataclass(frozen=True)
+class Light:
+    """Light of a scene.
+
+    Attributes
+    ----------
     sky : (float, float, float) or ndarray, shape (H, W, 3), float32
         Radiance of all around, linear: one for all directions, or a panorama (its middle column in direction ``z``,
         its first row above).
@@ -152,30 +171,114 @@ class World:
         Further light.
     exposure : float
         Factor from radiance to pictures, in which 1 is white.
-    field_of_view : float
-        Degrees from the left to the right border.
-    light : float
-        Light of the scene relative to other scenes; less light has more noise.
-    depth : int
-        Largest number of reflections and refractions.
-    roulette : int
-        Number of these after which Russian roulette may end a path.
-    paths : float
-        Paths of a glossy pixel as a share of the samples, if these are many. Longer paths reduce noise, so fewer of
-        them give no more noise (mean difference of two renderings) than all paths with ``roulette`` 2.
+    share : float
+        Light relative to other scenes; less light has more noise.
     """
 
-    things: Sequence[Thing]
-    near: float
-    far: float
-    at_near: float
-    at_far: float
     sky: Vector | FloatArray = (0.0, 0.0, 0.0)
     lamps: Sequence[Lamp] = ()
     suns: Sequence[Sun] = ()
     exposure: float = 1.0
-    field_of_view: float = 40.0
-    light: float = 1.0
-    depth: int = 8
+    share: float = 1.0
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Paths of light.
+
+    Attributes
+    ----------
+    depth : int
+        Largest number of reflections and refractions.
+    roulette : int
+        Number of these after which Russian roulette may end a path.
+    gloss : float
+        Paths of a glossy pixel as a share of the samples, if these are many. Longer paths reduce noise, so fewer of
+        them give no more noise (mean difference of two renderings) than all paths with ``roulette`` 2.
+    """
+
+    depth: int = 6
     roulette: int = 2
-    paths: float = 1.0
+    gloss: float = 1.0
+
+
+@dataclass(frozen=True)
+class World:
+    """A scene.
+
+    Attributes
+    ----------
+    things : sequence of Thing
+        They must fill the pictures, since a ray that meets nothing has no disparity.
+    cameras : Cameras
+    light : Light
+    paths : Paths
+    """
+
+    things: Sequence[Thing]
+    cameras: Cameras
+    light: Light
+    paths: Paths = Paths()
+
+
+SENSOR_MM = 35.0
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Cameras of a scene.
+
+    Attributes
+    ----------
+    size : int
+        Height and width of a view in pixels.
+    grid : (int, int)
+        Rows and columns of views.
+    focal_px : float
+        Focal length in pixels.
+    baseline : float
+        Metres from one view to the next.
+    focus : float
+        Focus distance, metres.
+    """
+
+    size: int
+    grid: tuple[int, int]
+    focal_px: float
+    baseline: float
+    focus: float
+
+    @property
+    def camera(self) -> Camera:
+        """Camera of the light field."""
+        return camera_from(**self.settings, shape=(self.size, self.size), crop_of=None)
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """Values for the benchmark's ``parameters.cfg``."""
+        return {
+            "focal_length_mm": self.focal_px / self.size * SENSOR_MM,
+            "baseline_mm": 1000 * self.baseline,
+            "focus_distance_m": self.focus,
+            "sensor_size_mm": SENSOR_MM,
+        }
+
+    @property
+    def positions(self) -> npt.NDArray[np.float64]:
+        """Positions of the views from the centre view, ``(down, across)`` in view steps; shape (T, S, 2)."""
+        rows, columns = self.grid
+        down, across = np.arange(rows) - rows // 2, np.arange(columns) - columns // 2
+        return np.stack(np.broadcast_arrays(down[:, None], across[None, :]), axis=-1).astype(np.float64)
+
+    def disparity(self, depth: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Disparity in pixels per view step of depths along the viewing direction in metres."""
+        return self.baseline * self.focal_px * (1 / depth - 1 / self.focus)
+
+
+def rig_of(world: World, size: int, grid: tuple[int, int], baseline: float = 1.0) -> Rig:
+    """The cameras for which a scene's near and far depths have its disparities, times ``baseline``."""
+    seen = world.cameras
+    focal = size / (2 * np.tan(np.radians(seen.field_of_view) / 2))
+    step = (seen.at_near - seen.at_far) / (focal * (1 / seen.near - 1 / seen.far))
+    focus = 1 / (1 / seen.near - seen.at_near / (step * focal))
+    return Rig(size, grid, float(focal), float(baseline * step), float(focus))

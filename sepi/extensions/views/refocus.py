@@ -1,24 +1,176 @@
-"""The command ``sepi refocus``."""
+"""The command ``sepi refocus``: a folder of refocused images, with an index of where each is focused."""
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Iterator, Sequence
+import os
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
+import numpy.typing as npt
 
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, read_light_field_of, reading_flags
 from sepi.errors import SepiError
+from sepi.io.files import atomic_path, filled_folder, remove_files
+from sepi.io.images import write_png
+from sepi.lightfield import FloatMap, full_scale
 from sepi.process.command import SepiCommand, progress_bar
 
 if TYPE_CHECKING:
     from sepi.camera import Camera
-    from sepi.extensions.views.refocused_folder import Focus
-    from sepi.lightfield import BoolMap, FloatMap, LightField
+    from sepi.lightfield import BoolMap, LightField
     from sepi.stage import Progress
+
+
+INDEX = "focus.csv"
+"""Name of the index: a row for each image."""
+
+COLUMNS = ("file", "disparity", "depth_m", "x", "y")
+"""Columns of the index; a value is empty if it is unknown or does not apply."""
+
+ALL_IN_FOCUS = "all_in_focus.png"
+
+ANIMATION = "focus.webp"
+"""Endless animation of the focal stack from the nearest to the farthest image and back."""
+
+# of an image of the animation
+_MILLISECONDS = 120
+_QUALITY = 85
+
+_MADE = re.compile(rf"focus_\d+\.png|{re.escape(ALL_IN_FOCUS)}|{re.escape(ANIMATION)}")
+
+
+@dataclass(frozen=True)
+class Focus:
+    """Focus of an image.
+
+    Attributes
+    ----------
+    disparity : float
+        Pixels per view step.
+    depth : float or None
+        Metres, infinite at and beyond infinity; None if the camera is unknown.
+    at : (int, int) or None
+        Column and row ``(x, y)`` of the pixel whose surface is in focus, if the focus was chosen so.
+    """
+
+    disparity: float
+    depth: float | None = None
+    at: tuple[int, int] | None = None
+
+
+def stack_names(count: int) -> list[str]:
+    """Names of the images of a focal stack: ``focus_01.png`` and so on."""
+    digits = max(2, len(str(count)))
+    return [f"focus_{number:0{digits}}.png" for number in range(1, count + 1)]
+
+
+def write_refocused(
+    folder: Path,
+    foci: Sequence[Focus],
+    pictures: Iterable[FloatMap],
+    sharp: FloatMap | None,
+    dtype: npt.DTypeLike,
+    *,
+    animated: bool = False,
+) -> tuple[str, ...]:
+    """Write a focal stack, the image in focus everywhere, and their index.
+
+    A new folder appears whole or not at all. In an existing folder, files that an earlier index names are replaced once
+    all new files are written, or removed; other files stay. Equal content gives equal bytes.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if missing.
+    foci : sequence of Focus
+        Focus of each image of the stack.
+    pictures : iterable of ndarray, shape (H, W, C), float32
+        Images in 0..1, consumed one by one.
+    sharp : ndarray, shape (H, W, C), float32, or None
+        The image in focus everywhere.
+    dtype : dtype
+        That of the views: uint8 gives images of 8 bit, all others of 16 bit.
+    animated : bool
+        Also write the stack as an animation.
+
+    Returns
+    -------
+    tuple of str
+        Names of the files written.
+
+    Raises
+    ------
+    SepiError
+        If the folder is a file, cannot be written or holds other files of these names, or the installed Pillow cannot
+        write animations.
+    """
+    before = _earlier_files(folder / INDEX)
+    names = stack_names(len(foci))
+    made = [*[ALL_IN_FOCUS] * (sharp is not None), *names, *[ANIMATION] * animated, INDEX]
+    others = [name for name in made if name not in before and os.path.lexists(folder / name)]
+    if others:
+        raise SepiError(f"{folder}: {others[0]} there was not written by 'sepi refocus'; choose another folder")
+    with filled_folder(folder) as temporary:
+        if sharp is not None:
+            write_png(temporary / ALL_IN_FOCUS, _levels(sharp, dtype))
+        frames = []
+        for name, picture in zip(names, pictures, strict=True):
+            write_png(temporary / name, _levels(picture, dtype))
+            if animated:
+                frames.append(_levels(picture, np.uint8))
+        if animated:
+            _write_animation(temporary / ANIMATION, frames)
+        told = dict(zip(names, map(_described, foci), strict=True))
+        rows = [[name, *told.get(name, [""] * 4)] for name in made[:-1]]
+        with (temporary / INDEX).open("w", encoding="ascii", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
+    remove_files(folder, set(before).difference(made))
+    return tuple(made)
+
+
+def _levels(picture: FloatMap, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
+    """Levels of an image (H, W, C) in 0..1 for a PNG: (H, W) if grey; 8 bit for uint8, else 16 bit."""
+    held = np.uint8 if np.dtype(dtype) == np.uint8 else np.uint16
+    levels = np.rint(picture.astype(np.float64) * full_scale(held)).astype(held)
+    return levels[..., 0] if levels.shape[2] == 1 else levels
+
+
+def _described(focus: Focus) -> list[str]:
+    x, y = ("", "") if focus.at is None else focus.at
+    depth = "" if focus.depth is None else f"{focus.depth:.6g}"
+    return [f"{focus.disparity:.6g}", depth, f"{x}", f"{y}"]
+
+
+def _write_animation(path: Path, frames: Sequence[npt.NDArray[Any]]) -> None:
+    from PIL import Image, features
+
+    if not features.check("webp"):
+        raise SepiError(f"{path}: the installed Pillow has no WebP, which animations need")
+    first, *more = (Image.fromarray(frame).convert("RGB") for frame in [*frames, *frames[-2:0:-1]])
+    with atomic_path(path) as temporary:
+        first.save(
+            temporary, "WEBP", save_all=True, append_images=more, duration=_MILLISECONDS, loop=0, quality=_QUALITY
+        )
+
+
+def _earlier_files(index: Path) -> list[str]:
+    """Names of an earlier index and of the images in it; empty if there is none."""
+    # a user's own file of this name stays, whatever it holds
+    with suppress(OSError, UnicodeDecodeError, csv.Error):
+        with index.open(encoding="ascii", newline="") as file:
+            rows = list(csv.reader(file))
+        if rows and tuple(rows[0]) == COLUMNS:
+            return [INDEX, *(row[0] for row in rows[1:] if row and _MADE.fullmatch(row[0]))]
+    return []
+
 
 _PATH = click.Path(path_type=Path)
 _STEPS = 9
@@ -32,15 +184,6 @@ class _Result:
     disparity: FloatMap
     unknown: BoolMap | None
     camera: Camera | None
-
-
-@dataclass(frozen=True)
-class _Wanted:
-    """Flags of where to focus."""
-
-    steps: int | None
-    disparities: tuple[float, ...]
-    pixels: tuple[tuple[int, int], ...]
 
 
 @click.command(cls=SepiCommand)
@@ -112,7 +255,6 @@ def refocus(
       sepi refocus cotton cotton-depth --at 250 310 --aperture 3
       sepi refocus cotton --disparity -0.5 --disparity 1
     """
-    from sepi.extensions.views.refocused_folder import write_refocused
     from sepi.extensions.views.refocusing import all_in_focus, views_within
     from sepi.io.result_files import require_target
     from sepi.process.threads import available_cores, use_threads
@@ -129,7 +271,9 @@ def refocus(
     camera = light_field.camera or (result.camera if result else None)
     if geometry is not None:
         camera = geometry(shape=light_field.shape)
-    foci = _foci(light_field, result, camera, _Wanted(steps, disparities, pixels))
+    foci = _foci(light_field, result, steps, disparities, pixels)
+    if camera is not None:
+        foci = [replace(focus, depth=_depth(camera, focus.disparity)) for focus in foci]
     # fails early if the folder cannot be used
     views_within(light_field, aperture)
     with progress_bar(light_field.name) as progress:
@@ -164,20 +308,22 @@ def _read_result(path: Path, light_field_path: Path, light_field: LightField, re
     return _Result(path, disparity, stored.unknown if stored.unknown.shape == disparity.shape else None, stored.camera)
 
 
-def _foci(light_field: LightField, result: _Result | None, camera: Camera | None, wanted: _Wanted) -> list[Focus]:
+def _foci(
+    light_field: LightField,
+    result: _Result | None,
+    steps: int | None,
+    disparities: tuple[float, ...],
+    pixels: tuple[tuple[int, int], ...],
+) -> list[Focus]:
     """Disparities to focus at, from near to far."""
-    from sepi.extensions.views.refocused_folder import Focus
-
-    for value in wanted.disparities:
+    for value in disparities:
         if not math.isfinite(value):
             raise SepiError(f"--disparity {value}: expected a finite number of pixels per view step")
-    found = [Focus(value) for value in wanted.disparities]
+    found = [Focus(value) for value in disparities]
     if result is not None:
-        found += [Focus(_disparity_at(result, x, y), at=(x, y)) for x, y in wanted.pixels]
-    if wanted.steps or not found:
-        found += [Focus(value) for value in _through(light_field, result, wanted.steps or _STEPS)]
-    if camera is not None:
-        found = [replace(focus, depth=_depth(camera, focus.disparity)) for focus in found]
+        found += [Focus(_disparity_at(result, x, y), at=(x, y)) for x, y in pixels]
+    if steps or not found:
+        found += [Focus(value) for value in _through(light_field, result, steps or _STEPS)]
     return sorted(found, key=lambda focus: -focus.disparity)
 
 
@@ -206,8 +352,6 @@ def _disparity_at(result: _Result, x: int, y: int) -> float:
 
 
 def _depth(camera: Camera, disparity: float) -> float:
-    import numpy as np
-
     return float(camera.depth(np.array([disparity], np.float32))[0])
 
 

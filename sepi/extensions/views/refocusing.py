@@ -194,14 +194,13 @@ def all_in_focus(
         weights = np.square(scale2 / (scale2 + np.square(sums).sum(axis=2)))
         sums *= weights[..., None]
         for t in np.flatnonzero(others.any(axis=1)).tolist():
-            _add_row(
-                light_field,
-                t,
-                others[t],
-                (disparity, surfaces),
-                occlusion_margin,
-                (centre, float(scale2), sums, weights),
-            )
+            row = np.zeros_like(others)
+            row[t] = others[t]
+            nearest = nearest_surfaces(light_field, surfaces, row, Rows(0, light_field.shape[0]))[t]
+            for s in np.flatnonzero(row[t]).tolist():
+                view, margin = as_unit_float(light_field.views[t, s]), occlusion_margin
+                v, u = light_field.baselines[t, s]
+                kernels.add_view(view, v, u, disparity, nearest[s], margin, centre, float(scale2), sums, weights)
             progress((number + (t + 1) / light_field.grid[0]) / ROUNDS)
         centre = centre + sums / weights[..., None]
     return np.clip(centre, 0, 1)
@@ -344,23 +343,3 @@ def _shown(light_field: LightField, place: tuple[int, ...], moved: FloatMap) -> 
 def _held(moved: float, length: int) -> slice:
     """Pixels ``p`` of a line for which a view has the pixel ``p - moved``."""
     return slice(max(0, math.ceil(moved)), min(length, math.floor(length - 1 + moved) + 1))
-
-
-def _add_row(
-    light_field: LightField,
-    t: int,
-    chosen: BoolMap,
-    disparities: tuple[FloatMap, FloatMap],
-    margin: float,
-    mean: tuple[FloatMap, float, FloatMap, FloatMap],
-) -> None:
-    """Add the chosen views of one row of the grid to a mean: its expected colours, squared scale, sums and weights."""
-    disparity, surfaces = disparities
-    baselines = light_field.baselines[t : t + 1]
-    of_row = np.zeros(light_field.grid, bool)
-    of_row[t] = chosen
-    nearest = nearest_surfaces(light_field, surfaces, of_row, Rows(0, light_field.shape[0]))[t]
-    for s in np.flatnonzero(chosen).tolist():
-        view = as_unit_float(light_field.views[t, s])
-        v, u = baselines[0, s]
-        kernels.add_view(view, v, u, disparity, nearest[s], margin, *mean)

@@ -15,7 +15,7 @@ from sepi.camera import Camera
 from sepi.camera.rig import Lens, Shot
 from sepi.errors import SepiError
 from sepi.extensions.cameras.calibration import calibrate, pairs_of, pictures_in
-from sepi.extensions.cameras.model import CameraModel
+from sepi.extensions.cameras.model import CameraModel, Picture
 from sepi.extensions.cameras.plane import plane_through
 from sepi.extensions.cameras.reader import read_model
 from sepi.scenes import render_shot
@@ -69,7 +69,7 @@ def test_a_sweep_becomes_its_cameras(sweep: tuple[Path, list[Shot]], calibrated:
     assert f"next: sepi depth {out}" in said
     assert sorted(path.name for path in out.iterdir()) == ["project.ini", "sparse"]
     model = read_model(out)
-    assert [path.samefile(folder / shot.name) for path, shot in zip(model.pictures, shots, strict=True)] == [True] * 6
+    assert [path.samefile(folder / shot.name) for shot, path, _ in model.pictures] == [True] * 6
     # from the model's world to the true one
     world = shots[0].rotation.T @ model.shots[0].rotation
     for found, shot in zip(model.shots, shots, strict=True):
@@ -149,7 +149,7 @@ def test_row_that_structure_from_motion_found_is_not_seen_from_above() -> None:
     """Errors of the places across a row tilted the plane of all views, and pictures became half as tall again."""
     stray = np.random.default_rng(0).normal(0, 0.5, 51)
     shots = tuple(_shot(str(n), n, aside, 0.75 * aside) for n, aside in enumerate(stray.tolist()))
-    plane = plane_through(CameraModel(Path("row"), shots, (Path(),) * len(shots), np.empty((0, 3))), None)
+    plane = plane_through(CameraModel(Path("row"), tuple(Picture(shot, Path()) for shot in shots)), None)
     assert np.degrees(np.arccos(plane.rotation[2, 2])) < 12
 
 

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from sepi.extensions.methods.markov_field import contrast_weights, energy, labels_of_least_energy
+from sepi.extensions.methods.markov_field import contrast_weights, labels_of_least_energy
 from sepi.kernels import message_passing as kernels
 
 
@@ -15,6 +15,15 @@ def problem(seed, labels, shape, strength=0.5):
     costs = random.random((labels, *shape)).astype(np.float32)
     across, down = (strength * random.random((2, *shape))).astype(np.float32)
     return costs, across, down
+
+
+def energy(labels, costs, across, down, truncation):
+    """The energy of a labelling; arguments as for :func:`labels_of_least_energy`."""
+    data = np.take_along_axis(costs, labels[None], axis=0).sum(dtype=np.float64)
+    jumps_across = np.minimum(np.abs(np.diff(labels, axis=1)), truncation)
+    jumps_down = np.minimum(np.abs(np.diff(labels, axis=0)), truncation)
+    smoothness = (across[:, :-1] * jumps_across).sum(dtype=np.float64) + (down[:-1] * jumps_down).sum(dtype=np.float64)
+    return float(data + smoothness)
 
 
 def least_by_search(costs, across, down, truncation):

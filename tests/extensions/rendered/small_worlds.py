@@ -1,13 +1,11 @@
 """Small worlds whose truth is known by formula, and what they are rendered with."""
 
-from typing import Any
-
 import numpy as np
 
 from sepi.extensions.rendered import shapes
-from sepi.extensions.rendered.options import RenderOptions
 from sepi.extensions.rendered.patterns import noise
-from sepi.extensions.rendered.world import Lamp, Material, Thing, World
+from sepi.extensions.rendered.rendering import RenderOptions
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Paths, Thing, World
 
 WALL, FLOOR = 3.0, 0.6
 RED = Material((0.6, 0.2, 0.2))
@@ -19,12 +17,15 @@ def taking(size: int = 64, views: int = 3, samples: int = 4, **values: object) -
     return RenderOptions.model_validate({"size": size, "grid": (views, views), "samples": samples, **values})
 
 
-def room(*things: Thing, **values: Any) -> World:
+CAMERAS = Cameras(1.2, WALL, 2.0, -1.5)
+EVEN = Light((1.0, 1.0, 1.0), exposure=0.7)
+
+
+def room(*things: Thing, light: Light = EVEN, paths: Paths | None = None) -> World:
     """A wall at ``WALL`` and a floor ``FLOOR`` below the camera, and things before them, under an even sky."""
     wall = Thing(shapes.rectangle((-4, -4, WALL), (8, 0, 0), (0, 8, 0)), Material(PAINT))
     floor = Thing(shapes.rectangle((-4, FLOOR, 0.3), (8, 0, 0), (0, 0, 3)), Material(PAINT))
-    light = {"sky": (1.0, 1.0, 1.0), "exposure": 0.7}
-    return World([wall, floor, *things], near=1.2, far=WALL, at_near=2.0, at_far=-1.5, **{**light, **values})
+    return World([wall, floor, *things], CAMERAS, light, paths or Paths(8))
 
 
 def bar(depth: float = 1.5, width: float = 0.1, material: Material = RED) -> Thing:

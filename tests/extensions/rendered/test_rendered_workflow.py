@@ -13,8 +13,8 @@ from workflow_copy import REPOSITORY, TINY, Workflow
 
 from sepi import ingest, truth
 from sepi.errors import SepiError
-from sepi.extensions.rendered.catalogue import RENDERED
 from sepi.extensions.rendered.exposure import read_scene
+from sepi.extensions.rendered.worlds import RENDERED
 from sepi.io.hdf5 import read_light_field
 from sepi.io.truth import read_with_truth
 from sepi.scoring.scores import region_masks, score_regions
@@ -110,7 +110,7 @@ def test_a_scene_is_rendered_again_for_the_renderer_and_itself_alone() -> None:
     } <= found
     assert not found & {
         "sepi.extensions.rendered.worlds.room",
-        "sepi.extensions.rendered.catalogue",
+        "sepi.extensions.rendered.worlds",
         "sepi.extensions.rendered.exposure",
         "sepi.process.command",
     }

@@ -8,22 +8,19 @@ import pytest
 from click.testing import CliRunner
 from error_lines import done
 from scipy import ndimage
-from small_worlds import ball, bar, depth_of_room, lamp_above, room, taking
+from small_worlds import CAMERAS, ball, bar, depth_of_room, lamp_above, room, taking
 
 import sepi
 from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.extensions.rendered import patterns, shapes, tracing
-from sepi.extensions.rendered.catalogue import RENDERED, world_of
-from sepi.extensions.rendered.exposure import exposed
-from sepi.extensions.rendered.masks import MASKS, mask, seen_bits
-from sepi.extensions.rendered.options import NOISE, Exposure
-from sepi.extensions.rendered.render_file import Render, read_render
+from sepi.extensions.rendered.exposure import NOISE, Exposure, exposed
+from sepi.extensions.rendered.render_file import MASKS, Render, mask, read_render, seen_bits
 from sepi.extensions.rendered.rendering import render_world
-from sepi.extensions.rendered.rig import rig_of
 from sepi.extensions.rendered.sampling import pictured, planned
 from sepi.extensions.rendered.tracing import Tracer
-from sepi.extensions.rendered.world import Material, Sun, World
+from sepi.extensions.rendered.world import Light, Material, Paths, Sun, Thing, World, rig_of
+from sepi.extensions.rendered.worlds import RENDERED, world_of
 from sepi.scenes.folder import write_hci
 from sepi.workflow.rendered_scenes import NOISE_LEVELS
 
@@ -79,7 +76,8 @@ def test_truth_of_every_view_is_of_the_same_points(plain: Render) -> None:
 
 def test_points_have_one_colour_in_all_views(tmp_path: Path) -> None:
     """By the light of a sun alone, which leaves no noise of paths."""
-    sunny = room(sky=(0.0, 0.0, 0.0), suns=[Sun((0.3, 0.6, 1.0), (4.0, 4.0, 4.0))], depth=2)
+    sun = Sun((0.3, 0.6, 1.0), (4.0, 4.0, 4.0))
+    sunny = room(light=Light(suns=[sun], exposure=0.7), paths=Paths(2))
     render = rendered(tmp_path, sunny, size=96, samples=4)
     light_field = exposed(render, Exposure())
     centre = light_field.views[light_field.reference_position].astype(float)
@@ -262,20 +260,18 @@ def test_lights_and_surfaces_do_what_they_say() -> None:
         tracer = Tracer(world, rig_of(world, 32, (1, 1)))
         return tracer.picture(tracer.position(0, 0), 0, 16)
 
-    dark = room()
-    base = {"things": dark.things, "near": 1.2, "far": 3.0, "at_near": 2.0, "at_far": -1.5}
-    below = mean(World(**base, lamps=[lamp_above()]))[-4:].mean()
     lamp = lamp_above()
+    below = mean(room(light=Light(lamps=[lamp])))[-4:].mean()
     turned = type(lamp)(lamp.corner, lamp.down, lamp.across, lamp.radiance)
     assert below > 0.05
-    assert mean(World(**base, lamps=[turned]))[-4:].mean() < 0.2 * below
-    sunny = mean(World(**base, suns=[Sun((0.0, 1.0, 0.0), (3.0, 3.0, 3.0))]))
+    assert mean(room(light=Light(lamps=[turned])))[-4:].mean() < 0.2 * below
+    sunny = mean(room(light=Light(suns=[Sun((0.0, 1.0, 0.0), (3.0, 3.0, 3.0))])))
     assert sunny[-4:].mean() > 5 * sunny[:8].mean()
     panorama = np.zeros((64, 128, 3), np.float32)
     # red above and behind the camera: a mirror that faces it shows red
     panorama[:32, :32, 0] = panorama[:32, -32:, 0] = 1
     mirror = shapes.rectangle((-4, -4, 3), (8, 0, 0), (0, 8, 0))
-    seen = mean(World([type(dark.things[0])(mirror, Material(kind="mirror"))], 1.2, 3.0, 2.0, -1.5, sky=panorama))
+    seen = mean(World([Thing(mirror, Material(kind="mirror"))], CAMERAS, Light(panorama)))
     assert seen[:8, 8:24, 0].mean() > 0.5
     assert seen[-8:].mean() < 0.05
 
@@ -329,14 +325,15 @@ def test_every_ray_of_a_scene_meets_something(name: str) -> None:
     world = world_of(name)
     rig = rig_of(world, 64, (9, 9))
     tracer = Tracer(world, rig)
-    slack = 0.1 * (world.at_near - world.at_far)
+    near, far = world.cameras.at_near, world.cameras.at_far
+    slack = 0.1 * (near - far)
     for corner in ((0, 0), (-4, -4), (4, 4)):
         seen = tracer.first_surface(tracer.position(*corner))
         assert np.isfinite(seen.depth).all()
         disparity = rig.disparity(seen.depth)
-        assert world.at_far - slack <= disparity.min()
+        assert far - slack <= disparity.min()
         # corners of so small pictures look far down
-        assert disparity.max() <= world.at_near + slack or corner != (0, 0)
+        assert disparity.max() <= near + slack or corner != (0, 0)
     light = tracer.picture(tracer.position(0, 0), 0, 16)
     assert 0.02 < np.median(light) < 0.6
     assert (light.max(axis=2) > 1).mean() < 0.08

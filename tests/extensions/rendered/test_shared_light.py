@@ -8,10 +8,9 @@ from small_worlds import ball, bar, room, taking
 
 from sepi.extensions.rendered.render_file import read_render
 from sepi.extensions.rendered.rendering import render_world
-from sepi.extensions.rendered.rig import rig_of
-from sepi.extensions.rendered.shared_light import alike_light
+from sepi.extensions.rendered.sampling import alike_light
 from sepi.extensions.rendered.tracing import Tracer
-from sepi.extensions.rendered.world import Material
+from sepi.extensions.rendered.world import Material, rig_of
 from sepi.kernels import reprojection as kernels
 
 SIZE, VIEWS = 48, 5
@@ -28,7 +27,7 @@ def falling_on_a_plane() -> dict[str, np.ndarray]:
 
 
 def gathered(light: Any, disparities: Any, things: Any, whole: Any, baselines: Any, view: int) -> Any:
-    """As :func:`sepi.extensions.rendered.shared_light.with_shared_light` asks for it."""
+    """As :func:`sepi.extensions.rendered.sampling.with_shared_light` asks for it."""
     surface = np.where(whole, things, -1).astype(np.int16)
     mean, variance = np.empty_like(light[0]), np.empty_like(disparities[0])
     kernels.gathered_light(light, disparities, surface, baselines, view, 0.02, mean, variance)

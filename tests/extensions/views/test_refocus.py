@@ -13,7 +13,7 @@ from PIL import Image
 
 import sepi
 from sepi.extensions.views import refocusing
-from sepi.extensions.views.refocused_folder import stack_names
+from sepi.extensions.views.refocus import stack_names
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import read_picture
 from sepi.io.pfm import write_pfm

@@ -7,10 +7,10 @@ which is a panorama and gives all the light.
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
-from sepi.extensions.rendered import patterns, shapes
-from sepi.extensions.rendered.world import FloatArray, Material, Mesh, Pattern, Thing, Vector, World
-from sepi.extensions.rendered.worlds import ware
+from sepi.extensions.rendered import patterns, shapes, staging
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Paths, Pattern, Thing, Vector, World
 
 TABLE, WALL = 0.3, 2.3
 CHROME, SILVER = Material(kind="mirror", metal="Cr"), Material(kind="mirror", metal="Ag")
@@ -18,17 +18,12 @@ _QUINCE = Material(patterns.noise(21, (0.66, 0.62, 0.24), 0.03, 0.12, finest=3))
 GILT = Material(kind="mirror", metal="Au", roughness=0.22)
 # place of the mirror, its turn (leaning, to the left), width and height
 _MIRROR = ((-0.18, TABLE - 0.035, 1.95), (-0.04, 0.13, 0.0), 0.46, 0.6)
-_BALLS = [
-    ((0.13, 1.5), 0.115),
-    ((-0.14, 1.32), 0.055),
-    ((0.33, 1.27), 0.04),
-    ((-0.02, 1.2), 0.03),
-    ((-0.4, 1.68), 0.08),
-]
+_BALLS = [(0.13, 1.5, 0.115), (-0.14, 1.32, 0.055), (0.33, 1.27, 0.04), (-0.02, 1.2, 0.03), (-0.4, 1.68, 0.08)]
 _VASE = [(0.06, 0.36), (0.066, 0.355), (0.04, 0.32), (0.036, 0.27), (0.09, 0.2), (0.105, 0.13), (0.07, 0.05),
          (0.05, 0.03), (0.075, 0.015), (0.078, 0.0)]  # fmt: skip
 _STICK = [(0.018, 0.26), (0.022, 0.255), (0.014, 0.235), (0.011, 0.2), (0.02, 0.17), (0.012, 0.14), (0.014, 0.08),
           (0.03, 0.04), (0.02, 0.03), (0.055, 0.012), (0.058, 0.0)]  # fmt: skip
+_QUINCES = [(0.02, 1.34), (-0.22, 1.22)]
 _CUP = [(0.045, 0.07), (0.047, 0.068), (0.044, 0.04), (0.03, 0.01), (0.026, 0.0)]
 
 
@@ -40,36 +35,22 @@ def world() -> World:
         Thing(shapes.rectangle((-2.5, -2, WALL), (5, 0, 0), (0, 3, 0)), Material(_wallpaper())),
         Thing(_plane(), SILVER),
         Thing(_frame(), GILT),
-        *(Thing(shapes.ball((x, TABLE - radius, z), radius), CHROME) for (x, z), radius in _BALLS),
-        Thing(ware.vessel(_VASE, 0.004, (0.44, TABLE, 1.78)), Material(kind="mirror", metal="Au", roughness=0.07)),
+        *(Thing(shapes.ball((x, TABLE - radius, z), radius), CHROME) for x, z, radius in _BALLS),
+        Thing(staging.vessel(_VASE, 0.004, (0.44, TABLE, 1.78)), Material(kind="mirror", metal="Au", roughness=0.07)),
         Thing(shapes.box((-0.42, TABLE - 0.05, 1.42), (0.24, 0.1, 0.17), (0, 0.35, 0)), lacquer),
         Thing(shapes.box((-0.42, TABLE - 0.112, 1.42), (0.25, 0.02, 0.18), (0, 0.35, 0)), lacquer),
-        Thing(ware.vessel(_CUP, 0.003, (0.3, TABLE, 1.47)), Material(_china(), "glossy")),
-        *(
-            Thing(ware.fruit((x, TABLE - 0.033, z), 0.036, n), _QUINCE)
-            for n, (x, z) in enumerate([(0.02, 1.34), (-0.22, 1.22)])
-        ),
+        Thing(staging.vessel(_CUP, 0.003, (0.3, TABLE, 1.47)), Material(_china(), "glossy")),
+        *(Thing(staging.fruit((x, TABLE - 0.033, z), 0.036, n), _QUINCE) for n, (x, z) in enumerate(_QUINCES)),
         *_books((0.43, TABLE, 1.4), 31, [0.024, 0.03, 0.018]),
         *_bookcase(),
         *_porthole((0.34, -0.3, WALL - 0.02)),
     ]
     for x, z in ((0.26, 1.92), (0.17, 2.02)):
-        things.append(Thing(shapes.turned_body(ware.profile(_STICK), (x, TABLE, z)), CHROME))
+        things.append(Thing(shapes.turned_body(staging.profile(_STICK), (x, TABLE, z)), CHROME))
         candle = [(0.0005, 0.42), (0.008, 0.418), (0.0105, 0.41), (0.0105, 0.25)]
-        things.append(Thing(shapes.turned_body(ware.profile(candle), (x, TABLE, z)), Material((0.9, 0.86, 0.76))))
-    return World(
-        things=things,
-        near=1.0,
-        far=WALL,
-        at_near=2.0,
-        at_far=-1.8,
-        sky=_room(),
-        exposure=1.65,
-        field_of_view=38,
-        depth=6,
-        roulette=4,
-        paths=0.55,
-    )
+        things.append(Thing(shapes.turned_body(staging.profile(candle), (x, TABLE, z)), Material((0.9, 0.86, 0.76))))
+    light = Light(sky=_room(), exposure=1.65)
+    return World(things, Cameras(1.0, WALL, 2.0, -1.8, 38), light, Paths(6, 4, 0.55))
 
 
 def _plane() -> Mesh:
@@ -91,7 +72,7 @@ def _frame() -> Mesh:
 
 def _porthole(centre: Vector) -> list[Thing]:
     """A round mirror that bulges, on the wall."""
-    cap = ware.profile([(0.0005, 0.035), (0.05, 0.03), (0.1, 0.014), (0.13, 0.0)])
+    cap = staging.profile([(0.0005, 0.035), (0.05, 0.03), (0.1, 0.014), (0.13, 0.0)])
     bulge = shapes.moved(shapes.turned_body(cap, (0, 0, 0)), (np.pi / 2, 0, 0), centre)
     turn = np.linspace(0, 2 * np.pi, 97)
     ring = np.array(centre) + 0.135 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], 1)
@@ -145,15 +126,12 @@ def _china() -> Pattern:
     return patterns.painted(colour, 0.25)
 
 
-def _room() -> FloatArray:
+def _room() -> npt.NDArray[np.float32]:
     """Radiance of ceiling, walls, floor, and of windows with bars in the wall behind and on the left."""
     down, across = (np.mgrid[:256, :512] + 0.5) / 256
     room = np.empty((256, 512, 3))
-    room[:] = np.where(
-        (down < 0.3)[..., None],
-        [0.5, 0.49, 0.46],
-        np.where((down < 0.66)[..., None], [0.3, 0.27, 0.22], [0.1, 0.075, 0.05]),
-    )
+    below = np.where((down < 0.66)[..., None], [0.3, 0.27, 0.22], [0.1, 0.075, 0.05])
+    room[:] = np.where((down < 0.3)[..., None], [0.5, 0.49, 0.46], below)
     for left, width in ((0.28, 0.22), (0.54, 0.18), (1.4, 0.16)):
         inside = (across > left) & (across < left + width) & (down > 0.27) & (down < 0.55)
         bars = ((across - left) / width * 3 % 1 < 0.08) | ((down - 0.27) / 0.07 % 1 < 0.1)

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.extensions.rendered import patterns, shapes
-from sepi.extensions.rendered.world import Lamp, Material, Mesh, Thing, Vector, World
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Paths, Thing, Vector, World
 
 Array = npt.NDArray[np.float64]
 FLOOR, TABLE = 1.0, 0.26
@@ -28,35 +28,27 @@ def world() -> World:
     planks = Material(patterns.wood(41, 1.1, (0.56, 0.42, 0.29), (0.38, 0.26, 0.17)))
     beech = Material(patterns.wood(51, 0.4))
     rug = Material(patterns.weave(61, 0.9, (0.5, 0.42, 0.4), 0.14))
-    return World(
-        things=[
-            Thing(_curtain(), blue),
-            Thing(shapes.rectangle((-3, -2.5, 3.55), (6, 0, 0), (0, 4, 0)), Material((0.8, 0.78, 0.72))),
-            Thing(shapes.rectangle((-3, FLOOR, 0.5), (6, 0, 0), (0, 0, 3.2)), planks),
-            Thing(shapes.rectangle((-0.95, FLOOR - 0.012, 1.6), (2.0, 0, 0.1), (-0.07, 0, 1.35)), rug),
-            Thing(_table_cloth((0.16, TABLE, 2.6), 0.46), cream),
-            Thing(_tied((0.83, 0.4, 1.98)), velvet),
-            Thing(_blanket((-0.72, -0.1, 2.45)), wool),
-            Thing(_rack((-0.72, -0.1, 2.45)), beech),
-            *(
-                Thing(
-                    _folded((0.32 + 0.008 * (n % 2), TABLE - 0.032 - 0.06 * n, 2.58), n),
-                    Material(patterns.linen(70 + 3 * n, 0.6, c)),
-                )
-                for n, c in enumerate(sheets)
-            ),
-            Thing(_crumpled((-0.07, TABLE - 0.003, 2.42)), Material(patterns.linen(91, 0.6, (0.8, 0.74, 0.72), 0.05))),
-        ],
-        near=1.85,
-        far=3.5,
-        at_near=1.9,
-        at_far=-1.7,
-        sky=(0.26, 0.27, 0.29),
-        lamps=[Lamp((-3.0, -1.2, 0.4), (0, 0, 1.6), (0.9, -1.3, 0), (13.0, 12.5, 11.8))],
-        exposure=2.0,
-        field_of_view=46,
-        depth=4,
-    )
+    lamp = Lamp((-3.0, -1.2, 0.4), (0, 0, 1.6), (0.9, -1.3, 0), (13.0, 12.5, 11.8))
+    things = [
+        Thing(_curtain(), blue),
+        Thing(shapes.rectangle((-3, -2.5, 3.55), (6, 0, 0), (0, 4, 0)), Material((0.8, 0.78, 0.72))),
+        Thing(shapes.rectangle((-3, FLOOR, 0.5), (6, 0, 0), (0, 0, 3.2)), planks),
+        Thing(shapes.rectangle((-0.95, FLOOR - 0.012, 1.6), (2.0, 0, 0.1), (-0.07, 0, 1.35)), rug),
+        Thing(_table_cloth((0.16, TABLE, 2.6), 0.46), cream),
+        Thing(_tied((0.83, 0.4, 1.98)), velvet),
+        Thing(_blanket((-0.72, -0.1, 2.45)), wool),
+        Thing(_rack((-0.72, -0.1, 2.45)), beech),
+        *(
+            Thing(
+                _folded((0.32 + 0.008 * (n % 2), TABLE - 0.032 - 0.06 * n, 2.58), n),
+                Material(patterns.linen(70 + 3 * n, 0.6, c)),
+            )
+            for n, c in enumerate(sheets)
+        ),
+        Thing(_crumpled((-0.07, TABLE - 0.003, 2.42)), Material(patterns.linen(91, 0.6, (0.8, 0.74, 0.72), 0.05))),
+    ]
+    light = Light(sky=(0.26, 0.27, 0.29), lamps=[lamp], exposure=2.0)
+    return World(things, Cameras(1.85, 3.5, 1.9, -1.7, 46), light, Paths(4))
 
 
 def _waves(along: Array, seed: int, period: float) -> Array:

@@ -11,27 +11,17 @@ import numpy as np
 from sepi.extensions.rendered import patterns
 from sepi.extensions.rendered.shapes import ball, bevelled, box, joined, leaf, moved, rectangle, rod, sheet, turned_body
 from sepi.extensions.rendered.staging import chair, lamp_towards, seen_from
-from sepi.extensions.rendered.world import Material, Mesh, Pattern, Thing, World
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Paths, Pattern, Thing, World
 
 _WALL = 4.1
 
 
 def world() -> World:
     """A hall without a ceiling, lit from the upper left."""
-    hall = World(
-        [*_hall(), *_curtain(), *_chairs(), *_pots(), *_agave()],
-        near=1.81,
-        far=4.17,
-        at_near=2.0,
-        at_far=-1.7,
-        sky=(0.75, 0.8, 0.88),
-        lamps=[lamp_towards((-2.6, -3.2, 0.8), (0.1, -0.3, 3.0), 1.7, (26.0, 24.0, 21.0))],
-        exposure=1.25,
-        field_of_view=36,
-        depth=7,
-        roulette=5,
-        paths=0.39,
-    )
+    lamp = lamp_towards((-2.6, -3.2, 0.8), (0.1, -0.3, 3.0), 1.7, (26.0, 24.0, 21.0))
+    things = [*_hall(), *_curtain(), *_chairs(), *_pots(), *_agave()]
+    light = Light(sky=(0.75, 0.8, 0.88), lamps=[lamp], exposure=1.25)
+    hall = World(things, Cameras(1.81, 4.17, 2.0, -1.7, 36), light, Paths(7, 5, 0.39))
     return seen_from(hall, (0.05, -0.95, 0.0), below=12)
 
 
@@ -79,10 +69,8 @@ def _chairs() -> list[Thing]:
     x, z = 0.86, 3.5
     seat = turned_body(bevelled(np.array([[0, 0.62], [0.17, 0.62], [0.17, 0.58], [0, 0.58]]), 0.006), (x, 0, z))
     turns = np.arange(4) * np.pi / 2 + 0.5
-    legs = [
-        rod((x + 0.19 * c, -0.013, z + 0.19 * s), (x + 0.1 * c, -0.59, z + 0.1 * s), 0.014)
-        for c, s in zip(np.cos(turns), np.sin(turns), strict=True)
-    ]
+    sides = zip(np.cos(turns), np.sin(turns), strict=True)
+    legs = [rod((x + 0.19 * c, -0.013, z + 0.19 * s), (x + 0.1 * c, -0.59, z + 0.1 * s), 0.014) for c, s in sides]
     return [
         Thing(chair(0.55, (-0.42, 0, 2.75), 5), Material(beech)),
         Thing(chair(-2.5, (0.35, 0, 3.1), 3), red),

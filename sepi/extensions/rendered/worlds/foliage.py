@@ -12,19 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.extensions.rendered import patterns
-from sepi.extensions.rendered.shapes import (
-    Points,
-    about_vertical,
-    ball,
-    copies,
-    joined,
-    leaf,
-    painted_from,
-    rectangle,
-    tube,
-)
-from sepi.extensions.rendered.staging import seen_from
-from sepi.extensions.rendered.world import Material, Mesh, Sun, Thing, World
+from sepi.extensions.rendered.shapes import Points, about_vertical, ball, copies, joined, leaf, rectangle, tube
+from sepi.extensions.rendered.staging import of_boards, seen_from
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Sun, Thing, World
 
 _WALL = 3.1
 _UP = np.array([0.0, -1.0, 0.0])
@@ -54,18 +44,9 @@ class _Habit:
 
 def world() -> World:
     """The wall of a garden."""
-    garden = World(
-        [*_ground(), *_shrubs()],
-        near=1.13,
-        far=2.75,
-        at_near=2.2,
-        at_far=-1.6,
-        sky=(0.75, 0.86, 1.0),
-        suns=[Sun((0.6, 0.9, 0.75), (7.5, 6.9, 5.8))],
-        exposure=0.85,
-        field_of_view=42,
-        depth=6,
-    )
+    things = [*_ground(), *_shrubs()]
+    light = Light(sky=(0.75, 0.86, 1.0), suns=[Sun((0.6, 0.9, 0.75), (7.5, 6.9, 5.8))], exposure=0.85)
+    garden = World(things, Cameras(1.13, 2.75, 2.2, -1.6, 42), light)
     return seen_from(garden, (-0.05, -0.92, 0.42), below=5)
 
 
@@ -73,15 +54,12 @@ def _ground() -> list[Thing]:
     plaster = patterns.noise(1, (0.72, 0.6, 0.44), 0.045, 1.3, finest=3, coarsest=500, chroma=0.25)
     plinth = patterns.stone(2, 0.9, (0.66, 0.64, 0.6), (0.42, 0.4, 0.38))
     soil = patterns.noise(3, (0.34, 0.26, 0.19), 0.08, 0.9, finest=3, coarsest=50, chroma=0.2)
-    blocks = [
-        painted_from(rectangle((-3 + 0.6 * n, -0.3, _WALL - 0.06), (0.592, 0, 0), (0, 0.3, 0)), 0.33 * n, 0.2 * n)
-        for n in range(10)
-    ]
+    blocks = [rectangle((-3 + 0.6 * n, -0.3, _WALL - 0.06), (0.592, 0, 0), (0, 0.3, 0)) for n in range(10)]
     top = rectangle((-3, -0.3, _WALL - 0.06), (6, 0, 0), (0, 0, 0.06))
     return [
         Thing(rectangle((-3, -4, _WALL), (6, 0, 0), (0, 4, 0)), Material(plaster)),
         Thing(rectangle((-3, -0.3, _WALL - 0.055), (6, 0, 0), (0, 0.3, 0)), Material((0.3, 0.28, 0.26))),
-        Thing(joined([*blocks, top]), Material(plinth)),
+        Thing(joined([of_boards(blocks, 0.33, 0.2), top]), Material(plinth)),
         Thing(rectangle((-3, 0, -1), (6, 0, 0), (0, 0, 5)), Material(soil)),
     ]
 

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sepi.extensions.rendered import patterns, shapes
-from sepi.extensions.rendered.world import Lamp, Material, Mesh, Pattern, Thing, Vector, World
-from sepi.extensions.rendered.worlds import ware
+from sepi.extensions.rendered import patterns, shapes, staging
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Paths, Pattern, Thing, Vector, World
 
 COUNTER, WALL = 0.25, 1.75
 GLASS, PANE = Material(kind="glass"), Material(kind="glass", pane=True)
@@ -42,7 +41,7 @@ def world() -> World:
     things.append(Thing(shapes.box((0.15, COUNTER - 0.008, 1.06), (0.24, 0.016, 0.03), (0, 0.15, 0)), frame))
     board = COUNTER - 0.024
     for foot in ((-0.08, board, 1.2), (0.02, board, 1.16), (0.12, board, 1.22)):
-        things.append(Thing(ware.vessel(_TUMBLER, 0.003, foot, 0.014), GLASS))
+        things.append(Thing(staging.vessel(_TUMBLER, 0.003, foot, 0.014), GLASS))
     things.append(Thing(_bottle((-0.24, COUNTER, 1.22)), GLASS))
     things.append(Thing(_jug((0.27, COUNTER, 1.28)), GLASS))
     things.append(Thing(shapes.ball((-0.13, COUNTER - 0.035, 1.07), 0.035), GLASS))
@@ -51,20 +50,9 @@ def world() -> World:
         path = np.array([[0.12 + x, board - 0.012, 1.22 + z], [0.12 + x * 1.3 + lean, board - 0.17, 1.22 + 1.2 * z]])
         things.append(Thing(shapes.tube(path, 0.0035, 8), Material(colour), thin=True))
     things += _twig((-0.24, COUNTER, 1.22))
-    return World(
-        things=things,
-        near=0.95,
-        far=WALL,
-        at_near=2.1,
-        at_far=-1.6,
-        sky=(0.45, 0.46, 0.48),
-        lamps=[Lamp((-2.4, -1.6, -0.6), (0, 0, 2.2), (1.4, -1.2, 0), (3.0, 2.9, 2.7))],
-        exposure=1.75,
-        field_of_view=33,
-        depth=10,
-        roulette=6,
-        paths=0.66,
-    )
+    lamp = Lamp((-2.4, -1.6, -0.6), (0, 0, 2.2), (1.4, -1.2, 0), (3.0, 2.9, 2.7))
+    light = Light(sky=(0.45, 0.46, 0.48), lamps=[lamp], exposure=1.75)
+    return World(things, Cameras(0.95, WALL, 2.1, -1.6, 33), light, Paths(10, 6, 0.66))
 
 
 def _poster(number: int, tint: Vector) -> Pattern:
@@ -97,13 +85,13 @@ def _frame(foot: Vector, width: float, height: float, turn: float) -> Mesh:
 
 
 def _bottle(foot: Vector) -> Mesh:
-    return ware.vessel(
+    return staging.vessel(
         [(0.012, 0.27), (0.017, 0.269), (0.017, 0.255), (0.0135, 0.25), (0.0135, 0.2), (0.02, 0.18), (0.04, 0.15),
          (0.043, 0.12), (0.043, 0.01), (0.038, 0.0)], 0.0035, foot, 0.01)  # fmt: skip
 
 
 def _jug(foot: Vector) -> Mesh:
-    return ware.vessel(
+    return staging.vessel(
         [(0.05, 0.2), (0.053, 0.201), (0.054, 0.198), (0.042, 0.16), (0.05, 0.11), (0.068, 0.06), (0.06, 0.01),
          (0.05, 0.0)], 0.004, foot, 0.012)  # fmt: skip
 

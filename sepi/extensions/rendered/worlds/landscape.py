@@ -23,7 +23,7 @@ from sepi.extensions.rendered.shapes import (
     turned_body,
 )
 from sepi.extensions.rendered.staging import house, seen_from
-from sepi.extensions.rendered.world import Material, Mesh, Pattern, Sun, Thing, World
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Pattern, Sun, Thing, World
 
 _FAR = 900.0
 # where houses stand: those in front, and the village behind
@@ -33,18 +33,9 @@ _PLACES += zip(np.random.default_rng(4).uniform(-75, 60, 22).tolist(), np.linspa
 
 def world() -> World:
     """The valley on a morning in summer."""
-    valley = World(
-        [*_terrain(), *_sky(), *_village(), *_trees(), *_lane()],
-        near=56.0,
-        far=890.0,
-        at_near=0.6,
-        at_far=-0.55,
-        sky=(0.7, 0.85, 1.1),
-        suns=[Sun((0.85, 0.75, 0.35), (6.5, 6.0, 5.0))],
-        exposure=0.95,
-        field_of_view=32,
-        depth=6,
-    )
+    things = [*_terrain(), *_sky(), *_village(), *_trees(), *_lane()]
+    light = Light(sky=(0.7, 0.85, 1.1), suns=[Sun((0.85, 0.75, 0.35), (6.5, 6.0, 5.0))], exposure=0.95)
+    valley = World(things, Cameras(56.0, 890.0, 0.6, -0.55, 32), light)
     return seen_from(valley, (0.0, -31.0, 0.0), below=5.5)
 
 
@@ -168,10 +159,8 @@ def _lane() -> list[Thing]:
     across = np.array([-1.5, -0.5, 0.5, 1.5])[None, :] + x[:, None]
     along = np.broadcast_to(z[:, None], across.shape)
     gravel = patterns.noise(61, (0.6, 0.55, 0.45), 0.06, 20.0, finest=3, coarsest=100)
-    posts = [
-        box((a - 2.6, b - 0.5, c), (0.16, 1.6, 0.16))
-        for a, b, c in np.stack([x, -_height(x, z), z], axis=1)[10::6].tolist()
-    ]
+    places = np.stack([x, -_height(x, z), z], axis=1)[10::6].tolist()
+    posts = [box((a - 2.6, b - 0.5, c), (0.16, 1.6, 0.16)) for a, b, c in places]
     rng = np.random.default_rng(7)
     drum = turned_body(
         np.array([[0, 0.7], [0.75, 0.69], [0.78, 0.6], [0.78, -0.6], [0.75, -0.69], [0, -0.7]]), (0, 0, 0), 24

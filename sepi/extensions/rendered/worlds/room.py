@@ -11,7 +11,7 @@ import numpy as np
 from sepi.extensions.rendered import patterns
 from sepi.extensions.rendered.shapes import ball, bevelled, box, joined, moved, rectangle, rod, turned_body
 from sepi.extensions.rendered.staging import book, chair, of_boards, seen_from, table
-from sepi.extensions.rendered.world import Lamp, Material, Mesh, Thing, Vector, World
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Thing, Vector, World
 
 _LEFT, _RIGHT, _BACK, _HIGH = -2.4, 2.2, 4.3, 2.6
 _WHITE = Material((0.8, 0.79, 0.76))
@@ -19,20 +19,15 @@ _WHITE = Material((0.8, 0.79, 0.76))
 
 def world() -> World:
     """The room in daylight."""
-    room = World(
-        [*_walls(), *_door(), *_pictures(), *_shelves(), *_table(), *_lamp()],
-        near=2.05,
-        far=4.8,
-        at_near=2.0,
-        at_far=-1.6,
+    things = [*_walls(), *_door(), *_pictures(), *_shelves(), *_table(), *_lamp()]
+    light = Light(
         lamps=[
             Lamp((_LEFT + 0.01, -2.3, 0.4), (0.0, 1.5, 0.0), (0.0, 0.0, 2.4), (6.0, 6.2, 6.6)),
             Lamp((_LEFT, -_HIGH, -1.5), (_RIGHT - _LEFT, 0.0, 0.0), (0.0, _HIGH, 0.0), (0.9, 0.95, 1.0)),
         ],
         exposure=2.1,
-        field_of_view=60,
-        depth=6,
     )
+    room = World(things, Cameras(2.05, 4.8, 2.0, -1.6, 60), light)
     return seen_from(room, (-0.85, -1.35, 0.4), below=5, rightwards=24)
 
 

@@ -9,19 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from sepi.extensions.rendered import patterns
-from sepi.extensions.rendered.shapes import (
-    ball,
-    bevelled,
-    box,
-    joined,
-    moved,
-    painted_from,
-    rectangle,
-    rod,
-    turned_body,
-)
-from sepi.extensions.rendered.staging import book, crate, leaning, seen_from
-from sepi.extensions.rendered.world import Lamp, Material, Thing, Vector, World
+from sepi.extensions.rendered.shapes import ball, bevelled, box, joined, moved, rectangle, rod, turned_body
+from sepi.extensions.rendered.staging import book, crate, leaning, of_boards, seen_from
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Thing, Vector, World
 
 _WALL = 3.0
 _LIFT = 0.002
@@ -29,33 +19,22 @@ _LIFT = 0.002
 
 def world() -> World:
     """The heap, by a window on the left."""
+    lamp = Lamp((-1.9, -2.9, 2.4), (-0.6, 0.0, -2.2), (-0.4, 1.5, 0.0), (22.0, 20.5, 18.5))
     things = [*_room(), *_boxes(), *_books(), *_balls(), *_sticks()]
-    heap = World(
-        things,
-        near=1.46,
-        far=2.86,
-        at_near=1.9,
-        at_far=-1.8,
-        sky=(0.75, 0.78, 0.83),
-        lamps=[Lamp((-1.9, -2.9, 2.4), (-0.6, 0.0, -2.2), (-0.4, 1.5, 0.0), (22.0, 20.5, 18.5))],
-        exposure=1.0,
-        field_of_view=38,
-        depth=6,
-    )
+    light = Light(sky=(0.75, 0.78, 0.83), lamps=[lamp])
+    heap = World(things, Cameras(1.46, 2.86, 1.9, -1.8, 38), light)
     return seen_from(heap, (0.02, -1.0, 0.3), below=19)
 
 
 def _room() -> list[Thing]:
-    planks = [
-        painted_from(rectangle((-3 + 0.14 * n, 0, -1), (0, 0, 4), (0.137, 0, 0)), 0.37 * n, 0.14 * n) for n in range(44)
-    ]
+    planks = [rectangle((-3 + 0.14 * n, 0, -1), (0, 0, 4), (0.137, 0, 0)) for n in range(44)]
     under = rectangle((-4, _LIFT, -1), (0, 0, 4.1), (8, 0, 0))
     wall = rectangle((-4, -4, _WALL), (8, 0, 0), (0, 4, 0))
     skirting = box((0, -0.05, _WALL - 0.009), (8, 0.1, 0.018))
     plaster = patterns.noise(11, (0.62, 0.6, 0.52), 0.06, 1.1, finest=3, coarsest=300, chroma=0.25)
     boards = patterns.wood(12, 1.3, (0.6, 0.45, 0.3), (0.38, 0.26, 0.17))
     return [
-        Thing(joined(planks), Material(boards)),
+        Thing(of_boards(planks, 0.37, 0.14), Material(boards)),
         Thing(under, Material((0.08, 0.06, 0.05))),
         Thing(wall, Material(plaster)),
         Thing(skirting, Material((0.75, 0.73, 0.68))),
@@ -91,10 +70,8 @@ def _boxes() -> list[Thing]:
 def _books() -> list[Thing]:
     rng = np.random.default_rng(3)
     colours: list[Vector] = [(0.5, 0.12, 0.1), (0.12, 0.26, 0.42), (0.16, 0.34, 0.22), (0.75, 0.66, 0.42)]
-    covers = [
-        Material(patterns.printed(30 + n, 0.24, 16, paper=colour, ink=0.85 if n < 3 else 0.2))
-        for n, colour in enumerate(colours)
-    ]
+    inks = (0.85, 0.85, 0.85, 0.2)
+    covers = [Material(patterns.printed(30 + n, 0.24, 16, colours[n], ink)) for n, ink in enumerate(inks)]
     paper = Material(patterns.noise(35, (0.82, 0.78, 0.68), 0.05, 0.2, finest=3, coarsest=12, chroma=0.1))
     found = []
     for x, y, z, count in ((-0.6, 0.0, 1.98, 5), (0.38, 0.0, 1.98, 7), (0.64, -0.3, 2.5, 5), (0.06, -0.52, 2.72, 3)):
@@ -122,16 +99,11 @@ def _balls() -> list[Thing]:
 
 def _sticks() -> list[Thing]:
     rng = np.random.default_rng(5)
+    draws = [rng.uniform(-1.3, 1.3, 16), rng.normal(0, 0.25, 16)]
+    draws += [rng.uniform(*span, 16) for span in ((0.1, 0.3), (0.9, 1.7), (0.005, 0.012))]
     wall = [
         leaning((x, 0, _WALL - back), (x + lean, -height, _WALL - 0.02), 0.01, radius)
-        for x, lean, back, height, radius in zip(
-            rng.uniform(-1.3, 1.3, 16),
-            rng.normal(0, 0.25, 16),
-            rng.uniform(0.1, 0.3, 16),
-            rng.uniform(0.9, 1.7, 16),
-            rng.uniform(0.005, 0.012, 16),
-            strict=True,
-        )
+        for x, lean, back, height, radius in zip(*draws, strict=True)
     ]
     # upper edges on which sticks can lie: two points of each
     edges = [((-0.66, -0.63, 2.43), (-0.32, -0.63, 2.46)), ((-0.14, -0.52, 2.54), (0.28, -0.52, 2.56))]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sepi.extensions.rendered import patterns, shapes
-from sepi.extensions.rendered.world import Material, Mesh, Sun, Thing, Vector, World
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Paths, Sun, Thing, Vector, World
 
 GROUND = 4.0
 _PANE = Material((0.1, 0.12, 0.14), "glossy")
@@ -58,18 +58,8 @@ def world() -> World:
         things += _front(front)
     for number, (x, z) in enumerate([(0.2, 17.5), (2.9, 15.5), (-0.9, 20.5), (3.9, 20.0)]):
         things += _parasol((x, GROUND, z), red_white if number % 2 else green)
-    return World(
-        things=things,
-        near=6.6,
-        far=26.0,
-        at_near=2.2,
-        at_far=-1.5,
-        sky=(0.36, 0.44, 0.56),
-        suns=[Sun((0.36, 0.72, 0.55), (2.0, 1.86, 1.62))],
-        exposure=1.6,
-        field_of_view=50,
-        depth=4,
-    )
+    light = Light(sky=(0.36, 0.44, 0.56), suns=[Sun((0.36, 0.72, 0.55), (2.0, 1.86, 1.62))], exposure=1.6)
+    return World(things, Cameras(6.6, 26.0, 2.2, -1.5, 50), light, Paths(4))
 
 
 def _front(front: Front) -> list[Thing]:
@@ -95,10 +85,8 @@ def _front(front: Front) -> list[Thing]:
             if drop:
                 blinds.append(shapes.rectangle((x - w / 2, high, 0.2), (w, 0, 0), (0, drop * h, 0)))
             if front.shutters and floor:
-                leaves += [
-                    _slab((x + s * 0.77 * w - w / 4, high), (x + s * 0.77 * w + w / 4, low), 0.04, -0.05)
-                    for s in (-1, 1)
-                ]
+                for at in (x + -1 * 0.77 * w, x + 1 * 0.77 * w):
+                    leaves.append(_slab((at - w / 4, high), (at + w / 4, low), 0.04, -0.05))
             if front.balconies and floor:
                 iron += _railing((x - w / 2 - 0.15, low + 0.05), w + 0.3, 0.95, -0.3, 0.12, 0.012)
                 sills.append(_slab((x - w / 2 - 0.2, low), (x + w / 2 + 0.2, low + 0.12), 0.1, -0.38))
@@ -107,12 +95,8 @@ def _front(front: Front) -> list[Thing]:
             awnings += _awning(x, 1.7 * front.pitch)
     panes = [_slab((0, -front.floors * front.storey), (length, 0), 0.05, 0.27)]
     blind = Material(patterns.stripes(0.3, [(0.8, 0.76, 0.66), (0.7, 0.66, 0.56)], across=False))
-    parts: list[tuple[list[Mesh], Material | None]] = [
-        (wall, front.wall),
-        (sills, _SILL),
-        (bars, _WHITE),
-        (panes, _PANE),
-    ]
+    parts: list[tuple[list[Mesh], Material | None]]
+    parts = [(wall, front.wall), (sills, _SILL), (bars, _WHITE), (panes, _PANE)]
     parts += [(blinds, blind), (leaves, front.shutters), (iron, _IRON), (awnings, front.awnings)]
     return [
         Thing(shapes.moved(shapes.joined(meshes), (0, front.turn, 0), front.corner), material, thin=meshes is iron)
@@ -130,10 +114,8 @@ def _slab(low: tuple[float, float], high: tuple[float, float], depth: float, at:
 
 def _casement(x: float, w: float, high: float, low: float) -> list[Mesh]:
     """Frame, middle post and two cross bars."""
-    upright = [
-        _slab((x + s * (w / 2 - 0.035) - 0.035, high), (x + s * (w / 2 - 0.035) + 0.035, low), 0.06, 0.2)
-        for s in (-1, 0, 1)
-    ]
+    middles = [x + s * (w / 2 - 0.035) for s in (-1, 0, 1)]
+    upright = [_slab((at - 0.035, high), (at + 0.035, low), 0.06, 0.2) for at in middles]
     levels = (high, high + 0.32 * (low - high), low - 0.07)
     return upright + [_slab((x - w / 2, y), (x + w / 2, y + 0.07), 0.06, 0.21) for y in levels]
 

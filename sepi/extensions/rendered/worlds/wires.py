@@ -22,8 +22,8 @@ from sepi.extensions.rendered.shapes import (
     tube,
     turned_body,
 )
-from sepi.extensions.rendered.staging import crate, leaning, seen_from
-from sepi.extensions.rendered.world import Material, Mesh, Sun, Thing, World
+from sepi.extensions.rendered.staging import crate, leaning, of_boards, seen_from
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Sun, Thing, World
 
 _WALL = 6.4
 # the fence: where its first post stands, how long it is, and how it is turned away from the picture's plane
@@ -34,39 +34,24 @@ _LENGTH, _HEIGHT, _MESH = 2.1, 1.45, 0.03
 
 def world() -> World:
     """The yard, in the sun of an afternoon."""
-    yard = World(
-        [*_ground(), *_wall(), *_bricks(), *_store(), *_fence(), *_cables()],
-        near=1.62,
-        far=6.6,
-        at_near=2.0,
-        at_far=-1.6,
-        sky=(0.62, 0.76, 1.0),
-        suns=[Sun((0.55, 0.75, 0.6), (7.0, 6.3, 5.2))],
-        exposure=1.0,
-        field_of_view=50,
-        depth=6,
-    )
+    things = [*_ground(), *_wall(), *_bricks(), *_store(), *_fence(), *_cables()]
+    light = Light(sky=(0.62, 0.76, 1.0), suns=[Sun((0.55, 0.75, 0.6), (7.0, 6.3, 5.2))])
+    yard = World(things, Cameras(1.62, 6.6, 2.0, -1.6, 50), light)
     return seen_from(yard, (0.0, -1.15, 0.0), below=5)
 
 
 def _ground() -> list[Thing]:
     gravel = patterns.noise(1, (0.5, 0.47, 0.43), 0.09, 1.4, finest=3, coarsest=60, chroma=0.3)
     slabs = patterns.noise(2, (0.62, 0.61, 0.58), 0.05, 1.2, finest=3, coarsest=400, chroma=0.1)
-    path = [
-        painted_from(box((-1.35, -0.015, 1.6 + 0.62 * n), (0.9, 0.04, 0.6), (0, 0.01 * (n % 3), 0)), 0.3 * n, 0.2 * n)
-        for n in range(8)
-    ]
+    path = [box((-1.35, -0.015, 1.6 + 0.62 * n), (0.9, 0.04, 0.6), (0, 0.01 * (n % 3), 0)) for n in range(8)]
     return [
         Thing(rectangle((-9, 0, -1), (18, 0, 0), (0, 0, 9)), Material(gravel)),
-        Thing(joined(path), Material(slabs)),
+        Thing(of_boards(path, 0.3, 0.2), Material(slabs)),
     ]
 
 
 def _wall() -> list[Thing]:
-    boards = [
-        painted_from(box((-1.75 + 0.115 * n, -1.06, _WALL - 0.03), (0.112, 2.0, 0.03)), 0.21 * n, 0.3 * n)
-        for n in range(9)
-    ]
+    boards = [box((-1.75 + 0.115 * n, -1.06, _WALL - 0.03), (0.112, 2.0, 0.03)) for n in range(9)]
     frame = [box((x, -1.06, _WALL - 0.04), (0.09, 2.12, 0.09)) for x in (-1.86, -0.72)]
     frame += [box((-1.29, -2.15, _WALL - 0.04), (1.23, 0.1, 0.09)), box((1.7, -1.42, _WALL - 0.06), (1.5, 0.07, 0.16))]
     frame += [box((x, -1.9, _WALL - 0.03), (0.05, 0.9, 0.06)) for x in (1.02, 1.7, 2.38)]
@@ -75,7 +60,7 @@ def _wall() -> list[Thing]:
     green = patterns.noise(11, (0.25, 0.36, 0.3), 0.05, 0.7, finest=3, coarsest=200, chroma=0.2)
     return [
         Thing(rectangle((-9, -6, _WALL), (18, 0, 0), (0, 6, 0)), Material(patterns.bricks(10, 1.5, 20))),
-        Thing(joined(boards), Material(green)),
+        Thing(of_boards(boards, 0.21, 0.3), Material(green)),
         Thing(joined(frame), Material((0.88, 0.87, 0.83))),
         Thing(rectangle((1.0, -2.35, _WALL - 0.01), (1.4, 0, 0), (0, 0.9, 0)), Material((0.1, 0.13, 0.16), "glossy")),
         Thing(pipe, Material((0.36, 0.37, 0.36), "glossy", 0.2)),
@@ -86,7 +71,7 @@ def _bricks() -> list[Thing]:
     rng = np.random.default_rng(7)
     bricks, pallets = [], []
     for x, z, turn, layers in ((0.62, 4.3, 0.3, 9), (-0.55, 5.2, -0.15, 6)):
-        stack, pallet = [], []
+        stack = []
         for layer in range(layers):
             for column in range(4):
                 for row in range(4 if layer < layers - 1 else int(rng.integers(1, 4))):
@@ -94,12 +79,8 @@ def _bricks() -> list[Thing]:
                     place = (0.245 * (column - 1.5) + off[0], -0.18 - 0.072 * layer, 0.12 * (row - 1.5) + off[1])
                     brick = box(place, (0.235, 0.068, 0.11), (0, float(rng.normal(0, 0.02)), 0))
                     stack.append(painted_from(brick, *rng.uniform(0, 0.6, 2)))
-        for side in (-0.42, 0.0, 0.42):
-            pallet.append(box((side, -0.06, 0), (0.1, 0.12, 0.6)))
-        for board in range(5):
-            pallet.append(
-                painted_from(box((0, -0.131, 0.13 * (board - 2)), (1.1, 0.022, 0.1)), 0.2 * board, 0.1 * board)
-            )
+        pallet = [box((side, -0.06, 0), (0.1, 0.12, 0.6)) for side in (-0.42, 0.0, 0.42)]
+        pallet.append(of_boards([box((0, -0.131, 0.13 * (n - 2)), (1.1, 0.022, 0.1)) for n in range(5)], 0.2, 0.1))
         bricks.append(moved(joined(stack), (0, turn, 0), (x, 0, z)))
         pallets.append(moved(joined(pallet), (0, turn, 0), (x, 0, z)))
     clay = patterns.noise(21, (0.6, 0.32, 0.23), 0.06, 0.6, finest=3, coarsest=100, chroma=0.3)
