@@ -265,9 +265,7 @@ def test_preconditioner_adds_what_hats_of_each_width_see(shape) -> None:
     for spacing in (2, 8, 32):
         hats = [
             # as far before the first pixel as behind the last, so that mirrored pictures have mirrored ones
-            np.maximum(
-                0, 1 - np.abs(np.arange(n)[:, None] + (1 + -n % 32) / 2 - np.arange(0, n + 32, spacing)) / spacing
-            )
+            (1 - np.abs(np.arange(n)[:, None] + (1 + -n % 32) / 2 - np.arange(0, n + 32, spacing)) / spacing).clip(0)
             for n in shape
         ]
         both = np.kron(*hats)
