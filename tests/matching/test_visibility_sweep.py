@@ -112,10 +112,10 @@ def sampled(values, y, x):
     """Bilinear samples with weights in steps of 2^-14."""
     H, W = values.shape
     top, left = (np.floor(p).astype(int).clip(0, n - 2) for p, n in ((y, H), (x, W)))
-    below = np.floor((y - top) * 2**14 + 0.5).clip(0, 2**14)
-    right, lower_right = (np.floor(part * (x - left) + 0.5) for part in (2**14 - below, below))
-    weights = (2**14 - below - right, right), (below - lower_right, lower_right)
-    return sum(values[top + i, left + j] * weights[i][j] for i, j in np.ndindex(2, 2)) / 2**14
+    fy, fx = (y - top).clip(0, 1), (x - left).clip(0, 1)
+    weights = np.floor(np.stack([(1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx]) * 2**14 + 0.5)
+    weights += (weights.argmax(axis=0) == np.arange(4)[:, None, None]) * (2**14 - weights.sum(axis=0))
+    return sum(values[top + i, left + j] * weights[2 * i + j] for i, j in np.ndindex(2, 2)) / 2**14
 
 
 def bows(picture, y, x):

@@ -2,8 +2,7 @@
 //
 // A sample of a cubic spline is a sum of 4 x 4 coefficients. The four channels of a coefficient lie side by side, so that a
 // row of four coefficients is one vector of sixteen numbers. Coefficients and weights are whole numbers of 16 bits, of
-// which processors multiply twice as many at once as of floats; what the rounding of the sums of columns leaves is a tenth
-// of the steps of an 8-bit picture. All else is done for eight pixels at once.
+// which processors multiply twice as many at once as of floats. All else is done for eight pixels at once.
 #include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
@@ -44,7 +43,8 @@ struct Pixels {
     Four own;
     Int8 inside;
     std::uint32_t nearest[LANES], coefficients[LANES];  // indices into the z-buffer, and of their first coefficients
-    std::int32_t weights[6][LANES];                     // of coefficients, in pairs: each of the four rows twice, the first two columns, the other two
+    std::int32_t rows[2][LANES];                        // weights of coefficients, of the first two rows, and of the other two
+    float columns[4][LANES];
 };
 
 // Integer weights, of sum ONE, of the four coefficients round a position, by its distance beyond the second.
@@ -73,7 +73,7 @@ struct View {
     const Index n, H, W;
     const Index t = views.places(n, 0), s = views.places(n, 1);
     const float down = views.baselines(n, 0), across = views.baselines(n, 1);
-    const float bottom = float(H - 1), right = float(W - 1), unit = views.unit / float(ONE);
+    const float bottom = float(H - 1), right = float(W - 1), unit = views.unit / (float(ONE) * float(ONE));
     const std::int32_t low = std::int32_t(views.low);
     const std::int32_t pitch = std::int32_t(views.splines.strides[2]), width = std::int32_t(seeing.nearest.strides[2]);
     const float *const nearest = seeing.nearest.at(t, s);
@@ -83,19 +83,17 @@ struct View {
     // Compute the positions of a row's pixels.
     void find(Index row, Pixels &pixels) const {
         const Float8 up = pixels.disparity * down, back = pixels.disparity * across;
-        Float8 y = float(row) - up, x = pixels.x - back;
-        pixels.inside = (y >= 0.0f) & (y <= bottom) & (x >= 0.0f) & (x <= right);
-        // nearest position, with halves rounded symmetrically
-        const Int8 position = (std::int32_t(row - low) - rounded(up)) * std::int32_t(width) + truncated(pixels.x) - rounded(back);
-        store(pixels.nearest, pixels.inside ? position : Int8{});
-        // pixels outside read a corner
-        y = pixels.inside ? y : spread(float(low));
-        x = pixels.inside ? x : Float8{};
-        const Int8 top = truncated(y), left = truncated(x);
-        store(pixels.coefficients, (top - low) * pitch + left * 4);
-        const auto rows = coefficient_weights(y - __builtin_convertvector(top, Float8)), columns = coefficient_weights(x - __builtin_convertvector(left, Float8));
-        for (Index n = 0; n < 4; ++n) store(pixels.weights[n], rows[n] | rows[n] << 16);
-        for (Index n = 0; n < 2; ++n) store(pixels.weights[4 + n], columns[2 * n] | columns[2 * n + 1] << 16);
+        pixels.inside = (up <= float(row)) & (-up <= bottom - float(row)) & (back <= pixels.x) & (-back <= right - pixels.x);
+        // nearest position, with halves rounded symmetrically; pixels outside read a corner
+        const Int8 y = pixels.inside ? std::int32_t(row - low) - rounded(up) : Int8{}, x = pixels.inside ? truncated(pixels.x) - rounded(back) : Int8{};
+        store(pixels.nearest, y * width + x);
+        // from there on, in small numbers, so that mirrored pictures give mirrored samples
+        const Float8 below = whole(up) - up, beside = whole(back) - back;
+        const Int8 above = below < 0.0f, left = beside < 0.0f;
+        store(pixels.coefficients, (y + (above & pixels.inside)) * pitch + (x + (left & pixels.inside)) * 4);
+        const auto rows = coefficient_weights(above ? below + 1.0f : below), columns = coefficient_weights(left ? beside + 1.0f : beside);
+        for (Index n = 0; n < 2; ++n) store(pixels.rows[n], rows[2 * n] | rows[2 * n + 1] << 16);
+        for (Index n = 0; n < 4; ++n) store(pixels.columns[n], __builtin_convertvector(columns[n], Float8) * unit);
         // prefetch data for sampling
         __builtin_prefetch(nearest + pixels.nearest[0]);
         for (Index n = 0; n < 4; ++n) __builtin_prefetch(coefficients + pixels.coefficients[0] + n * pitch);
@@ -109,23 +107,25 @@ struct View {
         if (!any(seen)) return Float8{};
         Four halves;
         for (int i = 0; i < 4; ++i) {
-            const Int8 a = products(pixels, i), b = products(pixels, i + 4);
-            const Int8 first = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11), others = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
-            halves[i] = __builtin_convertvector(first + others, Float8) * unit;
+            const Float8 a = products(pixels, i), b = products(pixels, i + 4);
+            halves[i] = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11) + __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
         }
         channels = transposed_halves(halves);
         return seen ? spread(1) : Float8{};
     }
 
-    // Sums of the first two columns of coefficients, of four channels, and of the others, weighted for pixel i.
-    Int8 products(const Pixels &pixels, int i) const {
-        const auto line = [&](Index n) { return Int8{} + pixels.weights[n][i]; };
-        const std::int16_t *first = coefficients + pixels.coefficients[i];
-        const auto row = [&](Index n) { return rounded_products(load(first + n * pitch), Short16(line(n))); };
-        const Short16 sums = row(0) + row(1) + row(2) + row(3);
-        // neighbours of one channel side by side
-        const Short16 neighbours = __builtin_shufflevector(sums, sums, 0, 4, 1, 5, 2, 6, 3, 7, 8, 12, 9, 13, 10, 14, 11, 15);
-        return dot_of_pairs(Int8(neighbours), __builtin_shufflevector(line(4), line(5), 0, 1, 2, 3, 12, 13, 14, 15));
+    // Sums of the first two columns of coefficients, of four channels, and of the others, weighted for pixel i. Neither is
+    // rounded to whole numbers, so that transposed pictures give transposed samples.
+    Float8 products(const Pixels &pixels, int i) const {
+        const auto row = [&](Index n) { return load(coefficients + pixels.coefficients[i] + n * pitch); };
+        const auto column = [&](auto pairs) {
+            return dot_of_pairs(pairs(row(0), row(1)), Int8{} + pixels.rows[0][i]) + dot_of_pairs(pairs(row(2), row(3)), Int8{} + pixels.rows[1][i]);
+        };
+        // the first and third column of coefficients, and the second and fourth, of neighbours below each other
+        const Int8 outer = column([](Short16 a, Short16 b) { return Int8(__builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 8, 24, 9, 25, 10, 26, 11, 27)); });
+        const Int8 inner = column([](Short16 a, Short16 b) { return Int8(__builtin_shufflevector(a, b, 4, 20, 5, 21, 6, 22, 7, 23, 12, 28, 13, 29, 14, 30, 15, 31)); });
+        const auto weights = [&](int n) { return __builtin_shufflevector(spread(pixels.columns[n][i]), spread(pixels.columns[n + 2][i]), 0, 1, 2, 3, 12, 13, 14, 15); };
+        return __builtin_convertvector(outer, Float8) * weights(0) + __builtin_convertvector(inner, Float8) * weights(1);
     }
 };
 

@@ -234,13 +234,15 @@ struct VisibleRow {
             const Index within = std::max<Index>(0, -left), beyond = std::min(W, fx == 0 ? W - left : W - 1 - left);
             if (top < 0 || top > H - 2) continue;
             // weights as pairs of 16-bit integers: pixel and right neighbour, above and below
-            const auto below = std::int64_t(double(fy) * ONE + 0.5), right = std::int64_t((ONE - below) * double(fx) + 0.5);
-            const auto lower_right = std::int64_t(below * double(fx) + 0.5);
-            const Int8 upper = pair_of(ONE - below - right, right), lower = pair_of(below - lower_right, lower_right);
+            const auto whole_part = [](double share) { return std::int64_t(share * ONE + 0.5); };
+            std::int64_t of[] = {whole_part((1.0 - fy) * (1.0 - fx)), whole_part((1.0 - fy) * fx), whole_part(fy * (1.0 - fx)), whole_part(double(fy) * fx)};
+            // the largest has what rounding leaves, so that mirrored and transposed views have the same costs
+            *std::max_element(of, of + 4) += ONE - (of[0] + of[1] + of[2] + of[3]);
+            const Int8 upper = pair_of(of[0], of[1]), lower = pair_of(of[2], of[3]);
             // between two pixels a straight line is off from a curve through them by its second difference, times
             // f (1 - f) / 2
             const auto bow = [](std::int64_t weight) { return 2 * weight * (ONE - weight) / ONE; };
-            const Int8 bows = pair_of(bow(std::int64_t(double(fx) * ONE + 0.5)), bow(below));
+            const Int8 bows = pair_of(bow(whole_part(fx)), bow(whole_part(fy)));
             // occlusion grows from half a margin to one and a half, since disparities are uncertain
             const Float8 limit = spread(candidates.disparities(k) + 1.5f * margin), number = spread(float(k));
             const Index lower_row = top - views.low + is_nearer_next(candidates.down(r, k), fy);

@@ -1,9 +1,9 @@
 // The matrix of the global optimisation, as a stencil, the hats of its preconditioner, and the weights of second-order smoothing.
 //
 // Pictures have a margin of MARGIN pixels of zeros on each side, so that loops need no border cases; hats have none.
-// Node i of the finest level lies at SPACING i - 0.5 pixels. A coarser level has every other node; each of its hats is
-// one of the finer level plus half of each neighbour. Sums add rows in order, so that all numbers of threads give the
-// same bits. Number is float or double.
+// Nodes of the finest level lie SPACING apart, from as far before the first pixel to behind the last one, so that mirrored
+// pictures take mirrored steps. A coarser level has every other node; each of its hats is one of the finer level plus half
+// of each neighbour. Sums add rows in order, so that all numbers of threads give the same bits. Number is float or double.
 #include <cmath>
 
 #include "kernels/arguments.hpp"
@@ -15,8 +15,13 @@ namespace {
 constexpr Index MARGIN = 2;   // reach of second differences, pixels
 constexpr Index SPACING = 2;  // distance of nodes of the finest hats, pixels
 
-// Heights of the finest hats at the pixels beside a node, and at the next ones.
-constexpr float NEAR = 0.75f, FAR = 0.25f;
+// Some nodes along an axis of n pixels, with hats as high as height(p) at pixels p = 0..2 spacing - 1 about their node, of
+// which that of the first begin so many before the first pixel. Nodes lie between two pixels, or on the earlier one.
+struct Nodes {
+    Index spacing, beyond, before = beyond / 2 + spacing;
+    Nodes(Index number, Index apart, Index n) : spacing(apart), beyond(apart * (number - 1) - n) {}
+    double height(Index p) const { return std::max(0.0, 1 - std::abs(double(2 * (p - spacing) + 1 + beyond % 2)) / double(2 * spacing)); }
+};
 
 // Entries of the stencil, which may have the first of them alone: rows and columns from one pixel to the other.
 constexpr Index ENTRIES[7][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 0}, {2, 0}, {1, 1}, {1, -1}};
@@ -30,16 +35,14 @@ void add(Number *__restrict row, Number factor, const Number *values, Index n) {
 // Inner product of two rows, in an order that vectorises and is the same on all processors.
 template <class Number>
 Number dot(const Number *a, const Number *b, Index n) {
-    constexpr Index PARTS = 128 / sizeof(Number), FEWER = PARTS / 4;
+    constexpr Index PARTS = 128 / sizeof(Number);
     Number sums[PARTS] = {};
     Index x = 0;
     for (; x <= n - PARTS; x += PARTS)
         for (Index i = 0; i < PARTS; ++i) sums[i] += a[x + i] * b[x + i];
-    for (; x <= n - FEWER; x += FEWER)
-        for (Index i = 0; i < FEWER; ++i) sums[i] += a[x + i] * b[x + i];
+    for (Index i = 0; x + i < n; ++i) sums[i] += a[x + i] * b[x + i];
     for (Index half = PARTS / 2; half > 0; half /= 2)
         for (Index i = 0; i < half; ++i) sums[i] += sums[i + half];
-    for (; x < n; ++x) sums[0] += a[x] * b[x];
     return sums[0];
 }
 
@@ -111,15 +114,16 @@ double step(Number length, Array<const Number, 2> direction, Array<const Number,
 template <class Number>
 void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = out.shape[1];
-    constexpr Number SHARES[] = {FAR, NEAR, NEAR, FAR};
+    const Nodes down(out.shape[0], SPACING, H), across(w, SPACING, W);
+    const Number h[] = {Number(across.height(0)), Number(across.height(1)), Number(across.height(2)), Number(across.height(3))};
     // with a margin of zeros as wide as the hats' reach
     parallel_for(0, out.shape[0], [&](Index i) {
         const auto lines = zeros<Number, 1>(2 * w + 2);
         Number *line = lines.array().data;
         for (Index n = 0; n < 4; ++n)
-            if (const Index y = 2 * i + n - 2; 0 <= y && y < H) add(line + 2, SHARES[n], vector.at(y + MARGIN, MARGIN), W);
+            if (const Index y = 2 * i + n - down.before; 0 <= y && y < H) add(line + across.before, Number(down.height(n)), vector.at(y + MARGIN, MARGIN), W);
         Number *__restrict target = out.at(i);
-        for (Index j = 0; j < w; ++j) target[j] = FAR * (line[2 * j] + line[2 * j + 3]) + NEAR * (line[2 * j + 1] + line[2 * j + 2]);
+        for (Index j = 0; j < w; ++j) target[j] = h[0] * line[2 * j] + h[1] * line[2 * j + 1] + h[2] * line[2 * j + 2] + h[3] * line[2 * j + 3];
     });
 }
 
@@ -128,20 +132,22 @@ template <class Number>
 double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2> vector, Array<const Number, 2> fine, Array<Number,
                            2> out) {
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = fine.shape[1];
+    const Nodes down(fine.shape[0], SPACING, H), across(w, SPACING, W);
+    const Number h[] = {Number(across.height(0)), Number(across.height(1)), Number(across.height(2)), Number(across.height(3))};
     const Scratch<Number, 1> along(H);
     parallel_for(0, H, [&](Index y) {
         const Scratch<Number, 1> lines(w), all_hats(2 * w);
         Number *__restrict line = lines.array().data, *__restrict hats = all_hats.array().data;
-        const Number first = y % 2 ? FAR : NEAR, second = y % 2 ? NEAR : FAR;
-        const Number *above = fine.at(y / 2), *below = fine.at(y / 2 + 1);
+        const Index i = (y + down.before) / 2, odd = (y + down.before) % 2;
+        const Number first = Number(down.height(2 + odd)), second = Number(down.height(odd)), *above = fine.at(i - 1), *below = fine.at(i);
         for (Index j = 0; j < w; ++j) line[j] = first * above[j] + second * below[j];
         for (Index j = 0; j < w - 1; ++j) {
-            hats[2 * j] = NEAR * line[j] + FAR * line[j + 1];
-            hats[2 * j + 1] = FAR * line[j] + NEAR * line[j + 1];
+            hats[2 * j] = h[2] * line[j] + h[0] * line[j + 1];
+            hats[2 * j + 1] = h[3] * line[j] + h[1] * line[j + 1];
         }
         const Number *row = vector.at(y + MARGIN, MARGIN), *own = inverse.at(y + MARGIN, MARGIN);
         Number *__restrict target = out.at(y + MARGIN, MARGIN);
-        for (Index x = 0; x < W; ++x) target[x] = own[x] * row[x] + hats[x];
+        for (Index x = 0; x < W; ++x) target[x] = own[x] * row[x] + hats[across.before - SPACING + x];
         along.array()(y) = dot<Number>(row, target, W);
     });
     return in_order(along);
@@ -150,10 +156,7 @@ double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2
 // Diagonal of the matrix in hats with this spacing, out (h, w).
 void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<double, 2> out) {
     const Index H = stencil.shape[1] - 2 * MARGIN, W = stencil.shape[2] - 2 * MARGIN, w = out.shape[1], reach = 2 * spacing;
-    // heights of a hat at its pixels, with zeros for entries that leave it
-    const auto hats = zeros<double, 1>(reach + 2 * MARGIN);
-    double *hat = hats.array().data + MARGIN;
-    for (Index p = 0; p < reach; ++p) hat[p] = 1 - std::abs(double(p) + 0.5 - double(spacing)) / double(spacing);
+    const Nodes down(out.shape[0], spacing, H), across(w, spacing, W);
     parallel_for(0, out.shape[0], [&](Index i) {
         const Scratch<double, 1> lines(spacing * (w + 1));
         double *line = lines.array().data, *__restrict target = out.at(i);
@@ -162,13 +165,13 @@ void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<doubl
             const auto [dy, dx] = ENTRIES[k];
             std::fill_n(line, spacing * (w + 1), 0.0);
             for (Index p = 0; p < reach; ++p) {
-                const Index y = spacing * (i - 1) + p;
-                const double share = hat[p] * hat[p + dy];
-                if (0 <= y && y < H && share > 0) add(line + spacing, share, stencil.at(k, y + MARGIN, MARGIN), W);
+                const Index y = spacing * i + p - down.before;
+                const double share = down.height(p) * down.height(p + dy);
+                if (0 <= y && y < H && share > 0) add(line + across.before, share, stencil.at(k, y + MARGIN, MARGIN), W);
             }
             for (Index p = 0; p < reach; ++p) {
                 // each entry from either of its pixels
-                const double share = (k == 0 ? 1.0 : 2.0) * hat[p] * hat[p + dx];
+                const double share = (k == 0 ? 1.0 : 2.0) * across.height(p) * across.height(p + dx);
                 if (share > 0)
                     for (Index j = 0; j < w; ++j) target[j] += share * line[spacing * j + p];
             }
