@@ -59,12 +59,10 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
     """A rule without the digest of its command would keep what earlier code made."""
     checked = set()
     for rule in read.rules:
-        command = re.search(r"-m (sepi[\w.]*|{params.module})", rule.shellcmd or "")
+        command = re.search(r"-m (sepi[\w.]*)", rule.shellcmd or "")
         if command is None:
             continue
         checked.add(rule.name)
-        if rule.name in STAGES:
-            assert rule.params.module == f"sepi.{rule.name}"
         code = dict(rule.params.items()).get("code")
         for name, chosen in STAGES.get(rule.name, {"": None}).items():
             if name == HANDED_ON:
