@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sepi.extensions.methods import oavc
+from sepi.extensions.methods import costs, oavc
 from sepi.extensions.methods.costs import least_costs
 from sepi.extensions.methods.oavc import lower_thresholds, vote_costs
 from sepi.lightfield import DisparityRange, FloatMap, LightField
@@ -18,7 +18,7 @@ from sepi.stage import CostVolume, no_progress
 pytestmark = pytest.mark.slow
 
 PARAMETERS = oavc.OavcParameters(num_disparities=61)
-FILTER = oavc.GuidedMedianParameters(radius=7, epsilon=1e-5)
+FILTER = costs.GuidedMedianParameters(radius=7, epsilon=1e-5)
 FEW = {"initial": {"num_disparities": 31}}
 # scenes of what is too thin in a smaller picture
 FINE = ("fine_structures", "stripes")
