@@ -19,7 +19,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from sepi.camera.rig import Floats
 from sepi.errors import SepiError, printable
@@ -170,14 +169,6 @@ def match(
     listed.unlink()
 
 
-def matched_points(
-    file: Any, one: int, other: int
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
-    """Unverified matches of two pictures of a database: all features of both, and pairs of them."""
-    places = [np.asarray(file.read_keypoints(image)[:, :2], np.float64) for image in (one, other)]
-    return places[0], places[1], np.asarray(file.read_matches(one, other), np.uint32).reshape(-1, 2)
-
-
 # number of pictures that are checked, spread over all of them, and the longer side of each, pixels
 _LOOKED_AT, _LOOK = 6, 640
 # least number of features of a picture with texture, and of matches of two pictures of one scene
@@ -277,7 +268,8 @@ def _steps(pycolmap: Any, file: Any, size: float) -> list[Step]:
     options.ransac.random_seed, options.ransac.max_error, options.compute_relative_pose = SEED, size, True
     steps = []
     for one, other in combinations(sorted(file.read_all_images(), key=lambda image: image.image_id), 2):
-        here, there, pairs = matched_points(file, one.image_id, other.image_id)
+        here, there = (np.asarray(file.read_keypoints(image.image_id)[:, :2], np.float64) for image in (one, other))
+        pairs = np.asarray(file.read_matches(one.image_id, other.image_id), np.uint32).reshape(-1, 2)
         if len(pairs) < _MATCHES:
             continue
         cameras = [file.read_camera(image.camera_id) for image in (one, other)]

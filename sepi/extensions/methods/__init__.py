@@ -38,7 +38,7 @@ _MODULES = {
     "initial.onnx": "onnx_network",
     "occlusion.pobr": "pobr",
     "occlusion.occ": "occ",
-    "optimize.guided_median": "oavc",
+    "optimize.guided_median": "costs",
     "optimize.pobr": "pobr",
     "optimize.median_descent": "mishiba",
     "optimize.confident_labels": "acc",

@@ -52,14 +52,7 @@ import numpy.typing as npt
 from pydantic import Field
 from scipy import fft
 
-from sepi.extensions.methods.costs import (
-    GuidedFilter,
-    disparity_of,
-    distinctness,
-    least_costs,
-    maps_of,
-    weighted_median,
-)
+from sepi.extensions.methods.costs import GuidedFilter, distinctness, maps_of, weighted_median
 from sepi.extensions.methods.markov_field import labels_of_least_energy
 from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap, LightField, as_unit_float
@@ -272,7 +265,7 @@ def refined(disparity: FloatMap, disparities: FloatMap, smooth: GuidedFilter) ->
     distances = CostVolume(disparities, np.empty((len(disparities), *disparity.shape), np.float16))
     for k, label in enumerate(disparities):
         distances.costs[k] = smooth(np.square(np.minimum(np.abs(disparity - label) / step, np.float32(_FARTHEST))))
-    return disparity_of(distances, least_costs(distances))
+    return maps_of(distances).disparity
 
 
 CHOICES = {

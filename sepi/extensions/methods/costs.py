@@ -3,7 +3,7 @@
 A guided filter [1]_ smooths each candidate's costs and keeps the edges of the reference view: in each window the output
 is a linear function of the guide's colours, and each pixel is the mean over all windows that contain it. Then each
 pixel selects the candidate of least cost (``guided_costs`` [2]_, a choice of the global optimisation). A weighted
-median [3]_ removes outliers and rough edges from a map without introducing new values.
+median [3]_ removes outliers and rough edges from a map without introducing new values (``guided_median``, another).
 
 References
 ----------
@@ -291,4 +291,36 @@ def guided_costs(
     return before.updated(best.disparity, best.confidence).without_costs()
 
 
-CHOICES = {"optimize": {"guided_costs": Choice(GuidedCostsParameters, guided_costs)}}
+class GuidedMedianParameters(GuidedCostsParameters):
+    """Parameters of the filtered costs and of the median of the map."""
+
+    median_radius: int = Field(3, ge=0, le=50, description="median window of 2 r + 1 pixels; 0: no median")
+    median_sigma: float = Field(
+        0.05, gt=0, description="RGB distance at which a pixel's weight in the median falls, colours in 0..1"
+    )
+
+
+def guided_median(
+    light_field: LightField, previous: StageMaps | None, parameters: GuidedMedianParameters, progress: Progress
+) -> StageMaps:
+    """Candidates of least filtered cost, and the weighted median of their map.
+
+    Requires maps with a cost volume.
+
+    Returns
+    -------
+    StageMaps
+        Without the cost volume.
+    """
+    maps = guided_costs(light_field, previous, parameters, progress)
+    radius, sigma = parameters.median_radius, parameters.median_sigma
+    disparity = weighted_median(maps.disparity, light_field.reference_view, radius, sigma)
+    return maps.updated(disparity, maps.confidence)
+
+
+CHOICES = {
+    "optimize": {
+        "guided_costs": Choice(GuidedCostsParameters, guided_costs),
+        "guided_median": Choice(GuidedMedianParameters, guided_median),
+    }
+}

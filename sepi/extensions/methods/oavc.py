@@ -55,13 +55,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.costs import (
-    GuidedCostsParameters,
-    colour_differences,
-    guided_costs,
-    maps_of,
-    weighted_median,
-)
+from sepi.extensions.methods.costs import colour_differences, maps_of
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
@@ -92,15 +86,6 @@ class OavcParameters(CandidateParameters):
     )
     least_threshold: float = Field(
         0.004, ge=1e-6, le=1, description="least threshold of a vote: mean difference of the channels, colours in 0..1"
-    )
-
-
-class GuidedMedianParameters(GuidedCostsParameters):
-    """Parameters of the filtered costs and of the median of the map."""
-
-    median_radius: int = Field(3, ge=0, le=50, description="median window of 2 r + 1 pixels; 0: no median")
-    median_sigma: float = Field(
-        0.05, gt=0, description="RGB distance at which a pixel's weight in the median falls, colours in 0..1"
     )
 
 
@@ -198,25 +183,4 @@ def votes(views: ShearedViews, disparities: FloatMap, thresholds: FloatMap, prog
     return CostVolume(disparities, costs)
 
 
-def guided_median(
-    light_field: LightField, previous: StageMaps | None, parameters: GuidedMedianParameters, progress: Progress
-) -> StageMaps:
-    """Candidates of least filtered cost, and the weighted median of their map.
-
-    Requires maps with a cost volume.
-
-    Returns
-    -------
-    StageMaps
-        Without the cost volume.
-    """
-    maps = guided_costs(light_field, previous, parameters, progress)
-    radius, sigma = parameters.median_radius, parameters.median_sigma
-    disparity = weighted_median(maps.disparity, light_field.reference_view, radius, sigma)
-    return maps.updated(disparity, maps.confidence)
-
-
-CHOICES = {
-    "initial": {"oavc": Choice(OavcParameters, oavc)},
-    "optimize": {"guided_median": Choice(GuidedMedianParameters, guided_median)},
-}
+CHOICES = {"initial": {"oavc": Choice(OavcParameters, oavc)}}

@@ -72,21 +72,15 @@ def book(size: Vector, cover: Material, paper: Material, turn: Vector, by: Vecto
         box((-w / 2 + board / 2, middle, 0), (board, h - 2 * board, d)),
     ]
     pages = box((0, middle, 0), (w - 2.5 * board, h - 2 * board, d - 3 * board))
-    return [
-        Thing(moved(joined(covers), turn, by), cover),
-        Thing(moved(pages, turn, by), paper),
-    ]
+    return [Thing(moved(joined(covers), turn, by), cover), Thing(moved(pages, turn, by), paper)]
 
 
 def crate(size: Vector, rows: int, turn: float, by: Vector) -> Mesh:
     """An open crate of rows of slats and two ends, which stands on y=0, turned about the vertical."""
     w, h, d = size
     thickness, pitch = 0.014, h / rows
-    slats = [
-        box((0, -(row + 0.5) * pitch, side * (d / 2)), (w, 0.84 * pitch, thickness))
-        for row in range(rows)
-        for side in (-1, 1)
-    ]
+    places = [(0, -(row + 0.5) * pitch, side * (d / 2)) for row in range(rows) for side in (-1, 1)]
+    slats = [box(place, (w, 0.84 * pitch, thickness)) for place in places]
     ends = [box((side * (w - thickness) / 2, -h / 2, 0), (thickness, h, d - thickness)) for side in (-1, 1)]
     bottom = box((0, -0.02, 0), (w - 2 * thickness, thickness, d - thickness))
     return moved(of_boards([*slats, *ends, bottom]), (0, turn, 0), by)
@@ -131,14 +125,10 @@ def house(wide: float, deep: float, tall: float, rise: float) -> tuple[Mesh, Mes
     body = joined([box((0, -tall / 2, 0), (wide, tall, deep)), *ends])
     slope, over = np.hypot(deep / 2, rise), 0.5
     pitch = np.arctan2(rise, deep / 2)
-    roof = [
-        moved(
-            box((0, -0.12, side * (slope / 2 + over / 2)), (wide + 2 * over, 0.22, slope + over)),
-            (-side * pitch, 0, 0),
-            (0, -tall - rise, 0),
-        )
-        for side in (-1, 1)
-    ]
+    roof = []
+    for side in (-1, 1):
+        plane = box((0, -0.12, side * (slope / 2 + over / 2)), (wide + 2 * over, 0.22, slope + over))
+        roof.append(moved(plane, (-side * pitch, 0, 0), (0, -tall - rise, 0)))
     chimney = box((wide / 4, -tall - rise - 0.2, 0.6), (0.8, 2.4, 0.8))
     rows = np.arange(1.6, tall - 0.5, 2.4)
     spots = [(x, -y) for y in rows.tolist() for x in np.arange(-wide / 2 + 1.4, wide / 2 - 1, 2.1).tolist()]

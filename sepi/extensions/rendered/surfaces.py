@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.extensions.rendered.patterns import srgb_decoded
+from sepi.extensions.rendered.shapes import joined
 from sepi.extensions.rendered.world import FloatArray, Material, Mesh, Pattern, Vector, World
 from sepi.kernels import triangles as kernels
 from sepi.lightfield import BoolMap
@@ -79,14 +79,7 @@ class Surfaces:
             parts.append((-1, sheet, (1.0, 1.0)))
         nothing = Mesh(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.uint32), _unpainted(3))
         parts.insert(0, (-1, nothing, (1.0, 1.0)))
-        starts = np.cumsum([0, *(len(mesh.vertices) for _, mesh, _ in parts)])
-        self.mesh = Mesh(
-            np.concatenate([mesh.vertices for _, mesh, _ in parts]).astype(np.float32),
-            np.concatenate([mesh.faces + int(at) for (_, mesh, _), at in zip(parts, starts, strict=False)]).astype(
-                np.uint32
-            ),
-            np.concatenate([mesh.uv / np.array(period) for _, mesh, period in parts]).astype(np.float32),
-        )
+        self.mesh = joined([replace(mesh, uv=mesh.uv / np.array(period)) for _, mesh, period in parts])
         self.thing = np.concatenate([np.full(len(mesh.faces), number) for number, mesh, _ in parts])
         self._corners = self.mesh.vertices.astype(np.float64)[self.mesh.faces]
         first, second, third = np.moveaxis(self._corners, 1, 0)
@@ -97,7 +90,13 @@ class Surfaces:
         rise = [np.cross(third - first, normal) / square, np.cross(normal, second - first) / square]
         gradient = (along - at)[:, :, None] * rise[0][:, None] + (beyond - at)[:, :, None] * rise[1][:, None]
         self._planes = Planes(first, normal, at, gradient)
-        self._patterns = [thing.material.pattern for thing in world.things]
+        # all patterns (by identity) in one list of linear texels; of each thing: start, height and width
+        patterns = [thing.material.pattern for thing in world.things]
+        rasters = {id(pattern): _raster(pattern) for pattern in patterns}
+        sizes = [raster[..., 0].size for raster in rasters.values()]
+        self._begins = dict(zip(rasters, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
+        self._texels: FloatArray = np.concatenate([srgb_decoded(raster).reshape(-1, 3) for raster in rasters.values()])
+        self._starts = np.array([(self._begins[id(one)], *rasters[id(one)].shape[:2]) for one in patterns])
         self._matte = np.array([thing.material.kind == "matte" for thing in world.things] + [False])
 
     def matte(self, things: npt.NDArray[np.int64]) -> BoolMap:
@@ -180,7 +179,7 @@ class Surfaces:
         corner, normal, uv, gradient = (part[faces] for part in self._planes)
         corner = corner - [*frame[:2], 0]
         volume = np.sum(normal * corner, axis=1)
-        starts, texels = self._starts, self._texels[1]
+        starts, texels = self._starts, self._texels
         start, sizes = starts[self.thing[faces], 0], starts[self.thing[faces], 1:]
         total = np.zeros((len(faces), 3))
         for fine in np.ndindex(_FINE, _FINE):
@@ -198,26 +197,8 @@ class Surfaces:
 
     def linear(self, pattern: Pattern) -> FloatArray:
         """The linear raster of a pattern."""
-        at, (height, width) = self._texels[0][id(pattern)], pattern.raster.shape[:2]
-        return self._texels[1][at : at + height * width].reshape(height, width, 3)
-
-    @cached_property
-    def _texels(self) -> tuple[dict[int, int], FloatArray]:
-        """Start of each pattern (by identity) in a list of all texels, and the linear texels."""
-        rasters: dict[int, FloatArray] = {}
-        for pattern in self._patterns:
-            rasters.setdefault(id(pattern), _raster(pattern))
-        begins = np.cumsum([0, *(raster[..., 0].size for raster in rasters.values())]).tolist()
-        texels = np.empty((begins[-1], 3), np.float32)
-        for raster, first, after in zip(rasters.values(), begins, begins[1:], strict=False):
-            texels[first:after] = srgb_decoded(raster).reshape(-1, 3)
-        return dict(zip(rasters, begins, strict=False)), texels
-
-    @cached_property
-    def _starts(self) -> npt.NDArray[np.int64]:
-        """Start in the list of texels, height and width of each thing's pattern."""
-        begins, _ = self._texels
-        return np.array([(begins[id(pattern)], *_raster(pattern).shape[:2]) for pattern in self._patterns])
+        at, (height, width) = self._begins[id(pattern)], pattern.raster.shape[:2]
+        return self._texels[at : at + height * width].reshape(height, width, 3)
 
 
 def _raster(pattern: Pattern | Vector) -> FloatArray:

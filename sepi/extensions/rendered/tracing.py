@@ -19,7 +19,7 @@ from sepi.errors import SepiError
 from sepi.extensions.rendered.patterns import srgb_decoded
 from sepi.extensions.rendered.shapes import normals, rotation
 from sepi.extensions.rendered.surfaces import FirstSurface, Surfaces, period
-from sepi.extensions.rendered.world import FloatArray, Lamp, Light, Material, Mesh, Pattern, Rig, Vector, World
+from sepi.extensions.rendered.world import FloatArray, Lamp, Light, Material, Pattern, Rig, Thing, Vector, World
 from sepi.process.threads import threads_used
 
 # metres at which rays begin; much less would lose digits of their directions
@@ -133,7 +133,7 @@ class Tracer:
         surfaces = {id(thing.material): thing.material for thing in world.things}
         loaded = {key: self._mi.load_dict(self._surface(material)) for key, material in surfaces.items()}
         for number, thing in enumerate(world.things):
-            parts[f"thing{number}"] = self._shape(thing.mesh, thing.material, {"bsdf": loaded[id(thing.material)]})
+            parts[f"thing{number}"] = self._shape(thing, loaded[id(thing.material)])
         for number, lamp in enumerate(light.lamps):
             parts[f"lamp{number}"] = self._lamp(lamp)
         for number, sun in enumerate(light.suns):
@@ -264,11 +264,11 @@ class Tracer:
         x, y = np.broadcast_arrays(right[None, :], down[:, None])
         return np.stack([x, y, np.ones_like(x)], axis=-1)
 
-    def _shape(self, mesh: Mesh, material: Material, parts: dict[str, Any]) -> Any:
-        """Mitsuba's shape of a mesh."""
+    def _shape(self, thing: Thing, surface: Any) -> Any:
+        """Mitsuba's shape of a thing."""
+        mesh = thing.mesh
         properties = self._mi.Properties()
-        for name, part in parts.items():
-            properties[name] = part
+        properties["bsdf"] = surface
         properties["face_normals"] = not mesh.smooth
         shape = self._mi.Mesh(
             "thing",
@@ -278,11 +278,10 @@ class Tracer:
             has_vertex_normals=mesh.smooth,
             has_vertex_texcoords=True,
         )
-        size = period(material)
         values = self._mi.traverse(shape)
         values["vertex_positions"] = np.ravel(mesh.vertices)
         values["faces"] = np.ravel(mesh.faces)
-        values["vertex_texcoords"] = np.ravel(mesh.uv / np.array(size, np.float32))
+        values["vertex_texcoords"] = np.ravel(mesh.uv / np.array(period(thing.material), np.float32))
         if mesh.smooth:
             values["vertex_normals"] = np.ravel(normals(mesh))
         values.update()

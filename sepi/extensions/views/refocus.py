@@ -6,7 +6,7 @@ import csv
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -255,7 +255,7 @@ def refocus(
       sepi refocus cotton cotton-depth --at 250 310 --aperture 3
       sepi refocus cotton --disparity -0.5 --disparity 1
     """
-    from sepi.extensions.views.refocusing import all_in_focus, views_within
+    from sepi.extensions.views import refocusing
     from sepi.io.result_files import require_target
     from sepi.process.threads import available_cores, use_threads
 
@@ -273,17 +273,21 @@ def refocus(
         camera = geometry(shape=light_field.shape)
     foci = _foci(light_field, result, steps, disparities, pixels)
     if camera is not None:
-        foci = [replace(focus, depth=_depth(camera, focus.disparity)) for focus in foci]
-    # fails early if the folder cannot be used
-    views_within(light_field, aperture)
+        depths = camera.depth(np.array([focus.disparity for focus in foci], np.float32)).tolist()
+        foci = [replace(focus, depth=depth) for focus, depth in zip(foci, depths, strict=True)]
+    # fails before a picture is computed
+    refocusing.views_within(light_field, aperture)
+    surfaces = None if result is None else result.disparity
+    count = len(foci) + (surfaces is not None)
     with progress_bar(light_field.name) as progress:
-        share = 0.0 if result is None else 1 / (1 + len(foci))
-        sharp = None
-        if result is not None:
-            sharp = all_in_focus(light_field, result.disparity, progress=lambda fraction: progress(share * fraction))
-        surfaces = None if result is None else result.disparity
-        pictures = _stack(
-            light_field, foci, surfaces, aperture, lambda fraction: progress(share + (1 - share) * fraction)
+
+        def part(number: int) -> Progress:
+            return lambda fraction: progress((number + fraction) / count)
+
+        sharp = None if surfaces is None else refocusing.all_in_focus(light_field, surfaces, progress=part(0))
+        pictures = (
+            refocusing.refocus(light_field, focus.disparity, surfaces, aperture=aperture, progress=part(number))
+            for number, focus in enumerate(foci, count - len(foci))
         )
         files = write_refocused(folder, foci, pictures, sharp, light_field.views.dtype, animated=animation)
     click.echo(f"focused at: {_listed(foci)}")
@@ -349,28 +353,6 @@ def _disparity_at(result: _Result, x: int, y: int) -> float:
     if not math.isfinite(value) or (result.unknown is not None and result.unknown[y, x]):
         raise SepiError(f"--at {x} {y}: {result.path} has no disparity for this pixel; choose one beside it")
     return value
-
-
-def _depth(camera: Camera, disparity: float) -> float:
-    return float(camera.depth(np.array([disparity], np.float32))[0])
-
-
-def _stack(
-    light_field: LightField,
-    foci: Sequence[Focus],
-    surfaces: FloatMap | None,
-    aperture: float | None,
-    progress: Progress,
-) -> Iterator[FloatMap]:
-    """Picture of each focus, computed one at a time."""
-    from sepi.extensions.views import refocusing
-
-    for number, focus in enumerate(foci):
-
-        def part(fraction: float, done: int = number) -> None:
-            progress((done + fraction) / len(foci))
-
-        yield refocusing.refocus(light_field, focus.disparity, surfaces, aperture=aperture, progress=part)
 
 
 def _listed(foci: Sequence[Focus]) -> str:
