@@ -12,8 +12,7 @@ import click
 from PIL import Image
 
 from sepi.extensions.rendered.catalogue import RENDERED
-from sepi.io.hdf5 import read_stage
-from sepi.io.truth import read_with_truth
+from sepi.io.hdf5 import read_stage, read_with_truth
 from sepi.lightfield import FloatMap, LightField
 from sepi.report.plan import TABLES
 from sepi.report.plots.overview import write_overview

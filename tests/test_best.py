@@ -11,7 +11,7 @@ from sepi.pipeline import estimate_depth
 from sepi.regularization.border_planes import BorderPlaneParameters, ransac_plane
 from sepi.regularization.uniform_regions import UniformPlanesParameters, plain_pixels
 from sepi.scenes import render
-from sepi.scoring.confidence import oracle, sparsification
+from sepi.scoring.error_bars import oracle, sparsification
 from sepi.scoring.scores import score
 from sepi.variants import VARIANTS
 from sepi.variants.built_in import PARTS_OF_BEST

@@ -60,11 +60,10 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
       sepi convert cotton-depth cotton.png --to rgbd
     """
     from sepi.io.all_views import read_result_at
-    from sepi.io.exr import EXR, write_exr
+    from sepi.io.codecs import EXR, TIFF, write_exr, write_tiff
+    from sepi.io.disparity_maps import write_pfm
     from sepi.io.images import write_png
     from sepi.io.map_pictures import colour_and_depth
-    from sepi.io.pfm import write_pfm
-    from sepi.io.tiff import TIFF, write_tiff
 
     suffix = output.suffix.lower()
     if kind is not None:

@@ -110,9 +110,8 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
     """
     from sepi.inspection.coded_views import comparable
     from sepi.inspection.disparity_range import settle_range
-    from sepi.inspection.odd_views import odd_views
     from sepi.inspection.row_spacing import settle_row_spacing
-    from sepi.inspection.view_order import check_order
+    from sepi.inspection.view_order import check_order, odd_views
     from sepi.matching.softening import LEAST_SHARE, share_too_sharp
 
     try:

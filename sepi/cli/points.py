@@ -56,8 +56,7 @@ def points(
       sepi points views-depth -o views.ply --focal-length 50 --baseline 10 --focus-distance 2 --sensor-size 36
     """
     from sepi.io.all_views import read_result_at
-    from sepi.io.ply import write_ply
-    from sepi.io.point_cloud import point_cloud
+    from sepi.io.point_cloud import point_cloud, write_ply
 
     result = read_result_at(result_path, view)
     if max_sigma is not None and result.sigma is None:

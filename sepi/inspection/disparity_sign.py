@@ -16,8 +16,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.inspection.coarse_sweep import agreeing, coarse_sweep
-from sepi.inspection.dark_corners import dark_corners
+from sepi.inspection.coarse_sweep import agreeing, coarse_sweep, dark_corners
 from sepi.inspection.view_layouts import Baseline, Trial, Views, baselines_under
 from sepi.kernels import view_order as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField

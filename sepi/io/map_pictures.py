@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.files import atomic_path
 from sepi.io.images import write_png
-from sepi.io.pfm import write_pfm
 from sepi.io.result_files import DEPTH_SIGMA, ERROR_FILES, INTERVAL, SIGMA_PFM, SIGMA_PNG
 from sepi.lightfield import BoolMap, FloatMap, as_unit_float
 from sepi.stage import StageMaps

@@ -19,11 +19,10 @@ from sepi.camera import Camera, warn_of_infinity
 from sepi.camera.rig import Rig
 from sepi.errors import SepiError
 from sepi.io import hdf5, map_pictures
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.files import atomic_path, filled_folder, remove_files
 from sepi.io.images import write_png
-from sepi.io.pfm import write_pfm
-from sepi.io.ply import write_ply
-from sepi.io.point_cloud import point_cloud
+from sepi.io.point_cloud import point_cloud, write_ply
 from sepi.io.provenance import DIGEST, RESULT, result_attributes
 from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, UNKNOWN, names_as_taken, require_own, sound_maps
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field

@@ -20,8 +20,8 @@ import numpy.typing as npt
 import pandas as pd
 
 from sepi.io.files import atomic_path
+from sepi.io.hdf5 import read_with_truth
 from sepi.io.scores import ExternalMap, Scores, read_external, read_reliability, read_scores, without_nan
-from sepi.io.truth import read_with_truth
 from sepi.process.command import SepiCommand
 from sepi.report.plan import PARTS, Plan
 from sepi.report.pooled import pooled_q25

@@ -31,7 +31,7 @@ from workflow_copy import Workflow
 
 from sepi.cli.main import main
 from sepi.errors import SepiError
-from sepi.io.pfm import write_pfm
+from sepi.io.disparity_maps import write_pfm
 from sepi.lightfield import DisparityRange, LightField
 from sepi.process.command import SepiCommand
 from sepi.scenes import render, write_hci

@@ -12,8 +12,7 @@ from PIL import Image, PngImagePlugin
 
 from sepi.cli.main import main
 from sepi.errors import SepiError
-from sepi.io.disparity_maps import SUFFIXES, TruthFile, is_disparity, read_disparity
-from sepi.io.pfm import write_pfm
+from sepi.io.disparity_maps import SUFFIXES, TruthFile, is_disparity, read_disparity, write_pfm
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
 from sepi.stage import StageMaps

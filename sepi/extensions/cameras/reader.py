@@ -15,14 +15,6 @@ from sepi.io.readers.formats import Format
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
 from sepi.lightfield import DisparityRange, LightField
 
-FORMAT = Format(
-    "calibrated cameras",
-    "COLMAP model, transforms.json, cameras.csv or cameras.yaml",
-    __name__,
-    ("images", "reference"),
-    scales=False,
-)
-
 # distance of cameras from their plane, in view steps, beyond which rectification needs the depth of the scene
 _FLAT = 1e-3
 
@@ -75,6 +67,20 @@ def files_of(path: Path, options: ReadOptions) -> tuple[Sequence[Path], Sequence
     assert found is not None
     model = read_model(path, options.images, options.part)
     return (*described_by(found), *model.files), model.pictures
+
+
+FORMATS = {
+    "cameras": Format(
+        "calibrated cameras",
+        "COLMAP model, transforms.json, cameras.csv or cameras.yaml",
+        matches,
+        read,
+        ("images", "reference"),
+        scales=False,
+        files_of=files_of,
+        with_depths=with_depths,
+    )
+}
 
 
 def read_cameras(

@@ -16,8 +16,7 @@ from sepi.extensions.rendered.surfaces import FirstSurface
 from sepi.extensions.rendered.world import FloatArray, Pattern, Thing
 from sepi.kernels import reprojection as kernels
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.scoring.edges import edges_of
-from sepi.scoring.regions import textureless
+from sepi.scoring.regions import edges_of, textureless
 
 MASKS = ("textured", "textureless", "glossy", "mirror", "glass", "thin", "discontinuities", "occluded", "alone")
 """Names of the masks.

@@ -1,4 +1,4 @@
-"""The sparsification curve of a map as a figure; :mod:`sepi.scoring.confidence` computes it."""
+"""The sparsification curve of a map as a figure; :mod:`sepi.scoring.error_bars` computes it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from sepi.lightfield import FloatMap
 from sepi.report.plots.saving import new_figure, save
-from sepi.scoring.confidence import STEPS, oracle, sparsification
+from sepi.scoring.error_bars import STEPS, oracle, sparsification
 
 
 def write_curves(folder: Path, confidence: FloatMap, error: FloatMap) -> None:

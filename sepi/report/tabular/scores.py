@@ -16,7 +16,7 @@ from sepi.report.plan import MAIN_VARIANT
 from sepi.report.runs import EXTERNAL, KEYS, Runs
 from sepi.report.tabular.methods import PROTOCOL_NOTE, REGIONS_NOTE, own_key
 from sepi.report.tabular.table import Head, Kind, Section, Table, ranks, section, shown
-from sepi.scoring.edges import LEAST_DISCONTINUITY, REACH
+from sepi.scoring.regions import LEAST_DISCONTINUITY, REACH
 from sepi.scoring.scores import (
     COUNTS,
     DISCONTINUITIES,

@@ -24,7 +24,7 @@ from sepi.extensions.cameras.files import read_model
 from sepi.extensions.cameras.rectification import light_field_of, rectification_of
 from sepi.extensions.cameras.table import rotation_of
 from sepi.io.all_views import read_result_at, write_all_views
-from sepi.io.pfm import read_pfm
+from sepi.io.disparity_maps import read_pfm
 from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import origin_attributes
 from sepi.io.result_files import names_as_taken

@@ -13,8 +13,8 @@ from error_lines import error_of
 
 from sepi.cli.main import main
 from sepi.extensions.page.comparison_page import Comparison, comparison_page
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import write_stage
-from sepi.io.pfm import write_pfm
 from sepi.lightfield import FloatMap
 from sepi.scenes import render, write_hci
 from sepi.scoring.scores import score

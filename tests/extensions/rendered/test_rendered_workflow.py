@@ -18,8 +18,7 @@ from sepi.extensions.rendered.catalogue import RENDERED
 from sepi.extensions.rendered.dataset import Dataset
 from sepi.extensions.rendered.exposure import read_scene
 from sepi.extensions.rendered.options import Exposure, RenderOptions
-from sepi.io.hdf5 import read_light_field
-from sepi.io.truth import read_with_truth
+from sepi.io.hdf5 import read_light_field, read_with_truth
 from sepi.report.plan import Plan
 from sepi.scoring.scores import region_masks, score_regions
 from sepi.variants import VARIANTS, needing_files

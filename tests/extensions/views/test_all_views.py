@@ -22,8 +22,8 @@ from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.extensions.views.all_views import AllViews, Sources, ViewMaps, _with_doubt, anchor_views, estimate_all_views
 from sepi.io.all_views import write_all_views
+from sepi.io.disparity_maps import read_pfm, write_pfm
 from sepi.io.hdf5 import read_attributes, write_light_field
-from sepi.io.pfm import read_pfm, write_pfm
 from sepi.io.provenance import result_attributes
 from sepi.io.result_folder import write_result
 from sepi.kernels import all_views as kernels

@@ -17,9 +17,9 @@ import sepi
 from sepi.cli.main import main
 from sepi.extensions.views import refocusing
 from sepi.extensions.views.refocused_folder import stack_names
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import read_picture
-from sepi.io.pfm import write_pfm
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
 from sepi.process.threads import available_cores

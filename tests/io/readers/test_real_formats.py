@@ -11,8 +11,8 @@ from click.testing import CliRunner
 from real_scenes import final_scores, part
 
 from sepi.cli.main import main
+from sepi.io.disparity_maps import read_pfm
 from sepi.io.hdf5 import write_light_field
-from sepi.io.pfm import read_pfm
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field
