@@ -13,10 +13,9 @@ import numpy as np
 from sepi.errors import SepiError, SepiWarning
 from sepi.inspection.coded_views import told_of_coding
 from sepi.io.provenance import reading_record
-from sepi.io.readers.arrays import UnclearAxesError
 from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import format_of, read
-from sepi.io.readers.options import ReadOptions, in_grid, unarranged
+from sepi.io.readers.options import ReadOptions, in_grid
 from sepi.lightfield import DisparityRange, LightField
 from sepi.process.memory import give_back_memory
 from sepi.validation import described, require_type
@@ -88,10 +87,7 @@ def read_light_field(
     require_type(f"{path}: options", options, (ReadOptions, NoneType), "sepi.ReadOptions")
     options = options or ReadOptions()
     given = None if disparity_range is None else _given_range(path, disparity_range)
-    try:
-        light_field = read(path, options, file_format, truth=truth)
-    except UnclearAxesError as unclear:
-        light_field = _with_axes(path, options, file_format, unclear)
+    light_field = read(path, options, file_format, truth=truth)
     if light_field.rig is not None and light_field.disparity_range is None:
         with_depths = format_of(path, file_format).with_depths
         if with_depths is not None:
@@ -139,19 +135,6 @@ def read_light_field(
     for warning in filter(None, found):
         warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)
     return light_field
-
-
-def _with_axes(path: Path, options: ReadOptions, file_format: str | None, unclear: UnclearAxesError) -> LightField:
-    """An array with ambiguous axes, read with those for which its views fit together."""
-    from sepi.inspection.arrangement import fitting_axes
-
-    tried = {axes: read(path, replace(unarranged(options), axes=axes), file_format) for axes in unclear.readings}
-    axes = fitting_axes(tried)
-    if axes is None:
-        raise unclear
-    light_field = read(path, replace(options, axes=axes), file_format)
-    note = f"axes taken as {' '.join(axes)}, for which the views fit together; set others by --axes"
-    return replace(light_field, notes=(note, *light_field.notes))
 
 
 def _given_range(path: Path, bounds: tuple[float, float]) -> DisparityRange:

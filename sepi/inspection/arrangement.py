@@ -1,18 +1,15 @@
-"""Finds from the views alone what files leave open: the grid of numbered views, and the axes of an array.
+"""Finds the grid that a numbered sequence of views fills, from the views alone.
 
 Names that only count the views do not tell the number of rows and columns, whether views are counted by row or by
-column, whether the camera ran back and forth, or whether the views fill the grid: crosses and discs are common. Each
+column, whether the camera ran back and forth, or whether the views fill the grid: crosses are common. Each
 arrangement of that many views is tried; in the right one, neighbours match everywhere.
-
-An axis of 3 or 4 beside one of views may hold colours or a row of the grid: colours show no parallax against each
-other, views do.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -20,15 +17,14 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError, SepiWarning
-from sepi.inspection.view_layouts import MOVEMENT, Baseline, Views, baselines_under, matched
+from sepi.inspection.view_layouts import Baseline, Views, baselines_under, matched
 from sepi.inspection.view_order import odd_views
 from sepi.io.readers.options import ReadOptions, arrange_numbers
 from sepi.lightfield import LightField
 
 Positions = npt.NDArray[np.int64]
 
-# Largest radius of the discs that are tried, and largest ratio of a grid's longer side to its shorter
-_LARGEST_RADIUS = 24
+# Largest ratio of a grid's longer side to its shorter
 _MOST_SLENDER = 6
 # Number of reference views, spread over the sequence, of neighbours matched with each, and of points in each. The worst
 # matches decide (one in so many): a wrong arrangement may be right except at the ends of its rows
@@ -145,7 +141,6 @@ def arrangements(count: int) -> Iterator[Arrangement]:
     yield Arrangement(f"a single row of {count}", line)
     yield Arrangement(f"a single column of {count}", line[:, ::-1])
     yield from _crosses(count)
-    yield from _discs(count)
 
 
 def _crosses(count: int) -> Iterator[Arrangement]:
@@ -159,25 +154,7 @@ def _crosses(count: int) -> Iterator[Arrangement]:
     name = f"a cross of {len(along)}x{len(along)}"
     yield Arrangement(f"{name}, the row first", cross)
     yield Arrangement(f"{name}, the column first", cross[:, ::-1])
-    yield from _as_in_the_grid(name, cross)
-
-
-def _discs(count: int) -> Iterator[Arrangement]:
-    """Discs of views round the middle of a grid."""
-    y, x = np.mgrid[-_LARGEST_RADIUS : _LARGEST_RADIUS + 1, -_LARGEST_RADIUS : _LARGEST_RADIUS + 1]
-    distances = np.unique(y**2 + x**2)
-    # the first is one view, the second and third are a cross and a square of 3x3
-    for distance in distances[(distances > 2) & (distances <= _LARGEST_RADIUS**2)]:
-        disc = np.argwhere(y**2 + x**2 <= distance)
-        if len(disc) == count and math.isqrt(count) ** 2 != count:
-            positions = disc - disc.min(axis=0)
-            side = int(positions.max()) + 1
-            yield from _as_in_the_grid(f"a disc in {side}x{side}", positions)
-
-
-def _as_in_the_grid(name: str, positions: Positions) -> Iterator[Arrangement]:
-    """Positions row by row, and column by column."""
-    ordered = positions[np.lexsort((positions[:, 1], positions[:, 0]))]
+    ordered = cross[np.lexsort((cross[:, 1], cross[:, 0]))]
     yield Arrangement(f"{name} row by row", ordered)
     yield Arrangement(f"{name} column by column", ordered[:, ::-1])
 
@@ -248,61 +225,3 @@ def _placed(light_field: LightField, way: Arrangement, options: ReadOptions, not
     return replace(
         light_field, views=views, present=present, view=options.view, arranged=True, files=files, notes=notes
     )
-
-
-# number of sequences of pictures, reductions for the search of movement, and its spacing
-_SEQUENCES = 8
-_REDUCTIONS = (1, 2, 4)
-_SPACING = 0.3
-# ratio of the matching cost in place to the least with movement: largest for colours, least for views
-_COLOURS = 1.2
-_VIEWS = 1.4
-_COLOUR_COUNTS = (3, 4)
-
-
-def fitting_axes(readings: Mapping[str, LightField]) -> str | None:
-    """The order of axes in which an array's pictures match; None if ambiguous.
-
-    Parameters
-    ----------
-    readings : mapping of str to LightField
-        Orders of the axes, and the light field that the array is in each.
-    """
-    kept = [axes for axes, light_field in readings.items() if _is_consistent(light_field)]
-    return kept[0] if len(kept) == 1 else None
-
-
-def _is_consistent(light_field: LightField) -> bool:
-    """Whether colours show no parallax, and views of an equally short row or column do."""
-    views = light_field.views
-    T, S, H, W, C = views.shape
-    if C > 1 and not _parallax(np.moveaxis(views, 4, 2).reshape(-1, C, H, W)) <= _COLOURS:
-        return False
-    grey = views[..., C // 2]
-    short = [np.moveaxis(grey, axis, 1).reshape(-1, n, H, W) for axis, n in enumerate((T, S)) if n in _COLOUR_COUNTS]
-    return all(_parallax(pictures) >= _VIEWS for pictures in short)
-
-
-def _parallax(pictures: npt.NDArray[np.generic]) -> float:
-    """Ratio of the matching cost of pictures in place to that as a row or column of views; NaN if undecided.
-
-    ``pictures`` are (K, M, H, W), K sequences of M.
-    """
-    pictures = pictures[:: max(1, len(pictures) // _SEQUENCES), ..., None]
-    views, middle = Views(LightField(pictures, "pictures", arranged=False)), pictures.shape[1] // 2
-    steps = np.array([step for step in range(-middle, pictures.shape[1] - middle) if step], np.float64)
-    offsets = np.stack([np.stack([0 * steps, steps], 1), np.stack([steps, 0 * steps], 1)])
-    best = np.nan
-    for factor in (factor for factor in _REDUCTIONS if not views.is_too_small(factor)):
-        costs = []
-        for k in range(len(pictures)):
-            places = [(k - views.middle[0], int(step) + middle - views.middle[1]) for step in (0, *steps)]
-            found = [
-                matched(views, places[0], places[1:], factor, offsets, movement, sampling=_SPACING)
-                for movement in (MOVEMENT, 0)
-            ]
-            costs += [(*moved[0].mean(axis=0), still[0].mean()) for moved, still in [found] if moved and still]
-        if costs:
-            *moved, still = np.mean(costs, axis=0)
-            best = np.fmax(best, still / max(min(moved), 1e-6))
-    return float(best)

@@ -136,24 +136,6 @@ _NARROW = 4
 _LISTED = 12
 
 
-class UnclearAxesError(SepiError):
-    """The shape of an array does not tell which axis is which.
-
-    Attributes
-    ----------
-    readings : tuple of str
-        Orders of the axes that the shape allows, as in ``ReadOptions.axes``.
-    """
-
-    def __init__(self, source: str, shape: tuple[int, ...], readings: Sequence[str]) -> None:
-        self.readings = tuple(readings)
-        example = readings[0] if readings else "TSHWC" if len(shape) == _MOST_AXES else "TSHW"
-        super().__init__(
-            f"{source}: the shape {shape} does not tell which axis is which; say it with --axes, such as "
-            f"{' or '.join(f'--axes {letters}' for letters in readings or [example])} ({_AXES_HELP})"
-        )
-
-
 def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, axes: str | None = None) -> LightField:
     """Light field from an array of all its views.
 
@@ -180,11 +162,9 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
 
     Raises
     ------
-    UnclearAxesError
-        If several orders of the axes are equally likely.
     SepiError
-        If the axes cannot be told apart or contradict the options, the values are of another type or range, or a view
-        that is not excluded holds values that are not finite.
+        If several orders of the axes are equally likely, or the axes contradict the options, the values are of another
+        type or range, or a view that is not excluded holds values that are not finite.
     """
     source = str(path)
     if array.dtype.kind not in "iuf" or array.dtype.itemsize > 8:
@@ -267,7 +247,11 @@ def _found_axes(source: str, shape: tuple[int, ...], grid: tuple[int, int] | Non
         return found[0]
     if not found and not is_likely(shape):
         raise SepiError(f"{source}: expected an array of views, of 4 or 5 axes, got {len(shape)}: {shape}")
-    raise UnclearAxesError(source, shape, found)
+    likely = found or ["TSHWC" if len(shape) == _MOST_AXES else "TSHW"]
+    raise SepiError(
+        f"{source}: the shape {shape} does not tell which axis is which; say it with --axes, such as "
+        f"{' or '.join(f'--axes {letters}' for letters in likely)} ({_AXES_HELP})"
+    )
 
 
 def is_likely(shape: tuple[int, ...]) -> bool:
