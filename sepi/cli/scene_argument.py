@@ -46,7 +46,7 @@ def read_ground_truth(
     """
     from sepi.io.all_views import read_disparity_at
     from sepi.io.disparity_maps import is_disparity
-    from sepi.io.readers.options import cut_like_views
+    from sepi.io.readers.view_grid import cut_like_views
 
     part = _part_of(estimate, reading)
     if path is None:

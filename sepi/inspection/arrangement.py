@@ -19,7 +19,8 @@ import numpy.typing as npt
 from sepi.errors import SepiError, SepiWarning
 from sepi.inspection.view_layouts import Baseline, Views, baselines_under, matched
 from sepi.inspection.view_order import odd_views
-from sepi.io.readers.options import ReadOptions, arrange_numbers
+from sepi.io.readers.options import ReadOptions
+from sepi.io.readers.view_grid import arrange_numbers
 from sepi.lightfield import LightField
 
 Positions = npt.NDArray[np.int64]

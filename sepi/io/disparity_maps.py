@@ -21,7 +21,7 @@ from sepi.io.files import atomic_path, reading
 from sepi.io.hdf5 import float_maps, has_dataset, open_hdf5, read_dataset
 from sepi.io.images import picture_header, png_texts, read_picture
 from sepi.io.readers.array_files import numpy_array, numpy_shapes
-from sepi.io.readers.options import cut_like_views
+from sepi.io.readers.view_grid import cut_like_views
 from sepi.lightfield import FloatMap, full_scale
 from sepi.stage import ERROR_BARS, StageMaps
 from sepi.validation import described, is_finite, require_map, require_path

@@ -11,12 +11,11 @@ from pathlib import Path
 from pydantic import Field
 
 from sepi.errors import SepiError
-from sepi.io.readers.options import Index
 from sepi.io.scores import ExternalSource
 from sepi.registry import added
 from sepi.stage import Parameters
 from sepi.validation import require_known
-from sepi.validation.models import CheckedModel
+from sepi.validation.models import CheckedModel, Index
 from sepi.variants import VARIANTS, Variant
 from sepi.workflow.datasets import Dataset, Scene
 from sepi.workflow.result_paths import RESULTS

@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.readers.camera_positions import reordered
-from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers, position_of, unarranged
+from sepi.io.readers.options import ReadOptions, unarranged
+from sepi.io.readers.view_grid import Numbers, arrange_numbers, position_of
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
 
 # integer types that values of other types may stand for, and the least maximum of floats that are not whole numbers:

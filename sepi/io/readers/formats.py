@@ -20,7 +20,7 @@ from sepi.io.hdf5 import has_dataset
 from sepi.io.images import SUFFIXES, picture_header
 from sepi.io.readers import array_files, eslf, exported, hci, image_folder, matlab
 from sepi.io.readers.array_files import Shapes, hdf5_shapes, no_light_field
-from sepi.io.readers.arrays import is_likely, with_white
+from sepi.io.readers.arrays import is_likely, readings, with_white
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import has_rows
 from sepi.lightfield import DisparityRange, LightField, Truth
@@ -348,13 +348,11 @@ def _of_lenslets(path: Path) -> Size:
 
 
 def _of_array(shape: tuple[int, ...], itemsize: int) -> Size:
-    """Size of the views in an array of 4 or 5 axes."""
-    first, second = sorted(sorted(range(len(shape)), key=lambda axis: shape[axis])[-2:])
-    others = [size for axis, size in enumerate(shape) if axis not in (first, second)]
-    # colours are the last of 5 axes, or of 4 after a single axis of views
-    coloured = others if len(others) == 3 else others[1:] if others[0] > 4 else []
-    channels = next((size for size in reversed(coloured) if size in (3, 4)), 1)
-    return Size(max(1, math.prod(others) // channels), shape[first], shape[second], itemsize * channels)
+    """Size of the views in an array of 4 or 5 axes, in the first order of its axes that is likely."""
+    axes = (readings(shape) or ["NHWC" if len(shape) == 4 else "TSHWC"])[0]
+    size = dict(zip(axes, shape[len(shape) - len(axes) :], strict=True))
+    views = size.get("N", 1) * size.get("T", 1) * size.get("S", 1)
+    return Size(views, size["H"], size["W"], itemsize * size.get("C", 1))
 
 
 def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:

@@ -39,8 +39,9 @@ from sepi.io.files import name_of, naming, reading
 from sepi.io.hdf5 import has_dataset, number_of, open_hdf5, read_dataset
 from sepi.io.images import picture_header, read_picture
 from sepi.io.readers.arrays import light_field_from_array
-from sepi.io.readers.options import ReadOptions, arrange_numbers, cut_like_views, position_of
+from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import read_grid
+from sepi.io.readers.view_grid import arrange_numbers, cut_like_views, position_of
 from sepi.lightfield import DisparityRange, FloatMap, LightField, Truth
 from sepi.validation.models import validated
 

@@ -17,7 +17,8 @@ from sepi.errors import SepiError
 from sepi.io.files import reading
 from sepi.io.images import SUFFIXES, read_views
 from sepi.io.readers.arrays import Array, with_white
-from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers
+from sepi.io.readers.options import ReadOptions
+from sepi.io.readers.view_grid import Numbers, arrange_numbers
 from sepi.io.readers.view_names import CAMERAS, infer_view_numbers, pair_view_numbers
 from sepi.lightfield import BoolMap
 
