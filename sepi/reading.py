@@ -104,7 +104,7 @@ def read_light_field(
     if options.row_spacing is not None:
         light_field = with_row_spacing(light_field, options.row_spacing)
     elif check_order:
-        from sepi.inspection.row_spacing import settle_row_spacing
+        from sepi.inspection.arrangement import settle_row_spacing
 
         light_field = settle_row_spacing(light_field, views)
     record = reading_record(options, file_format)

@@ -59,7 +59,7 @@ def arrange_numbers(
     if side is not None:
         # around the centre view of the light field; an even grid has one more row before it than after it
         top, left = T // 2 - side // 2, S // 2 - side // 2
-        if side < 1 or side % 2 == 0 or top < 0 or left < 0 or top + side > T or left + side > S:
+        if side % 2 == 0 or top < 0 or left < 0 or top + side > T or left + side > S:
             raise SepiError(f"{source}: the central {side}x{side} views of {T}x{S}; expected an odd number that fits")
         numbers = numbers[top : top + side, left : left + side]
     numbers = ORDERS[options.order](numbers)

@@ -298,7 +298,6 @@ BAD: dict[str, Case] = {
     "huge running number": case(["0.png", "1.png", "999999999999.png"], "--grid gives 2x2", grid=(2, 2)),
     "sparse": case(["0_0.png", "1_1.png", "300_1.png", "300_2.png"], "301x3"),
     "huge grid": case(PLACES, "at most 10000 views", grid=(999_999, 999_999)),
-    "no grid": case(PLACES, "0x0", grid=(0, 0)),
     "small grid, running": case(
         by_number("{}.png", range(1, 5)), "4 images numbered 1 to 4; --grid gives 1x3", grid=(1, 3)
     ),
