@@ -24,7 +24,7 @@ from sepi.io.files import atomic_path, filled_folder, remove_files
 from sepi.io.images import write_png
 from sepi.io.point_cloud import point_cloud, write_ply
 from sepi.io.provenance import DIGEST, RESULT, result_attributes
-from sepi.io.result_files import DEPTH, RUNTIME, UNKNOWN, names_as_taken, require_own, sound_maps
+from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, UNKNOWN, names_as_taken, require_own, sound_maps
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.process.threads import available_cores
 from sepi.stage import StageMaps
@@ -153,16 +153,16 @@ def write_result(
     >>> maps = sepi.estimate_depth(light_field)
     >>> for name in sepi.write_result("dots-depth", light_field, maps, {"made_by": "a test"}):
     ...     print(name)
-    confidence.png
-    disparity.npy
     disparity.pfm
-    disparity.png
+    disparity.npy
     disparity_16bit.png
+    disparity.png
+    confidence.png
+    points.ply
     interval.npz
     mask_occluded.png
     mask_textureless.png
     mask_unknown.png
-    points.ply
     sigma.pfm
     sigma.png
     result.h5
@@ -266,7 +266,8 @@ def _write_files(
             for one in written:
                 one.result()
             # a later result may replace these files: they are not a user's own
-            names = (*sorted(path.name for path in folder.iterdir() if path.name[0] != "."), RESULT)
+            others = {path.name for path in folder.iterdir() if path.name[0] != "."}.difference(RESULT_FILES)
+            names = (*RESULT_FILES[:-1], *sorted(others), RESULT)
             files = {"files": " ".join(sorted((*names, *beside)))}
             file.attrs.update({**told.result(), **attributes, **files})
     return names
