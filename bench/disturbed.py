@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
+from sepi.inspection.arrangement import settle_row_spacing
 from sepi.inspection.disparity_range import estimate_range
-from sepi.inspection.row_spacing import settle_row_spacing
 from sepi.inspection.view_order import change_of_order, check_order, turned_by_half
 from sepi.io.readers.options import AS_GIVEN, ORDERS
 from sepi.lightfield import DisparityRange, LightField, as_unit_float

@@ -12,8 +12,7 @@ import click
 from PIL import Image
 
 from sepi.extensions.rendered.worlds import RENDERED
-from sepi.io.hdf5 import read_stage
-from sepi.io.truth import read_with_truth
+from sepi.io.hdf5 import read_stage, read_with_truth
 from sepi.lightfield import FloatMap, LightField
 from sepi.report.drawing import write_overview
 from sepi.report.pictures import Picture, disparity_limits, error_picture, map_picture, reference_picture

@@ -12,15 +12,14 @@ from pathlib import Path
 import click
 import numpy as np
 
-from sepi.io.hdf5 import read_stage
+from sepi.io.hdf5 import read_stage, read_with_truth
 from sepi.io.provenance import scene_attributes
 from sepi.io.scores import Evaluation, map_name, write_scores
-from sepi.io.truth import read_with_truth
 from sepi.lightfield import FloatMap, LightField, require_light_field
 from sepi.matching.unknown import with_unknown
 from sepi.process.command import SepiCommand, bad_thresholds
-from sepi.scoring.edges import Edges, edges_of
 from sepi.scoring.error_bars import ErrorBars, reliability
+from sepi.scoring.regions import Edges, edges_of
 from sepi.scoring.scores import DISCONTINUITIES, region_masks, score_regions
 from sepi.stage import ERROR_BARS, StageMaps
 from sepi.validation import require_map, require_type

@@ -18,8 +18,8 @@ from pydantic import TypeAdapter, ValidationError
 from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluations_of
 from sepi.io.disparity_maps import map_file, read_disparity
+from sepi.io.hdf5 import read_with_truth
 from sepi.io.scores import ExternalMap, ExternalSource, write_external
-from sepi.io.truth import read_with_truth
 from sepi.lightfield import LightField
 from sepi.process.command import SepiCommand, bad_thresholds
 

@@ -205,99 +205,83 @@ class LightField:
     workspace: Workspace | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        v = self.views
-        require_type("name of the light field", self.name, str, "text")
-        for key in ("source", "reading"):
-            require_type(f"{self.name}: {key}", getattr(self, key), str, "text")
-        require_type(
-            f"{self.name}: disparity_range", self.disparity_range, (DisparityRange, NoneType), "a DisparityRange"
-        )
-        require_type(f"{self.name}: camera", self.camera, (Camera, NoneType), "a Camera")
-        for what, array in self._arrays().items():
-            require_type(f"{self.name}: {what}", array, np.ndarray, "an array")
+        for key, (kind, expected) in _TYPES.items():
+            require_type(f"{self.name}: {key}", getattr(self, key), kind, expected)
+        for what, values in {"notes": self.notes, "masks": self.masks.values()}.items():
+            kind, expected = (str, "a tuple of texts") if what == "notes" else (np.ndarray, "names with arrays")
+            for value in values:
+                require_type(f"{self.name}: {what}", value, kind, expected)
+        if self.present is None:
+            object.__setattr__(self, "present", np.ones(self.views.shape[:2], bool))
         if self.view is not None:
             position = whole_pair(f"{self.name}: view", self.view, "two whole numbers (t, s)")
             object.__setattr__(self, "view", position)
+        # file names need not be printable text, but text that is printed and stored must be
         for key in ("name", "source"):
-            # file names need not be printable text, but text that is printed and stored must be
             object.__setattr__(self, key, _shown(getattr(self, key)))
-        require_type(f"{self.name}: notes", self.notes, (tuple, list), "a tuple of texts")
-        for note in self.notes:
-            require_type(f"{self.name}: notes", note, str, "a tuple of texts")
         object.__setattr__(self, "notes", tuple(map(_shown, self.notes)))
-        if not isinstance(v, np.ndarray):
-            raise SepiError(f"{self.name}: views must be an array of shape (T, S, H, W, C), got a {type(v).__name__}")
-        if v.ndim != 5 or v.shape[4] not in (1, 3) or 0 in v.shape:
-            raise SepiError(f"{self.name}: views must have shape (T, S, H, W, C) with C = 1 or 3, got {v.shape}")
-        if v.shape[0] > v.shape[2] and v.shape[1] > v.shape[3] and v.shape[0] * v.shape[1] > _LARGEST_ODD_GRID:
-            raise SepiError(
-                f"{self.name}: views must have shape (T, S, H, W, C), got a grid of {v.shape[0]}x{v.shape[1]} views of "
-                f"{v.shape[3]}x{v.shape[2]} pixels; views.transpose(2, 3, 0, 1, 4) puts (H, W, T, S, C) right"
-            )
-        if v.shape[0] * v.shape[1] < 2:
-            raise SepiError(f"{self.name}: depth needs at least two views, got a grid of {v.shape[0]}x{v.shape[1]}")
-        if min(v.shape[2:4]) < MIN_SIZE:
-            raise SepiError(
-                f"{self.name}: views must be at least {MIN_SIZE}x{MIN_SIZE} pixels, got {v.shape[3]}x{v.shape[2]}"
-            )
-        if v.dtype not in (np.uint8, np.uint16, np.float32):
-            raise SepiError(f"{self.name}: views must be uint8, uint16 or float32, got {v.dtype}")
-        if self.present is None:
-            object.__setattr__(self, "present", np.ones(v.shape[:2], bool))
-        if self.present.shape != v.shape[:2] or self.present.dtype != bool:
-            raise SepiError(f"{self.name}: present must be bool of shape {v.shape[:2]}, got {self.present.shape}")
-        t, s = self.reference_position
-        if not (0 <= t < v.shape[0] and 0 <= s < v.shape[1]):
-            raise SepiError(
-                f"{self.name}: view {t},{s} lies outside the grid; rows go from 0 to {v.shape[0] - 1}, "
-                f"columns from 0 to {v.shape[1] - 1}"
-            )
-        which = "centre view" if self.reference_position == (v.shape[0] // 2, v.shape[1] // 2) else "view"
-        if self.arranged and not self.present[self.reference_position]:
-            raise SepiError(
-                f"{self.name}: the {which} (t, s) = {self.reference_position} is missing, but depth is estimated for "
-                "it; choose another by --view (view=)"
-            )
-        if self.missing is not None and (self.missing.shape != v.shape[:4] or self.missing.dtype != bool):
-            raise SepiError(f"{self.name}: missing must be bool of shape {v.shape[:4]}, got {self.missing.shape}")
-        if self.present.sum() < 2:
-            raise SepiError(f"{self.name}: depth needs at least two views, only the {which} {t},{s} is present")
-        if v.dtype == np.float32:
-            _require_unit(self.name, v[self.present])
-        if not (is_finite(self.row_spacing) and self.row_spacing > 0):
-            raise SepiError(f"{self.name}: row_spacing must be a positive number, got {described(self.row_spacing)}")
-        if self.positions is not None and (
-            self.positions.shape != (*v.shape[:2], 2)
-            or self.positions.dtype.kind not in "fiu"
-            or not np.isfinite(self.positions[self.present]).all()
-        ):
-            raise SepiError(
-                f"{self.name}: positions must be finite, of shape (T, S, 2) = {(*v.shape[:2], 2)}, got "
-                f"{self.positions.shape}"
-            )
-        if self.positions is not None and len(np.unique(self.positions[self.present], axis=0)) == 1:
-            raise SepiError(f"{self.name}: positions must differ, got the same for all views")
+        self._require_views()
+        self._require_positions()
         for name, mask in self.masks.items():
-            if mask.dtype != bool:
-                raise SepiError(f"{self.name}: masks must be bool, got {name} of {mask.dtype}")
+            self._require(mask.dtype == bool, f"masks must be bool, got {name} of {mask.dtype}")
         for what, array in {"ground_truth": self.ground_truth, **self.masks}.items():
-            if array is not None and array.shape != self.shape:
-                raise SepiError(
-                    f"{self.name}: {what} must have the views' shape (H, W) = {self.shape}, got {array.shape}"
-                )
-
+            if array is not None:
+                expected = f"must have the views' shape (H, W) = {self.shape}, got {array.shape}"
+                self._require(array.shape == self.shape, f"{what} {expected}")
         if self.ground_truth is not None:
-            if self.ground_truth.dtype.kind not in "fiu":
-                raise SepiError(f"{self.name}: ground_truth must be float32, got {self.ground_truth.dtype}")
+            stored = self.ground_truth.dtype
+            self._require(stored.kind in "fiu", f"ground_truth must be float32, got {stored}")
             object.__setattr__(self, "ground_truth", self.ground_truth.astype(np.float32, copy=False))
         if self.disparity_range is not None:
             require_known(f"{self.name}: source of the disparity range", [self.disparity_range.source], RANGE_SOURCES)
 
-    def _arrays(self) -> dict[str, object]:
-        require_type(f"{self.name}: masks", self.masks, Mapping, "names with arrays")
-        known = ("present", "missing", "positions", "ground_truth")
-        named = {**{what: getattr(self, what) for what in known}, **self.masks}
-        return {what: array for what, array in named.items() if array is not None}
+    def _require(self, holds: object, message: str) -> None:
+        if not holds:
+            raise SepiError(f"{self.name}: {message}")
+
+    def _require_views(self) -> None:
+        """Raise unless the views have the right form, and the reference view and another one are present."""
+        v, expected = self.views, "views must have shape (T, S, H, W, C)"
+        self._require(v.ndim == 5 and v.shape[4] in (1, 3) and v.size, f"{expected} with C = 1 or 3, got {v.shape}")
+        rows, columns, height, width, _ = v.shape
+        self._require(
+            rows <= height or columns <= width or rows * columns <= _LARGEST_ODD_GRID,
+            f"{expected}, got a grid of {rows}x{columns} views of {width}x{height} pixels; "
+            "views.transpose(2, 3, 0, 1, 4) puts (H, W, T, S, C) right",
+        )
+        self._require(rows * columns > 1, f"depth needs at least two views, got a grid of {rows}x{columns}")
+        least = f"{MIN_SIZE}x{MIN_SIZE} pixels, got {width}x{height}"
+        self._require(min(height, width) >= MIN_SIZE, f"views must be at least {least}")
+        known = v.dtype in (np.uint8, np.uint16, np.float32)
+        self._require(known, f"views must be uint8, uint16 or float32, got {v.dtype}")
+        for what, shape in {"present": v.shape[:2], "missing": v.shape[:4]}.items():
+            if (array := getattr(self, what)) is not None:
+                sound = array.shape == shape and array.dtype == bool
+                self._require(sound, f"{what} must be bool of shape {shape}, got {array.shape}")
+        t, s = self.reference_position
+        ends = f"rows go from 0 to {rows - 1}, columns from 0 to {columns - 1}"
+        self._require(0 <= t < rows and 0 <= s < columns, f"view {t},{s} lies outside the grid; {ends}")
+        which = "centre view" if (t, s) == (rows // 2, columns // 2) else "view"
+        self._require(
+            self.present[t, s] or not self.arranged,
+            f"the {which} (t, s) = {(t, s)} is missing, but its depth is estimated; choose another by --view (view=)",
+        )
+        others = f"depth needs at least two views, only the {which} {t},{s} is present"
+        self._require(self.present.sum() > 1, others)
+        if v.dtype == np.float32:
+            _require_unit(self.name, v[self.present])
+
+    def _require_positions(self) -> None:
+        """Raise unless the views stand at different places."""
+        spacing, at = self.row_spacing, self.positions
+        message = f"row_spacing must be a positive number, got {described(spacing)}"
+        self._require(is_finite(spacing) and spacing > 0, message)
+        if at is not None:
+            shape = (*self.grid, 2)
+            sound = at.shape == shape and at.dtype.kind in "fiu" and np.isfinite(at[self.present]).all()
+            self._require(sound, f"positions must be finite, of shape (T, S, 2) = {shape}, got {at.shape}")
+            same = len(np.unique(at[self.present], axis=0)) == 1
+            self._require(not same, "positions must differ, got the same for all views")
 
     def require_seen_range(self) -> None:
         """Raise if the range goes far beyond the disparities that another view can show.
@@ -441,6 +425,19 @@ class LightField:
         if view == self.reference_position:
             return self
         return replace(self, view=view, ground_truth=None, masks={})
+
+
+_ARRAY = (np.ndarray, NoneType), "an array"
+# field to its types, and what they are called
+_TYPES: dict[str, tuple[type | tuple[type, ...], str]] = {
+    **dict.fromkeys(("name", "source", "reading"), (str, "text")),
+    "views": (np.ndarray, "an array of shape (T, S, H, W, C)"),
+    **dict.fromkeys(("present", "missing", "positions", "ground_truth"), _ARRAY),
+    "disparity_range": ((DisparityRange, NoneType), "a DisparityRange"),
+    "camera": ((Camera, NoneType), "a Camera"),
+    "notes": ((tuple, list), "a tuple of texts"),
+    "masks": (Mapping, "names with arrays"),
+}
 
 
 def _shown(text: str) -> str:

@@ -93,9 +93,9 @@ def read_light_field(
     except UnclearAxesError as unclear:
         light_field = _with_axes(path, options, file_format, unclear)
     if light_field.rig is not None and light_field.disparity_range is None:
-        reader = format_of(path, file_format).reader
-        if hasattr(reader, "with_depths"):
-            light_field = reader.with_depths(path, light_field, options, given)
+        with_depths = format_of(path, file_format).with_depths
+        if with_depths is not None:
+            light_field = with_depths(path, light_field, options, given)
     if not light_field.arranged:
         from sepi.inspection.arrangement import arrange
 
@@ -108,7 +108,7 @@ def read_light_field(
     if options.row_spacing is not None:
         light_field = with_row_spacing(light_field, options.row_spacing)
     elif check_order:
-        from sepi.inspection.row_spacing import settle_row_spacing
+        from sepi.inspection.arrangement import settle_row_spacing
 
         light_field = settle_row_spacing(light_field, views)
     record = reading_record(options, file_format)
@@ -122,7 +122,7 @@ def read_light_field(
     found = [_depth_warning(light_field)]
     if check_order:
         from sepi.inspection import view_order
-        from sepi.inspection.odd_views import odd_views
+        from sepi.inspection.view_order import odd_views
 
         checked = view_order.check_order(light_field, options.order, views)
         del views

@@ -34,7 +34,7 @@ class Extension(NamedTuple):
     on_request : collection of str
         Variants that need files of the user; ``snakemake comparison`` leaves them out.
     readers : mapping of str to str
-        Word for ``--format`` to a module, whose ``FORMAT`` is the :class:`sepi.io.readers.formats.Format`.
+        Word for ``--format`` to a module; its ``FORMATS[WORD]`` is the :class:`sepi.io.readers.formats.Format`.
     commands : mapping of str to (str, str)
         Command of ``sepi`` to a module, whose function of that name is the click command, and its line in the list.
     flags : mapping of str to str

@@ -9,8 +9,7 @@ import click
 
 from sepi.cli.input_options import Reading, reading_flags, scene_flags, truth_flags
 from sepi.io.disparity_maps import TruthFile
-from sepi.io.hdf5 import read_light_field
-from sepi.io.truth import write_truth
+from sepi.io.hdf5 import read_light_field, write_truth
 from sepi.lightfield import Truth
 from sepi.process.command import SepiCommand
 

@@ -17,11 +17,10 @@ from sepi.extensions.page.page import page_of
 from sepi.extensions.page.pixels import InterestingPixel
 from sepi.extensions.page.scene import page_json, scene_probes
 from sepi.external import ExternalSource, external_maps
-from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
-from sepi.io.pfm import write_pfm
+from sepi.io.disparity_maps import write_pfm
+from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage, write_truth
 from sepi.io.provenance import scene_attributes, stage_attributes
 from sepi.io.scores import ExternalMap, map_name, write_external, write_scores
-from sepi.io.truth import write_truth
 from sepi.lightfield import FloatMap, LightField
 from sepi.process.machine import this_machine
 from sepi.report import numbers

@@ -14,20 +14,17 @@ from sepi.camera import camera_from
 from sepi.evaluate import evaluation_of, evaluations_of
 from sepi.inspection.disparity_range import estimate_range
 from sepi.inspection.view_order import check_order
-from sepi.io.disparity_maps import read_disparity
+from sepi.io.disparity_maps import read_disparity, read_pfm, write_pfm
 from sepi.io.hdf5 import write_light_field
 from sepi.io.map_pictures import colour_code
-from sepi.io.pfm import read_pfm, write_pfm
-from sepi.io.ply import write_ply
-from sepi.io.point_cloud import point_cloud
+from sepi.io.point_cloud import point_cloud, write_ply
 from sepi.matching.sheared_views import ShearedViews
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.unknown import unknown_pixels
 from sepi.process.threads import use_threads
 from sepi.scenes import render, write_hci
-from sepi.scoring.confidence import oracle, sparsification
-from sepi.scoring.edges import edges_of
-from sepi.scoring.regions import occluded, textureless
+from sepi.scoring.error_bars import oracle, sparsification
+from sepi.scoring.regions import edges_of, occluded, textureless
 from sepi.scoring.scores import region_masks, score, score_regions
 from sepi.variants import VARIANTS, stage_parameters
 

@@ -10,7 +10,7 @@ from sepi.pipeline import estimate_depth
 from sepi.regularization.border_planes import BorderPlaneParameters, ransac_plane
 from sepi.regularization.uniform_regions import UniformPlanesParameters, plain_pixels
 from sepi.scenes import render
-from sepi.scoring.confidence import oracle, sparsification
+from sepi.scoring.error_bars import oracle, sparsification
 from sepi.scoring.scores import score
 
 pytestmark = pytest.mark.slow

@@ -14,10 +14,9 @@ from geometries import grid_baselines
 from sepi import ingest, truth
 from sepi.errors import SepiError
 from sepi.evaluate import command, evaluation_of, evaluations_of
-from sepi.io.hdf5 import write_light_field, write_stage
+from sepi.io.hdf5 import read_with_truth, write_light_field, write_stage
 from sepi.io.images import write_png
 from sepi.io.scores import read_evaluations, read_reliability, read_scores
-from sepi.io.truth import read_with_truth
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.unknown import unknown_pixels
 from sepi.scenes import render, write_hci

@@ -12,8 +12,8 @@ from click.testing import CliRunner, Result
 from sepi.errors import SepiWarning
 from sepi.evaluate import evaluation_of
 from sepi.external import ExternalSource, command, external_maps
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import write_light_field
-from sepi.io.pfm import write_pfm
 from sepi.io.scores import ExternalMap, read_external, without_nan, write_external
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field

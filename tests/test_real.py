@@ -11,7 +11,7 @@ import pytest
 from real_scenes import final_maps, final_scores, maps_after, part, scene
 
 from bench.noisy import with_noise
-from sepi.io.pfm import read_pfm
+from sepi.io.disparity_maps import read_pfm
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import DisparityRange, LightField, as_unit_float
 from sepi.matching.plane_sweep import SweepParameters, sweep

@@ -15,7 +15,7 @@ from workflow_copy import REPOSITORY, TINY, Workflow, planned
 from sepi import registry
 from sepi.cli.main import main
 from sepi.errors import SepiError
-from sepi.io.pfm import read_pfm
+from sepi.io.disparity_maps import read_pfm
 from sepi.scenes import render
 from sepi.variants import STAGES
 

@@ -12,7 +12,7 @@ import numpy as np
 
 import sepi
 from sepi.scenes import render
-from sepi.scoring.confidence import oracle, sparsification
+from sepi.scoring.error_bars import oracle, sparsification
 
 light_field = render("dots", size=128, views=7)
 maps = sepi.estimate_depth(light_field)

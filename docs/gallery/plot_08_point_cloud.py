@@ -16,8 +16,7 @@ import numpy as np
 
 import sepi
 from sepi.camera import camera_from
-from sepi.io.ply import write_ply
-from sepi.io.point_cloud import point_cloud
+from sepi.io.point_cloud import point_cloud, write_ply
 from sepi.scenes import render
 
 # %%

@@ -18,7 +18,7 @@ import yaml
 
 import sepi
 from sepi.camera.rig import Lens, Shot
-from sepi.io.pfm import read_pfm
+from sepi.io.disparity_maps import read_pfm
 from sepi.io.result_folder import write_as_taken
 from sepi.scenes import render_shot
 

@@ -59,11 +59,10 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
       sepi convert cotton-depth cotton.png --to rgbd
     """
     from sepi.io.all_views import read_result_at
-    from sepi.io.exr import EXR, write_exr
+    from sepi.io.codecs import EXR, TIFF, write_exr, write_tiff
+    from sepi.io.disparity_maps import write_pfm
     from sepi.io.images import write_png
     from sepi.io.map_pictures import colour_and_depth
-    from sepi.io.pfm import write_pfm
-    from sepi.io.tiff import TIFF, write_tiff
 
     suffix = output.suffix.lower()
     if kind is not None:
@@ -154,8 +153,7 @@ def points(
       sepi points views-depth -o views.ply --focal-length 50 --baseline 10 --focus-distance 2 --sensor-size 36
     """
     from sepi.io.all_views import read_result_at
-    from sepi.io.ply import write_ply
-    from sepi.io.point_cloud import point_cloud
+    from sepi.io.point_cloud import point_cloud, write_ply
 
     result = read_result_at(result_path, view)
     if max_sigma is not None and result.sigma is None:

@@ -88,8 +88,8 @@ def evaluate(
     from sepi.io.files import naming
     from sepi.io.scores import without_nan
     from sepi.scoring.conventions import misfit
-    from sepi.scoring.crops import in_frame
     from sepi.scoring.error_bars import ErrorBars
+    from sepi.scoring.regions import in_frame
     from sepi.scoring.scores import PROTOCOLS, region_masks, score_regions
 
     source = ground_truth if own is None else own.path

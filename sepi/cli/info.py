@@ -108,11 +108,10 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
     interpolated, and warns if a part of the scene lies outside the disparity range. The exit code is 1 if another order
     fits clearly better, the views fit in no order, or some match none of the others; 2 if INPUT cannot be read.
     """
+    from sepi.inspection.arrangement import settle_row_spacing
     from sepi.inspection.coded_views import comparable
     from sepi.inspection.disparity_range import settle_range
-    from sepi.inspection.odd_views import odd_views
-    from sepi.inspection.row_spacing import settle_row_spacing
-    from sepi.inspection.view_order import check_order
+    from sepi.inspection.view_order import check_order, odd_views
     from sepi.matching.softening import LEAST_SHARE, share_too_sharp
 
     try:

@@ -5,19 +5,19 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import Field, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from sepi.errors import SepiError
+from sepi.io.readers.options import ReadOptions
 
 if TYPE_CHECKING:
     from sepi.camera import Camera, Part
     from sepi.io.disparity_maps import TruthFile
     from sepi.io.provenance import Origin
-    from sepi.io.readers.options import ReadOptions
     from sepi.io.result_folder import Result
     from sepi.lightfield import FloatMap, LightField
 
@@ -63,6 +63,21 @@ class Reading:
         return read_light_field(path, file_format=self.file_format, options=self.options, **more)
 
 
+_KINDS: dict[str, dict[str, Any]] = {
+    "Count": {"type": click.IntRange(min=1)},
+    "Positive": {"type": _POSITIVE},
+    "bool": {"is_flag": True},
+    "tuple[str, ...]": {"multiple": True},
+}
+
+
+def _flag_of(option: Field[Any]) -> Callable[..., Any]:
+    """Flag of an option for reading."""
+    kind, about = str(option.type).removesuffix(" | None"), option.metadata
+    more = {"type": Pair(about["metavar"])} if kind in ("Grid", "Position") else _KINDS.get(kind, {})
+    return click.option(f"--{option.name.replace('_', '-')}", default=option.default, **about, **more)
+
+
 _FLAGS = (
     click.option(
         "--format",
@@ -71,46 +86,7 @@ _FLAGS = (
         help="exported, cameras, hci, hci-2013, images, eslf, mosaic, tiff-stack, matlab, numpy, openlf, hdf5 or sepi; "
         "default: recognised from the files.",
     ),
-    click.option("--grid", type=Pair("ROWSxCOLUMNS"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."),
-    click.option(
-        "--pattern", help="Names of views in a folder: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is any text."
-    ),
-    click.option(
-        "--axes",
-        help="Axes of an array in order, such as HWTSC: T S (view row, column; N for both in one), H W and C (colour).",
-    ),
-    click.option("--variable", help="Name of the array in a .mat, .npz or HDF5 file with several."),
-    click.option("--central", type=click.IntRange(min=1), metavar="N", help="Use only the N x N views in the middle."),
-    click.option("--order", default="as-given", help="Order of the views: a name that 'sepi check' prints."),
-    click.option(
-        "--exclude", multiple=True, metavar="VIEW", help="Leave out a view: ROW,COLUMN from 0, or a file; repeatable."
-    ),
-    click.option(
-        "--view",
-        type=Pair("ROW,COLUMN"),
-        metavar="ROW,COLUMN",
-        help="View whose depth is estimated; default: the centre view.",
-    ),
-    click.option(
-        "--row-spacing",
-        type=_POSITIVE,
-        metavar="F",
-        help="Distance of rows of views in steps of columns, if they differ.",
-    ),
-    click.option("--white", type=_POSITIVE, metavar="W", help="Value of white: 1023 for 10 bits, 4095 for 12."),
-    click.option("--images", metavar="FOLDER", help="Pictures of calibrated cameras, if not beside the model."),
-    click.option(
-        "--reference",
-        metavar="PICTURE",
-        help="Picture of the calibrated camera whose depth is estimated; default: the most central one.",
-    ),
-    click.option(
-        "--crop-of",
-        metavar="WxH+X+Y",
-        help="For crops: width and height of the whole picture, and column and row in it of a view's first pixel. "
-        "Sensor size and calibration are those of the whole picture.",
-    ),
-    click.option("--follow-links", is_flag=True, help="Read views that are links to files outside their folder."),
+    *map(_flag_of, fields(ReadOptions)),
 )
 
 
@@ -171,8 +147,6 @@ def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def with_reading(*args: Any, file_format: str | None, **values: Any) -> Any:
-        from sepi.io.readers.options import ReadOptions
-
         options = ReadOptions(**{field.name: values.pop(field.name) for field in fields(ReadOptions)})
         return command(*args, reading=Reading(file_format, options), **values)
 
@@ -207,7 +181,6 @@ def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:
         if 0 < len(missing) < len(flags):
             raise click.UsageError(f"metric depth needs {', '.join(map(_flag, flags))}; missing: {', '.join(missing)}")
         from sepi.camera import camera_from
-        from sepi.io.readers.options import ReadOptions
 
         part = ReadOptions(crop_of=values.get("crop_of")).part
         geometry = None if missing else functools.partial(camera_from, **flags, crop_of=part)
@@ -258,7 +231,7 @@ def read_ground_truth(
     """
     from sepi.io.all_views import read_disparity_at
     from sepi.io.disparity_maps import is_disparity
-    from sepi.io.readers.options import cut_like_views
+    from sepi.io.readers.view_grid import cut_like_views
 
     part = _part_of(estimate, reading)
     if path is None:

@@ -1,8 +1,11 @@
-"""Finds the grid that a numbered sequence of views fills, from the views alone.
+"""What files leave open, from the views alone: the grid that a numbered sequence fills, and the spacing of its rows.
 
 Names that only count the views do not tell the number of rows and columns, whether views are counted by row or by
-column, whether the camera ran back and forth, or whether the views fill the grid: crosses and discs are common. Each
-arrangement of that many views is tried; in the right one, neighbours match everywhere.
+column, whether the camera ran back and forth, or whether the views fill the grid: crosses are common. Each arrangement
+of that many views is tried; in the right one, neighbours match everywhere.
+
+A camera gantry may use different vertical and horizontal steps. Points of one view are matched with views above, below
+and beside it, for each spacing and layout tried: in the right one, all views agree on one disparity for each point.
 """
 
 from __future__ import annotations
@@ -17,15 +20,27 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError, SepiWarning
-from sepi.inspection.odd_views import odd_views
-from sepi.inspection.view_layouts import Baseline, Views, baselines_under, matched
-from sepi.io.readers.options import ReadOptions, arrange_numbers
+from sepi.inspection.view_layouts import (
+    AT_END,
+    FEWEST_POINTS,
+    MATCHED,
+    MOVEMENT,
+    Baseline,
+    Views,
+    baselines_under,
+    is_clear,
+    matched,
+    ring,
+    search_distances,
+)
+from sepi.inspection.view_order import odd_views
+from sepi.io.readers.options import ReadOptions
+from sepi.io.readers.view_grid import arrange_numbers
 from sepi.lightfield import LightField
 
 Positions = npt.NDArray[np.int64]
 
-# Largest radius of the discs that are tried, and largest ratio of a grid's longer side to its shorter
-_LARGEST_RADIUS = 24
+# Largest ratio of a grid's longer side to its shorter
 _MOST_SLENDER = 6
 # Number of reference views, spread over the sequence, of neighbours matched with each, and of points in each. The worst
 # matches decide (one in so many): a wrong arrangement may be right except at the ends of its rows
@@ -142,7 +157,6 @@ def arrangements(count: int) -> Iterator[Arrangement]:
     yield Arrangement(f"a single row of {count}", line)
     yield Arrangement(f"a single column of {count}", line[:, ::-1])
     yield from _crosses(count)
-    yield from _discs(count)
 
 
 def _crosses(count: int) -> Iterator[Arrangement]:
@@ -156,25 +170,7 @@ def _crosses(count: int) -> Iterator[Arrangement]:
     name = f"a cross of {len(along)}x{len(along)}"
     yield Arrangement(f"{name}, the row first", cross)
     yield Arrangement(f"{name}, the column first", cross[:, ::-1])
-    yield from _as_in_the_grid(name, cross)
-
-
-def _discs(count: int) -> Iterator[Arrangement]:
-    """Discs of views round the middle of a grid."""
-    y, x = np.mgrid[-_LARGEST_RADIUS : _LARGEST_RADIUS + 1, -_LARGEST_RADIUS : _LARGEST_RADIUS + 1]
-    distances = np.unique(y**2 + x**2)
-    # the first is one view, the second and third are a cross and a square of 3x3
-    for distance in distances[(distances > 2) & (distances <= _LARGEST_RADIUS**2)]:
-        disc = np.argwhere(y**2 + x**2 <= distance)
-        if len(disc) == count and math.isqrt(count) ** 2 != count:
-            positions = disc - disc.min(axis=0)
-            side = int(positions.max()) + 1
-            yield from _as_in_the_grid(f"a disc in {side}x{side}", positions)
-
-
-def _as_in_the_grid(name: str, positions: Positions) -> Iterator[Arrangement]:
-    """Positions row by row, and column by column."""
-    ordered = positions[np.lexsort((positions[:, 1], positions[:, 0]))]
+    ordered = cross[np.lexsort((cross[:, 1], cross[:, 0]))]
     yield Arrangement(f"{name} row by row", ordered)
     yield Arrangement(f"{name} column by column", ordered[:, ::-1])
 
@@ -245,3 +241,157 @@ def _placed(light_field: LightField, way: Arrangement, options: ReadOptions, not
     return replace(
         light_field, views=views, present=present, view=options.view, arranged=True, files=files, notes=notes
     )
+
+
+# Spacings tried, and how many between one and its double
+_MOST = 4.0
+_PER_OCTAVE = 4
+# Number of points to distinguish spacings, and to measure the one found
+_POINTS_TO_TELL, _POINTS_TO_CHOOSE = 80, 150
+# Layouts up to the sign
+_LAYOUTS = ("as-given", "flip-rows", "transpose", "transpose-flip-rows")
+# Movement in the farthest view, pixels: spacing where movements are compared, and the most when the spacing is measured
+_FINE_SAMPLING = 0.1
+_MOST_MOVEMENT = 80.0
+# Rounds of measuring, and spacings to each side of the last round's best
+_ROUNDS = 2
+_EACH_SIDE = 4
+# Smaller differences are not reported: they are within the measurement error
+_LEAST_CHANGE = 0.04
+# Spacings within this factor of one need a second test: interpolation smooths noise, and decoded lenslet pictures are
+# shifted by a few hundredths of a pixel; either can favour a spacing that is a tenth off
+_DOUBTED = 1.25
+
+
+def settle_row_spacing(light_field: LightField, views: Views | None = None) -> LightField:
+    """The light field with the row spacing estimated from its views, and a note; unchanged if that fails.
+
+    Nothing is done where a spacing or positions of the views are known already. ``views``: its views, where they are
+    looked at otherwise, too.
+    """
+    if light_field.settled or light_field.positions is not None or light_field.row_spacing != 1:
+        return light_field
+    spacing = estimate_row_spacing(views or Views(light_field))
+    if spacing is None:
+        return light_field
+    spacing = round(spacing, 3)
+    note = f"rows of views are {spacing:g} times as far apart as columns (estimated); set it by --row-spacing"
+    return replace(light_field, row_spacing=spacing, notes=(*light_field.notes, note))
+
+
+class _Trial(NamedTuple):
+    """Best spacing from the views at one distance."""
+
+    spacing: float
+    order: str
+    baselines: list[Baseline]
+    movement: float
+    clear: bool
+
+
+def estimate_row_spacing(views: Views) -> float | None:
+    """Distance of rows in view steps, if another than that of columns fits clearly better.
+
+    Parameters
+    ----------
+    views : Views
+        Their own row spacing is not used.
+
+    Returns
+    -------
+    float or None
+        For the order in which the light field was read. None if rows are as far apart as columns, there is only one
+        row or column, or the spacing is unclear.
+    """
+    for reach, factor in search_distances(views):
+        trial = _tried(views, reach, factor)
+        if trial is not None:
+            measured = _measured(views, trial) if trial.clear else 1.0
+            if abs(math.log(measured)) < _LEAST_CHANGE:
+                return None
+            near = abs(math.log(measured)) < math.log(_DOUBTED)
+            return None if near and not _is_seen_in_movements(views, trial, measured) else measured
+    return None
+
+
+def _tried(views: Views, reach: int, factor: int) -> _Trial | None:
+    """The best spacing from views at this distance; None if unclear.
+
+    It is clear if it fits clearly better than equal spacing in any layout.
+    """
+    baselines = views.worth_matching(ring(views.baselines, reach))
+    if not any(t for t, _ in baselines) or not any(s for _, s in baselines) or views.is_too_small(factor):
+        return None
+    count = round(_PER_OCTAVE * math.log2(_MOST))
+    spacings = [2 ** (n / _PER_OCTAVE) for n in range(-count, count + 1)]
+    # most light fields are in order, and their rows as far apart as their columns: a few hypotheses tell
+    hypotheses = [(_LAYOUTS[0], spacing) for spacing in (0.5, 1.0, 2.0)]
+    found = matched(views, (0, 0), baselines, factor, _offsets(baselines, hypotheses), MOVEMENT, _POINTS_TO_TELL)
+    if found is None or not all(is_clear(found[0][:, 1], found[0][:, other]) for other in (0, 2)):
+        hypotheses = [(order, spacing) for order in _LAYOUTS for spacing in spacings]
+    else:
+        hypotheses = [(_LAYOUTS[0], spacing) for spacing in spacings]
+    found = matched(views, (0, 0), baselines, factor, _offsets(baselines, hypotheses), MOVEMENT, _POINTS_TO_CHOOSE)
+    if found is None:
+        return None
+    cost, movement = found
+    mean = cost.mean(axis=0)
+    best = int(mean.argmin())
+    usual = min((n for n, (_, spacing) in enumerate(hypotheses) if spacing == 1), key=lambda n: mean[n])
+    moved = abs(movement[cost[:, best] < MATCHED, best])
+    if moved.size < FEWEST_POINTS or np.quantile(moved, 1 - AT_END) > 0.95 * MOVEMENT:
+        return None
+    order, spacing = hypotheses[best]
+    clear = is_clear(cost[:, best], cost[:, usual])
+    return _Trial(spacing, order, baselines, factor * float(moved.max()), clear)
+
+
+def _measured(views: Views, trial: _Trial) -> float:
+    """The spacing of a trial, to about a hundredth."""
+    spacing, width = trial.spacing, 1 / _PER_OCTAVE
+    for _ in range(_ROUNDS):
+        tried = [spacing * 2 ** (width * n / _EACH_SIDE) for n in range(-_EACH_SIDE, _EACH_SIDE + 1)]
+        offsets = _offsets(trial.baselines, [(trial.order, one) for one in tried])
+        found = matched(views, (0, 0), trial.baselines, 1, offsets, min(trial.movement + 1, _MOST_MOVEMENT))
+        if found is None:
+            return spacing
+        spacing = tried[int(found[0].mean(axis=0).argmin())]
+        width /= _EACH_SIDE
+    return spacing
+
+
+def _is_seen_in_movements(views: Views, trial: _Trial, spacing: float) -> bool:
+    """Whether the ratio of points' movements along columns of views to those along rows is that, surely not one.
+
+    A line through both movements may miss the origin, so that a shift of all views does not count.
+    """
+    # here, since it takes a while to load, and hardly any light field needs it
+    from scipy.stats import theilslopes
+
+    movements, fits = [], []
+    for axis in (0, 1):
+        along = [baseline for baseline in trial.baselines if baseline[1 - axis] == 0]
+        if not along:
+            return False
+        offsets = _offsets(along, [(trial.order, 1.0)])
+        found = matched(views, (0, 0), along, 1, offsets, trial.movement + 1, sampling=_FINE_SAMPLING)
+        if found is None:
+            return False
+        cost, moved = found
+        movements.append(moved[:, 0] / max(abs(baseline[axis]) for baseline in along))
+        fits.append(cost[:, 0] < MATCHED)
+    both = fits[0] & fits[1]
+    if both.sum() < FEWEST_POINTS or not np.ptp(movements[1][both]):
+        return False
+    # where nearly all movements are the same its interval is none, and no number is nearer than that
+    with np.errstate(invalid="ignore"):
+        line = theilslopes(movements[0][both], movements[1][both])
+    # all of the slope's interval of confidence is nearer to the spacing than to one
+    middle = math.sqrt(spacing)
+    return bool(line.low_slope > middle if spacing > 1 else line.low_slope > 0 and line.high_slope < middle)
+
+
+def _offsets(baselines: list[Baseline], hypotheses: list[tuple[str, float]]) -> npt.NDArray[np.float64]:
+    """Baselines (L, V, 2) under each order and spacing, in units of the longest: all search the same movement."""
+    laid = [baselines_under(order, np.array(baselines, np.float64) * (spacing, 1)) for order, spacing in hypotheses]
+    return np.stack([offsets / abs(offsets).max() for offsets in laid])

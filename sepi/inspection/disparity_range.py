@@ -20,8 +20,7 @@ import numpy as np
 
 from sepi.errors import SepiError, SepiWarning
 from sepi.image.noise import noise_of_reference_view
-from sepi.inspection.coarse_sweep import agreeing, coarse_sweep
-from sepi.inspection.dark_corners import dark_corners
+from sepi.inspection.coarse_sweep import agreeing, coarse_sweep, dark_corners
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float, require_light_field
 
 # Search: pixels per view step to each side, and at most this share of a view

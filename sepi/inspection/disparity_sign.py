@@ -16,8 +16,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.inspection.coarse_sweep import agreeing, coarse_sweep
-from sepi.inspection.dark_corners import dark_corners
+from sepi.inspection.coarse_sweep import agreeing, coarse_sweep, dark_corners
 from sepi.inspection.view_layouts import Baseline, Trial, Views, baselines_under
 from sepi.kernels import view_order as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
@@ -142,12 +141,21 @@ def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views:
         for at in _at(direction, reach)
     }
     noise = max(_LEAST_NOISE, rounding, _typical([values[trusted] for values in residual.values()]))
-    total, count = np.zeros((2, *_regions(disparity.shape)))
+    side = max(4, min(_REGION, round(math.sqrt(disparity.size) / _REGIONS_ACROSS)))
+    total, count = np.zeros((2, *(-(-length // side) for length in disparity.shape)))
     for t, s in directions:
         there = [residual[at] for at in _at((-t, -s), reach)]
         opposite = np.asarray(np.mean(there, axis=0), np.float32)
         for at in _at((t, s), reach)[-_HIDING_VIEWS:]:
-            _add_pairs(residual[at], opposite, disparity, surface, positions[at], noise, 2 * movement, total, count)
+            # views on the other side see both pixels of a pair
+            usable = surface & (opposite <= _SEEN) & np.isfinite(residual[at])
+            rise = np.zeros(disparity.shape, np.float32)
+            rise[usable] = np.log((residual[at][usable] + noise) / (opposite[usable] + noise))
+            down, across = np.sign(positions[at]).astype(int).tolist()
+            farthest, length, hidden = 2 * movement, np.abs(positions[at]).max(), _HIDDEN * noise
+            add_pairs(
+                rise, residual[at], disparity, usable, (down, across), farthest, length, hidden, side, total, count
+            )
     return _summary(total, count)
 
 
@@ -160,29 +168,6 @@ def _residual(reference: FloatMap, view: FloatMap, baseline: FloatMap, disparity
     out = np.empty_like(reference)
     kernels.residuals(reference, view, baseline, disparity, asked, _WINDOW_RADIUS, out)
     return out
-
-
-def _add_pairs(
-    residual: FloatMap,
-    opposite: FloatMap,
-    disparity: FloatMap,
-    surface: BoolMap,
-    baseline: npt.NDArray[np.float32],
-    noise: float,
-    farthest: int,
-    total: npt.NDArray[np.float64],
-    count: npt.NDArray[np.float64],
-) -> None:
-    """Add the evidence of pixel pairs that meet in a view, and their number, to the sums of each region.
-
-    ``residual`` is that of the view, ``opposite`` the mean over the views on the other side, which see both pixels.
-    """
-    usable = surface & (opposite <= _SEEN) & np.isfinite(residual)
-    rise = np.zeros(disparity.shape, np.float32)
-    rise[usable] = np.log((residual[usable] + noise) / (opposite[usable] + noise))
-    down, across = np.sign(baseline).astype(int).tolist()
-    length, hidden, side = np.abs(baseline).max(), _HIDDEN * noise, _side(disparity.shape)
-    add_pairs(rise, residual, disparity, usable, (down, across), farthest, length, hidden, side, total, count)
 
 
 def add_pairs(
@@ -235,16 +220,6 @@ def _summary(total: npt.NDArray[np.float64], count: npt.NDArray[np.float64]) -> 
     deviation = max(float(np.sqrt((weights**2 * (values - mean) ** 2).sum() / (weights**2).sum())), 0.1)
     error = deviation * float(np.sqrt((weights**2).sum()) / weights.sum())
     return Evidence(mean, abs(mean) / error, regions, int((values * mean > 0).sum()))
-
-
-def _side(shape: tuple[int, ...]) -> int:
-    """Side of a region, pixels."""
-    return max(4, min(_REGION, round(math.sqrt(math.prod(shape)) / _REGIONS_ACROSS)))
-
-
-def _regions(shape: tuple[int, ...]) -> tuple[int, int]:
-    side = _side(shape)
-    return -(-shape[0] // side), -(-shape[1] // side)
 
 
 def _directions(views: Views, largest: float) -> tuple[int, list[Baseline]]:

@@ -2,7 +2,7 @@
 
 Points of one view are matched with other views under each layout, over disparities of both signs: in the right layout,
 all views agree on one disparity for each point. Layouts can also differ in the spacing of rows, see
-:mod:`sepi.inspection.row_spacing`.
+:mod:`sepi.inspection.arrangement`.
 """
 
 from __future__ import annotations

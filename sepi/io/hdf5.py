@@ -1,7 +1,10 @@
-"""HDF5 files of this package: light fields and stage files.
+"""HDF5 files of this package: light fields, ground truth, and stage files.
 
 Each file begins with a digest of all bytes that follow. It lies in the user block of HDF5, which other programs skip.
 From a damaged file HDF5 may read wrong numbers, crash, or hang, so the digest is checked first.
+
+A truth file holds ``ground_truth (H, W) float32`` in pixels per view step and ``masks/NAME (H, W)`` of the reference
+view, if the scene has them. It is a file apart: only scores use it, no stage reads it.
 
 A stage file holds ``disparity (H, W) float32`` in pixels per view step, ``confidence (H, W) float32`` in 0..1, the
 stage's own maps, and attributes that say what made them. If a later stage chooses among candidates, it also holds
@@ -16,6 +19,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -382,3 +386,25 @@ def create_hdf5(path: Path) -> Iterator[h5py.File]:
             block = digest_block(written)
             written.seek(0)
             written.write(block)
+
+
+def write_truth(path: Path, truth: Truth) -> None:
+    """Write the ground truth and masks of a scene; equal content gives equal bytes."""
+    with create_hdf5(path) as file:
+        put_truth(file, truth)
+
+
+def read_with_truth(light_field: Path, truth: Path | None) -> LightField:
+    """Light field with the ground truth from a truth file; without that file, with its own.
+
+    Raises
+    ------
+    SepiError
+        If a file is missing or of another kind, or they differ in size.
+    """
+    found = read_light_field(light_field)
+    if truth is None:
+        return found
+    with open_hdf5(truth, "truth file (written by python -m sepi.truth)") as file:
+        ground_truth, masks = truth_in(truth, file)
+        return replace(found, ground_truth=ground_truth, masks=masks)

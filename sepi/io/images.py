@@ -5,23 +5,34 @@ from __future__ import annotations
 import io
 import logging
 import os
+import struct
 import warnings
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
+from importlib import import_module
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.exr import exr_pixels
+from sepi.io.codecs import (
+    EXR_SIGNATURE,
+    TIFF_SIGNATURES,
+    exr_form,
+    exr_pixels,
+    open_tiff,
+    page_pixels,
+    pnm_form,
+    pnm_pixels,
+    tiff_form,
+)
 from sepi.io.files import atomic_path, reading
-from sepi.io.picture_headers import Header, pillow_class, pnm_pixels, read_header
-from sepi.io.tiff import open_tiff, page_pixels
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
 from sepi.process.threads import available_cores
 
@@ -31,11 +42,42 @@ _ENDS = ("png", "jpg", "jpeg", "tif", "tiff", "exr", "bmp", "webp", "pgm", "ppm"
 SUFFIXES = frozenset(f".{end}" for end in _ENDS)
 """Suffixes of the images that can be read, in lower case."""
 
+MAX_PIXELS = 2**28
+"""Most pixels of an image that is read; no camera has more."""
+
+# more than any compression reaches on images of 8 bit; small images of one colour may shrink further
+_PIXELS_PER_BYTE = 1100
+_SMALL = 2**24
 _MAX_BYTES = 2**32
 _SILENT = logging.NullHandler()
-_CODECS = {"PNG": "png", "GIF": "gif", "JPEG 2000": "jpeg2k", "AVIF": "avif", "WebP": "webp"}
-_PLUGINS = {"JPEG": "Jpeg", "BMP": "Bmp"}
-_LAST_CHUNK = b"IEND" + zlib.crc32(b"IEND").to_bytes(4, "big")
+_PNG = b"\x89PNG\r\n\x1a\n"
+# bytes before the second chunk of a PNG
+_PNG_HEADER = 33
+
+
+class Header(NamedTuple):
+    """Kind, size and pixel type of an image, from its header.
+
+    Attributes
+    ----------
+    kind : str
+        Such as ``"PNG"`` or ``"OpenEXR"``.
+    height, width : int
+        In pixels.
+    pixel_bytes : int
+        Bytes of a decoded pixel.
+    grey : bool
+        Whether it has no colours; False if the header does not say.
+    white : int
+        PNM: the value of white; else 0.
+    """
+
+    kind: str
+    height: int
+    width: int
+    pixel_bytes: int = 3
+    grey: bool = False
+    white: int = 0
 
 
 def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
@@ -69,9 +111,9 @@ def _read(path: Path, any_floats: bool) -> Pixels:
     with _opened(path) as file:
         # in one read: each of many small ones would release Python's lock and wait for it again
         data = file.read()
-    header = read_header(path, io.BytesIO(data))
+    header = _header(path, io.BytesIO(data))
     with reading(path, header.kind):
-        image = _decoded(path, data, header.kind)
+        image = _KINDS[header.kind].pixels(path, data)
         if image.shape[:2] != (header.height, header.width):
             raise SepiError(f"damaged {header.kind}: its pixels are not those of its header")
         if image.dtype not in (np.uint8, np.uint16, np.float32):
@@ -139,23 +181,25 @@ def read_views(
 def picture_header(path: Path) -> Header:
     """Header of an image of any supported kind; its pixels are not decoded."""
     with _opened(path) as file:
-        return read_header(path, file)
+        return _header(path, file)
 
 
 def png_texts(path: Path) -> dict[str, str]:
-    """Text chunks of a PNG by key; empty if the file is damaged or not a PNG."""
-    from PIL import PngImagePlugin
+    """Text chunks of a PNG by key; empty if the file cannot be read or is not a PNG."""
+    data, at, texts = b"", len(_PNG), {}
+    with suppress(OSError):
+        data = path.read_bytes() if path.is_file() else b""
+    while data.startswith(_PNG) and at + 12 <= len(data):
+        end = at + 8 + int.from_bytes(data[at : at + 4], "big")
+        if data[at + 4 : at + 8] == b"tEXt" and data[end : end + 4] == _checksum(data[at + 4 : end]):
+            key, _, text = data[at + 8 : end].decode("latin-1").partition("\0")
+            texts[key] = text
+        at = end + 4
+    return texts
 
-    if not path.is_file():
-        return {}
-    try:
-        # check the size first: Pillow decodes the whole image to find texts behind the pixels
-        picture_header(path)
-        with PngImagePlugin.PngImageFile(path) as image:
-            return {key: str(text) for key, text in image.text.items()}
-    except Exception:
-        # Pillow fails on damage in many ways
-        return {}
+
+def _checksum(chunk: bytes) -> bytes:
+    return zlib.crc32(chunk).to_bytes(4, "big")
 
 
 def write_png(path: Path, pixels: Pixels | BoolMap, texts: Mapping[str, str] | None = None) -> None:
@@ -167,23 +211,16 @@ def write_png(path: Path, pixels: Pixels | BoolMap, texts: Mapping[str, str] | N
     pixels : ndarray, shape (H, W) or (H, W, 3), uint8, uint16 or bool
         Grey or RGB; bool becomes 0 and 255.
     texts : mapping of str to str, optional
-        Text chunks, for grey images only.
+        Text chunks.
     """
     values: npt.NDArray[Any] = np.asarray(255 * pixels, np.uint8) if pixels.dtype == bool else pixels
     with atomic_path(path) as temporary:
-        if texts is not None:
-            from PIL import Image, PngImagePlugin
-
-            chunks = PngImagePlugin.PngInfo()
-            for key, text in texts.items():
-                chunks.add_text(key, text)
-            # a quarter of the time for 5 % more bytes; OpenCV does the same
-            Image.fromarray(values).save(temporary, "PNG", pnginfo=chunks, compress_level=1)
-            return
         done, data = cv2.imencode(".png", values[:, :, ::-1] if values.ndim == 3 else values)
         if not done:
             raise SepiError(f"{path}: pixels {pixels.shape} of type {pixels.dtype} cannot be written as PNG")
-        temporary.write_bytes(data.tobytes())
+        bodies = [b"tEXt" + f"{key}\0{text}".encode("latin-1") for key, text in (texts or {}).items()]
+        chunks = b"".join((len(body) - 4).to_bytes(4, "big") + body + _checksum(body) for body in bodies)
+        temporary.write_bytes(data[:_PNG_HEADER].tobytes() + chunks + data[_PNG_HEADER:].tobytes())
 
 
 @contextmanager
@@ -197,35 +234,6 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
             if size > _MAX_BYTES:
                 raise SepiError(f"{size} bytes are more than an image has")
             yield file
-
-
-def _decoded(path: Path, data: bytes, kind: str) -> Pixels:
-    """Pixels (H, W) or (H, W, C) in the order RGB; damage raises an error and prints nothing."""
-    if kind == "OpenEXR":
-        return exr_pixels(str(path))
-    if kind == "PNM":
-        return pnm_pixels(data)
-    if kind == "TIFF":
-        with open_tiff(io.BytesIO(data)) as pictures:
-            return page_pixels(pictures.pages[0].aspage())
-    if kind == "PNG" and _LAST_CHUNK not in data:
-        raise ValueError("its end is missing")
-    if kind in _PLUGINS:
-        with pillow_class(_PLUGINS[kind])(io.BytesIO(data)) as image:
-            tile = image.tile[0]
-            # Pillow does not miss bytes that fill up the last row of a BMP
-            if tile.codec_name == "raw" and tile.offset + tile.args[1] * image.height > len(data):
-                raise ValueError("its end is missing")
-            return np.asarray(image.convert("L" if image.mode == "L" else "RGB"))
-    import imagecodecs
-
-    # its warnings do not concern the pixels
-    logging.getLogger("imagecodecs").addHandler(_SILENT)
-    try:
-        pixels: Pixels = getattr(imagecodecs, f"{_CODECS[kind]}_decode")(data)
-    except RuntimeError as error:
-        raise ValueError(f"its pixels cannot be decoded: {error}") from error
-    return pixels
 
 
 def _require_memory(folder: Path, view: Pixels, count: int) -> None:
@@ -243,3 +251,136 @@ def _described(image: Pixels) -> str:
     height, width, channels = image.shape
     bits = f"{8 * image.dtype.itemsize} bit{' float' if image.dtype.kind == 'f' else ''}"
     return f"{width}x{height} {'RGB' if channels == 3 else 'grey'} of {bits}"
+
+
+def _header(path: Path, file: IO[bytes]) -> Header:
+    """Header of an open image file; its content tells the kind, not its name.
+
+    Only its first bytes are read, or as much as tells whether it is complete. Decoders take memory for any size in a
+    header, and some fill the missing part of a truncated file with grey.
+    """
+    size = file.seek(0, io.SEEK_END)
+    file.seek(0)
+    start = file.read(12)
+    name = next((name for name, kind in _KINDS.items() if start.startswith(kind.signatures)), None)
+    if name is None:
+        raise SepiError(f"{path}: not a {', '.join(_KINDS)} image (PNM: PGM or PPM)")
+    file.seek(0)
+    with reading(path, name):
+        header = Header(name, *_KINDS[name].form(file, path, size))
+        if not 1 <= header.height * header.width <= min(MAX_PIXELS, _PIXELS_PER_BYTE * size + _SMALL):
+            raise SepiError(f"{header.width}x{header.height} pixels cannot be in a {name} of {size} bytes, or too many")
+    return header
+
+
+# height, width, and if known: bytes of a pixel, grey, white
+_Form = tuple[int, int] | tuple[int, int, int, bool] | tuple[int, int, int, bool, int]
+
+
+def _png_form(file: IO[bytes], path: Path, size: int) -> _Form:
+    head = file.read(_PNG_HEADER)
+    # decoding turns grey with transparency, or a palette, into colours
+    width, height, bits, colours = struct.unpack_from(">IIBB", head, 16)
+    grey = colours in (0, 4)
+    if not width * height:
+        raise ValueError("no pixels")
+    return height, width, (1 if grey else 3) * (2 if bits == 16 else 1), grey
+
+
+def _pillow_form(plugin: str, file: IO[bytes], path: Path, size: int) -> _Form:
+    with _pillow_class(plugin)(file) as image:
+        grey = image.mode in ("1", "L", "LA", "I;16")
+        return image.height, image.width, (1 if grey else 3) * (2 if "16" in image.mode else 1), grey
+
+
+def _pillow_class(plugin: str) -> Any:
+    # ``Image.open`` and the class for WebP refuse images that are allowed here, with a limit for all threads
+    return getattr(import_module(f"PIL.{plugin}ImagePlugin"), f"{plugin}ImageFile")
+
+
+def _avif_form(file: IO[bytes], path: Path, size: int) -> _Form:
+    # the box 'ispe' holds the size of the image
+    _, _, box = file.read(4096).partition(b"ispe\0\0\0\0")
+    return int.from_bytes(box[4:8], "big"), int.from_bytes(box[:4], "big")
+
+
+def _webp_form(file: IO[bytes], path: Path, size: int) -> _Form:
+    head = file.read(30)
+    if head[12:16] == b"VP8X":
+        width, height = (1 + int.from_bytes(head[at : at + 3], "little") for at in (24, 27))
+    elif head[12:16] == b"VP8L":
+        bits = int.from_bytes(head[21:25], "little")
+        width, height = 1 + bits % 2**14, 1 + (bits >> 14) % 2**14
+    else:
+        width, height = (int.from_bytes(head[at : at + 2], "little") % 2**14 for at in (26, 28))
+    return height, width
+
+
+def _tiff_form(file: IO[bytes], path: Path, size: int) -> _Form:
+    """Form of the first page."""
+    with open_tiff(file) as pictures:
+        return tiff_form(pictures.pages[0].aspage(), size)
+
+
+def _pnm_form(file: IO[bytes], path: Path, size: int) -> _Form:
+    height, width, channels, white, *_ = pnm_form(file.read(4096), size)
+    return height, width, channels * (1 if white < 256 else 2), channels == 1, white
+
+
+def _exr_form(file: IO[bytes], path: Path, size: int) -> _Form:
+    height, width, names = exr_form(str(path))
+    return height, width, 4 * len(names), len(names) == 1
+
+
+# pixels (H, W) or (H, W, C) in the order RGB; damage raises an error and prints nothing
+def _tiff_pixels(path: Path, data: bytes) -> Pixels:
+    with open_tiff(io.BytesIO(data)) as pictures:
+        return page_pixels(pictures.pages[0].aspage())
+
+
+def _pillow_pixels(plugin: str, path: Path, data: bytes) -> Pixels:
+    with _pillow_class(plugin)(io.BytesIO(data)) as image:
+        tile = image.tile[0]
+        # Pillow does not miss bytes that fill up the last row of a BMP
+        if tile.codec_name == "raw" and tile.offset + tile.args[1] * image.height > len(data):
+            raise ValueError("its end is missing")
+        return np.asarray(image.convert("L" if image.mode == "L" else "RGB"))
+
+
+def _codec_pixels(codec: str, path: Path, data: bytes) -> Pixels:
+    import imagecodecs
+
+    if codec == "png" and b"IEND" + _checksum(b"IEND") not in data:
+        raise ValueError("its end is missing")
+    # its warnings do not concern the pixels
+    logging.getLogger("imagecodecs").addHandler(_SILENT)
+    try:
+        pixels: Pixels = getattr(imagecodecs, f"{codec}_decode")(data)
+    except RuntimeError as error:
+        raise ValueError(f"its pixels cannot be decoded: {error}") from error
+    return pixels
+
+
+class _Kind(NamedTuple):
+    """A kind of image: its first bytes, and what reads its header and its pixels."""
+
+    signatures: bytes | tuple[bytes, ...]
+    form: Callable[[IO[bytes], Path, int], _Form]
+    pixels: Callable[[Path, bytes], Pixels]
+
+
+# the length of the first box comes before
+_AVIF = tuple(bytes((0, 0, 0, length)) + b"ftypavif" for length in range(16, 256, 4))
+_JPEG_2000 = (b"\0\0\0\x0cjP  ", b"\xff\x4f\xff\x51")
+_KINDS = {
+    "PNG": _Kind(_PNG, _png_form, partial(_codec_pixels, "png")),
+    "JPEG": _Kind(b"\xff\xd8\xff", partial(_pillow_form, "Jpeg"), partial(_pillow_pixels, "Jpeg")),
+    "TIFF": _Kind(TIFF_SIGNATURES, _tiff_form, _tiff_pixels),
+    "OpenEXR": _Kind(EXR_SIGNATURE, _exr_form, lambda path, _: exr_pixels(str(path))),
+    "BMP": _Kind(b"BM", partial(_pillow_form, "Bmp"), partial(_pillow_pixels, "Bmp")),
+    "GIF": _Kind(b"GIF8", partial(_pillow_form, "Gif"), partial(_codec_pixels, "gif")),
+    "JPEG 2000": _Kind(_JPEG_2000, partial(_pillow_form, "Jpeg2K"), partial(_codec_pixels, "jpeg2k")),
+    "AVIF": _Kind(_AVIF, _avif_form, partial(_codec_pixels, "avif")),
+    "WebP": _Kind(b"RIFF", _webp_form, partial(_codec_pixels, "webp")),
+    "PNM": _Kind((b"P2", b"P3", b"P5", b"P6"), _pnm_form, lambda _, data: pnm_pixels(data)),
+}

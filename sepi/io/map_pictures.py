@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.files import atomic_path
 from sepi.io.images import write_png
-from sepi.io.pfm import write_pfm
-from sepi.io.result_files import DEPTH_SIGMA, ERROR_FILES, INTERVAL, SIGMA_PFM, SIGMA_PNG
+from sepi.io.result_files import DEPTH_SIGMA, INTERVAL, SIGMA_PFM, SIGMA_PNG
 from sepi.lightfield import BoolMap, FloatMap, as_unit_float
 from sepi.stage import StageMaps
 from sepi.validation import require_map
@@ -133,11 +133,6 @@ def bars_in_metres(maps: StageMaps, camera: Camera | None) -> dict[str, FloatMap
     sigma = camera.depth_sigma(maps.disparity, maps.sigma)
     # larger disparities are nearer
     return {"depth_sigma": sigma, "nearest": camera.depth(maps.high), "farthest": camera.depth(maps.low)}
-
-
-def names_of_error_bars(maps: StageMaps, *, in_metres: bool) -> tuple[str, ...]:
-    """File names of error bars, with those of the depth if ``in_metres``; empty if the maps have none."""
-    return () if maps.sigma is None else (*ERROR_FILES, *((DEPTH_SIGMA,) if in_metres else ()))
 
 
 def write_error_bars(folder: Path, maps: StageMaps, metres: Mapping[str, FloatMap], unknown: BoolMap) -> None:

@@ -1,4 +1,4 @@
-"""A coloured point cloud from a disparity map.
+"""A coloured point cloud from a disparity map, and its PLY file, which all 3-D viewers read.
 
 Axes are those of PLY viewers: x to the right, y up, z towards the viewer, so that the scene lies at negative z and
 shows upright and the right way round. The origin is the camera of the view that the disparity map belongs to.
@@ -19,9 +19,11 @@ is a third of the image width. A relief does not have the proportions of the sce
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from types import NoneType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -29,8 +31,9 @@ import numpy.typing as npt
 from sepi.camera import Camera
 from sepi.camera.rig import WORLD, Rig
 from sepi.errors import SepiError
+from sepi.io.files import atomic_path, reading
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.validation import require_map, require_type
+from sepi.validation import require_map, require_path, require_type
 
 Positions = npt.NDArray[np.float32]
 Colours = npt.NDArray[np.uint8]
@@ -265,3 +268,81 @@ def _colours(pixels: npt.NDArray[Any]) -> Colours:
         values = pixels * (255.0 / np.iinfo(pixels.dtype).max)
     levels = np.rint(values).astype(np.uint8)
     return np.repeat(levels, 3, axis=1) if levels.shape[1] == 1 else levels
+
+
+class Cloud(Protocol):
+    """Coloured points, such as :class:`sepi.io.point_cloud.PointCloud`; may have a ``sigma`` for each point."""
+
+    @property
+    def positions(self) -> npt.NDArray[np.floating]:
+        """Coordinates, shape (N, 3)."""
+
+    @property
+    def colours(self) -> npt.NDArray[np.uint8]:
+        """RGB, shape (N, 3)."""
+
+    def comments(self) -> tuple[str, ...]:
+        """Axes and units, for the file's header."""
+
+
+def write_ply(path: str | Path, cloud: Cloud, comments: Sequence[str] | None = None) -> None:
+    """Write coloured points as a binary little-endian PLY, whole or not at all; equal content gives equal bytes.
+
+    Parameters
+    ----------
+    path : str or Path
+        MeshLab, CloudCompare, Blender and others open it; comments in its header name the units. If the cloud has a
+        sigma, each vertex has a property of that name, which CloudCompare shows as a scalar field.
+    cloud : Cloud
+        Such as a :class:`~sepi.io.point_cloud.PointCloud`.
+    comments : sequence of str, optional
+        Axes and units; default: those of the cloud.
+
+    Raises
+    ------
+    SepiError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from sepi.io.point_cloud import write_ply
+    >>> from sepi.io.point_cloud import point_cloud
+    >>> from sepi.scenes import render
+    >>> light_field = render("pyramids", size=64, views=2)
+    >>> picture = light_field.views[light_field.reference_position]
+    >>> write_ply(Path("pyramids.ply"), point_cloud(picture, light_field.ground_truth))
+    >>> Path("pyramids.ply").read_bytes().splitlines()[4]
+    b'element vertex 4096'
+    """
+    path = require_path("PLY to write", path)
+    for name in ("positions", "colours"):
+        require_type(f"{path}: {name}", getattr(cloud, name, None), np.ndarray, "an array of the points")
+    from plyfile import PlyData, PlyElement
+
+    columns = dict(zip("xyz", np.asarray(cloud.positions, "<f4").T, strict=True))
+    columns |= dict(zip(("red", "green", "blue"), cloud.colours.T, strict=True))
+    # a user's own class need not have it
+    if (sigma := getattr(cloud, "sigma", None)) is not None:
+        columns["sigma"] = np.asarray(sigma, "<f4")
+    points = np.empty(len(cloud.positions), [(name, values.dtype) for name, values in columns.items()])
+    for name, values in columns.items():
+        points[name] = values
+    told = list(cloud.comments() if comments is None else comments)
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        PlyData([PlyElement.describe(points, "vertex")], byte_order="<", comments=told).write(file)
+
+
+def read_positions(path: Path) -> npt.NDArray[np.float64]:
+    """Coordinates (N, 3) of the points of a PLY file.
+
+    Raises
+    ------
+    SepiError
+        If it is damaged or has no points.
+    """
+    from plyfile import PlyData
+
+    with reading(path, "PLY file of points"):
+        points = PlyData.read(path)["vertex"]
+        return np.column_stack([np.asarray(points[axis], np.float64) for axis in "xyz"])

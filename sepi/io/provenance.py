@@ -13,11 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import TypeAdapter, ValidationError
 
 from sepi.camera import numbers_of
 from sepi.errors import SepiError
@@ -25,6 +25,7 @@ from sepi.io.hdf5 import RIG, Attribute, attribute, open_hdf5, read_attributes, 
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.stage import Entry, StageMaps
+from sepi.validation import require_type
 
 RESULT = "result.h5"
 
@@ -190,11 +191,9 @@ def _reading(path: Path, record: str) -> tuple[ReadOptions, str | None]:
     try:
         given = json.loads(record or "{}")
         file_format = given.pop(_FORMAT, None)
-        for name in _NOT_KEPT:
-            given.pop(name, None)
-        options = TypeAdapter(ReadOptions).validate_json(json.dumps(given), strict=True)
-        TypeAdapter(str | None).validate_python(file_format)
-    except (ValueError, AttributeError, TypeError, RecursionError, ValidationError) as error:
+        require_type("format", file_format, (str, NoneType), "text")
+        options = ReadOptions(**{name: value for name, value in given.items() if name not in _NOT_KEPT})
+    except (SepiError, ValueError, AttributeError, TypeError, RecursionError) as error:
         raise SepiError(f"{path}: damaged: options of its light field are not valid ({record[:40]!r})") from error
     return options, file_format
 

@@ -19,11 +19,10 @@ from sepi.camera import Camera, warn_of_infinity
 from sepi.camera.rig import Rig
 from sepi.errors import SepiError
 from sepi.io import hdf5, map_pictures
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.files import atomic_path, filled_folder, remove_files
 from sepi.io.images import write_png
-from sepi.io.pfm import write_pfm
-from sepi.io.ply import write_ply
-from sepi.io.point_cloud import point_cloud
+from sepi.io.point_cloud import point_cloud, write_ply
 from sepi.io.provenance import DIGEST, RESULT, result_attributes
 from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, UNKNOWN, names_as_taken, require_own, sound_maps
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
@@ -160,12 +159,12 @@ def write_result(
     disparity.png
     confidence.png
     points.ply
-    sigma.pfm
-    sigma.png
     interval.npz
     mask_occluded.png
     mask_textureless.png
     mask_unknown.png
+    sigma.pfm
+    sigma.png
     result.h5
     >>> bool((np.load("dots-depth/disparity.npy") == maps.disparity).all())
     True
@@ -250,11 +249,7 @@ def _write_files(
     metres = map_pictures.bars_in_metres(maps, camera)
     if camera is not None:
         more |= {"depth": camera.depth(maps.disparity), **metres}
-    bars = map_pictures.names_of_error_bars(maps, in_metres=bool(metres))
-    taken = write_as_taken(folder, light_field, maps.disparity, sigma=maps.sigma)
-    original = names_as_taken(with_sigma=maps.sigma is not None) if taken else ()
-    given = [*([] if camera is None else [DEPTH]), *bars, *original, *([] if seconds is None else [RUNTIME])]
-    names = (*RESULT_FILES[:-1], *given, *masks, RESULT)
+    write_as_taken(folder, light_field, maps.disparity, sigma=maps.sigma)
     unknown, digest = maps.mask(UNKNOWN), attributes.get(DIGEST)
     # images are packed outside Python's lock
     with ThreadPoolExecutor(min(4, available_cores())) as pool:
@@ -266,13 +261,15 @@ def _write_files(
             pool.submit(_write_pictures, folder, maps, masks, unknown),
             pool.submit(_write_numbers, folder, light_field, maps, more.get("depth"), seconds),
         ]
-        # a later result may replace these files: they are not a user's own
-        files = {"files": " ".join(sorted((*names, *beside)))}
         with hdf5.create_hdf5(folder / RESULT) as file:
             hdf5.put_maps(file, maps.updated(maps.disparity, maps.confidence, **more))
+            for one in written:
+                one.result()
+            # a later result may replace these files: they are not a user's own
+            others = {path.name for path in folder.iterdir() if path.name[0] != "."}.difference(RESULT_FILES)
+            names = (*RESULT_FILES[:-1], *sorted(others), RESULT)
+            files = {"files": " ".join(sorted((*names, *beside)))}
             file.attrs.update({**told.result(), **attributes, **files})
-        for one in written:
-            one.result()
     return names
 
 
@@ -308,8 +305,8 @@ def write_as_taken(
     disparity: FloatMap,
     position: _View | None = None,
     sigma: FloatMap | None = None,
-) -> bool:
-    """Write the maps of a view at the pixels of the image as its calibrated camera took it; False without a rig.
+) -> None:
+    """Write the maps of a view at the pixels of the image as its calibrated camera took it; nothing without a rig.
 
     Parameters
     ----------
@@ -323,7 +320,7 @@ def write_as_taken(
         Standard deviation of the disparity.
     """
     if light_field.camera is None or light_field.rig is None:
-        return False
+        return
     from sepi.camera.as_taken import as_taken, sigma_as_taken
 
     t, s = position or light_field.reference_position
@@ -332,4 +329,3 @@ def write_as_taken(
     maps = [*as_taken(disparity, *where), *([] if sigma is None else [sigma_as_taken(sigma, *where)])]
     for name, values in zip(names_as_taken(position, with_sigma=sigma is not None), maps, strict=True):
         write_pfm(folder / name, values)
-    return True

@@ -16,7 +16,7 @@ from matplotlib.image import AxesImage
 from sepi.io.files import atomic_path
 from sepi.lightfield import FloatMap
 from sepi.report.pictures import Picture
-from sepi.scoring.confidence import STEPS, oracle, sparsification
+from sepi.scoring.error_bars import STEPS, oracle, sparsification
 
 # without matplotlib's version and the time
 _OPTIONS: dict[str, dict[str, Any]] = {

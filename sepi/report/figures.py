@@ -17,10 +17,9 @@ import click
 import numpy as np
 
 from sepi.io.files import atomic_folder
-from sepi.io.hdf5 import read_stage
+from sepi.io.hdf5 import read_stage, read_with_truth
 from sepi.io.images import write_png
 from sepi.io.scores import read_evaluations, read_external
-from sepi.io.truth import read_with_truth
 from sepi.matching.unknown import with_unknown
 from sepi.process.command import SepiCommand
 from sepi.registry import added

@@ -19,6 +19,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from sepi.io.files import atomic_path
+from sepi.io.hdf5 import read_with_truth
 from sepi.io.scores import (
     Evaluation,
     ExternalMap,
@@ -29,7 +30,6 @@ from sepi.io.scores import (
     read_scores,
     without_nan,
 )
-from sepi.io.truth import read_with_truth
 from sepi.report.plan import PARTS, Plan
 from sepi.report.runs import EXTERNAL, KEYS, TENTHS, Runs, read_json
 from sepi.scoring.scores import PROTOCOLS, SCORED_REGIONS, WHOLE_MAP

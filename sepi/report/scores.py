@@ -15,7 +15,7 @@ from sepi.report import published
 from sepi.report.plan import MAIN_VARIANT
 from sepi.report.runs import EXTERNAL, KEYS, PROTOCOL_NOTE, REGIONS_NOTE, Runs, own_key
 from sepi.report.table import Head, Kind, Section, Table, ranks, section, shown
-from sepi.scoring.edges import LEAST_DISCONTINUITY, REACH
+from sepi.scoring.regions import LEAST_DISCONTINUITY, REACH
 from sepi.scoring.scores import (
     COUNTS,
     DISCONTINUITIES,

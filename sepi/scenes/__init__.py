@@ -12,7 +12,6 @@ Examples
 
 from sepi.scenes.definitions import SCENES
 from sepi.scenes.folder import write_hci
-from sepi.scenes.light_field import render, true_disparity
-from sepi.scenes.posed import render_shot
+from sepi.scenes.light_field import render, render_shot, true_disparity
 
 __all__ = ["SCENES", "render", "render_shot", "true_disparity", "write_hci"]

@@ -1,20 +1,177 @@
-"""The built-in scenes: their surfaces, and the difficulty that each one poses.
+"""The built-in scenes: their surfaces and textures, and the difficulty that each one poses.
 
-Lengths are fractions of the image size, disparities are pixels per view step.
+A scene is a list of planar patches with an outline and a texture. Coordinates are those of the centre view, in
+fractions of the image: (0, 0) is the outer corner of the top left pixel, (1, 1) that of the bottom right pixel. Shapes
+therefore scale with the image while disparities, in pixels per view step, do not.
+
+Textures are periodic rasters, one texel per pixel of the centre view, sampled by cubic splines. They have pixel-scale
+detail at every image size, so that depth can be estimated. The photographs are samples included in scikit-image.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from sepi.scenes import textures
-from sepi.scenes.surfaces import Plane, Surface, blob, everywhere, polygon, pyramid, rectangle, thread
+from sepi.lightfield import FloatMap
 
-# textures are made only for drawing; the surfaces' positions do not depend on them
-noise, photograph, shading = (textures.later(make) for make in (textures.noise, textures.photograph, textures.shading))
+Outline = npt.NDArray[np.float64]
+"""Corners ``(N, 2)`` of a closed polygon as (x, y)."""
+
+Texture = FloatMap | Callable[[], FloatMap]
+"""Periodic, one texel per pixel, shape (M, M, 3) in 0..1; or a function that makes it."""
+
+# Corners of a circle: at 1024 pixels the polygon deviates by less than 0.1 pixels.
+CIRCLE_CORNERS = 180
+
+
+class Plane(NamedTuple):
+    """Disparity ``at_centre + across * (x - 1/2) + down * (y - 1/2)`` in pixels per view step."""
+
+    at_centre: float
+    across: float = 0.0
+    down: float = 0.0
+
+    def at(self, x: float, y: float) -> float:
+        """Disparity at a point of the image."""
+        return self.at_centre + self.across * (x - 0.5) + self.down * (y - 0.5)
+
+
+class Surface(NamedTuple):
+    """A planar patch."""
+
+    outlines: Sequence[Outline]
+    """Points inside an odd number of outlines belong to the surface (a second outline cuts a hole)."""
+    plane: Plane
+    texture: Texture
+    textureless: bool = False
+    """Whether the texture has too little detail to estimate depth."""
+
+
+def everywhere() -> Outline:
+    """A rectangle far larger than the part visible in any view."""
+    return rectangle(-3, -3, 4, 4)
+
+
+def rectangle(left: float, top: float, right: float, bottom: float) -> Outline:
+    """An upright rectangle."""
+    return np.array([[left, top], [right, top], [right, bottom], [left, bottom]], float)
+
+
+def polygon(*corners: tuple[float, float]) -> Outline:
+    """A polygon through the given corners."""
+    return np.array(corners, float)
+
+
+def blob(x: float, y: float, radius: float, waves: Sequence[tuple[int, float, float]] = ()) -> Outline:
+    """A circle with a radius that varies with the angle: waves of (periods, amplitude / radius, phase in radians)."""
+    angle = 2 * np.pi * np.arange(CIRCLE_CORNERS) / CIRCLE_CORNERS
+    r = radius * (1 + sum((a * np.cos(n * angle + phase) for n, a, phase in waves), np.zeros_like(angle)))
+    return np.stack([x + r * np.cos(angle), y + r * np.sin(angle)], axis=1)
+
+
+def thread(start: tuple[float, float], end: tuple[float, float], width: float) -> Outline:
+    """A straight bar of the given width."""
+    a, b = np.array(start), np.array(end)
+    along = (b - a) / np.hypot(*(b - a))
+    side = 0.5 * width * np.array([-along[1], along[0]])
+    return np.stack([a + side, b + side, b - side, a - side])
+
+
+def pyramid(base: Outline, apex: tuple[float, float], height: float, ground: Plane, texture: Texture) -> list[Surface]:
+    """The faces of a pyramid on ``ground`` with its top at ``apex`` in the centre view.
+
+    ``height`` is the disparity of the top relative to the ground; negative for a pyramid sunk into it.
+    """
+    faces = []
+    for a, b in zip(base, np.roll(base, -1, axis=0), strict=True):
+        corners = np.stack([a, b, np.array(apex)])
+        disparity = [ground.at(*a), ground.at(*b), ground.at(*apex) + height]
+        plane = Plane(*np.linalg.solve(np.column_stack([np.ones(3), corners - 0.5]), disparity).tolist())
+        faces.append(Surface([corners], plane, texture))
+    return faces
+
+
+Colour = tuple[float, float, float]
+"""Red, green, blue, full range = 1."""
+
+# Texels per period; far longer than any disparity range, so that a repetition is never a false match.
+PERIOD = 512
+# Shortest wavelength of noise in pixels.
+FINEST = 3.0
+# Share of a texture's variation that differs between colour channels.
+CHROMA = 0.25
+# Standard deviation of the noise added to a photograph.
+GRAIN = 0.05
+
+
+def later(make: Callable[..., FloatMap]) -> Callable[..., Callable[[], FloatMap]]:
+    """Wrap a texture function so that calls return a function that makes the texture when it is drawn."""
+    return lambda *given, **named: partial(make, *given, **named)
+
+
+@later
+def noise(seed: int, colour: Colour, contrast: float, *, coarsest: float = 48.0) -> FloatMap:
+    """Smooth noise around a colour with equal energy per octave between two wavelengths in pixels.
+
+    ``contrast`` is the standard deviation of the brightness. No wavelength is below 2 pixels, so that views are sampled
+    without aliasing.
+    """
+    brightness, *chroma = _bands(np.random.default_rng(seed), coarsest)
+    variation = brightness[..., None] + CHROMA * np.stack(chroma, axis=-1)
+    return _limited(np.array(colour) + contrast * variation)
+
+
+@later
+def photograph(name: str, tint: Colour, *, seed: int) -> FloatMap:
+    """A sample image included in scikit-image, mirrored so that it repeats without a seam.
+
+    Its colours are multiplied by ``tint``; fine noise is added so that smooth parts have detail too.
+    """
+    from skimage import data
+
+    # range reduced, since clipping at black or white would leave no detail to match
+    picture = 0.12 + 0.76 * np.asarray(getattr(data, name)(), np.float64) / 255
+    if picture.ndim == 2:
+        picture = np.repeat(picture[..., None], 3, axis=-1)
+    half = PERIOD // 2
+    top, left = (picture.shape[0] - half) // 2, (picture.shape[1] - half) // 2
+    tile = picture[top : top + half, left : left + half]
+    tile = np.concatenate([tile, tile[::-1]])
+    tile = np.concatenate([tile, tile[:, ::-1]], axis=1)
+    return _limited(tile * np.array(tint) + noise(seed, (0.5, 0.5, 0.5), GRAIN, coarsest=12)() - 0.5)
+
+
+@later
+def shading(colour: Colour, amplitude: float) -> FloatMap:
+    """One colour with brightness varying only over hundreds of pixels: too smooth to estimate depth."""
+    phase = 2 * np.pi * np.arange(PERIOD) / PERIOD
+    wave = 0.5 * amplitude * (np.sin(phase)[:, None] + np.sin(phase)[None, :])
+    return _limited(np.array(colour) + wave[..., None])
+
+
+def _bands(rng: np.random.Generator, coarsest: float) -> npt.NDArray[np.float64]:
+    """Four independent fields of unit variance, shape (4, PERIOD, PERIOD)."""
+    white = rng.standard_normal((4, PERIOD, PERIOD))
+    from scipy import fft
+
+    frequency = np.hypot(fft.fftfreq(PERIOD)[:, None], fft.rfftfreq(PERIOD)[None, :])
+    # amplitude 1/f gives equal energy per octave; smooth flanks avoid ripples
+    with np.errstate(divide="ignore"):
+        amplitude = np.where(frequency > 0, 1 / frequency, 0)
+    amplitude *= np.exp(-((frequency * FINEST) ** 8)) * (1 - np.exp(-((frequency * coarsest) ** 4)))
+    fields = fft.irfft2(fft.rfft2(white) * amplitude, s=(PERIOD, PERIOD))
+    normalised: npt.NDArray[np.float64] = fields / fields.std(axis=(1, 2), keepdims=True)
+    return normalised
+
+
+def _limited(values: npt.NDArray[np.float64]) -> FloatMap:
+    """Values limited to slightly inside 0..1, so that their spline stays within 0..1."""
+    return np.clip(values, 0.02, 0.98).astype(np.float32)
 
 
 class Scene(NamedTuple):

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from sepi.errors import SepiError
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.files import atomic_folder
 from sepi.io.images import Pixels, write_png
-from sepi.io.pfm import write_pfm
 from sepi.lightfield import FloatMap, LightField, require_light_field
 from sepi.validation import require_path
 

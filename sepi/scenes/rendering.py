@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from sepi.kernels import rendering as kernels
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.scenes.surfaces import Surface
+from sepi.scenes.definitions import Surface
 
 # Sub-samples per pixel and direction.
 SAMPLES = 4

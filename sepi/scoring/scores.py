@@ -22,8 +22,8 @@ import numpy as np
 from sepi.errors import SepiError
 from sepi.io.scores import AllScores, Scores
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
-from sepi.scoring.edges import Edges, edges_of, fattening_and_thinning
 from sepi.scoring.error_bars import ErrorBars
+from sepi.scoring.regions import Edges, edges_of, fattening_and_thinning, occluded, textureless
 from sepi.validation import described, is_finite, require_map, require_type
 
 PROTOCOLS: dict[str, int] = {"paper": 0, "benchmark": 15}
@@ -40,7 +40,7 @@ SCORES: dict[str, str] = {
 """Score to its name in tables."""
 
 EDGE_SCORES: dict[str, str] = {"fattening": "fattening %", "thinning": "thinning %"}
-"""Score at depth discontinuities (:mod:`sepi.scoring.edges`) to its name in tables."""
+"""Score at depth discontinuities (:mod:`sepi.scoring.regions`) to its name in tables."""
 
 OWN_BAD_PIXEL = "badpix_"
 """Prefix of the scores for a user's thresholds."""
@@ -113,8 +113,8 @@ def score(
         ``mse100``: 100 x mean squared error over finite estimates; ``q25``: the 25th percentile of 100 x absolute
         error, not interpolated; ``badpix007``, ``badpix003``, ``badpix001``: percentage of pixels with a larger error
         than 0.07, 0.03, 0.01, including non-finite estimates; ``fattening``, ``thinning``: see
-        :func:`sepi.scoring.edges.fattening_and_thinning`; ``non_finite``, ``pixels``: counts. A score over no pixels is
-        NaN. With ``bars``, also :data:`sepi.scoring.error_bars.ERROR_BAR_SCORES`.
+        :func:`sepi.scoring.regions.fattening_and_thinning`; ``non_finite``, ``pixels``: counts. A score over no pixels
+        is NaN. With ``bars``, also :data:`sepi.scoring.error_bars.ERROR_BAR_SCORES`.
 
     Raises
     ------
@@ -184,7 +184,7 @@ def score_regions(
     edges : Edges, optional
         Depth discontinuities of the ground truth; computed if not given.
     within : ndarray, shape (H, W), bool, optional
-        Pixels that count in every region, such as those of a crop (:func:`sepi.scoring.crops.in_frame`); default: all.
+        Pixels that count in every region, such as a crop's (:func:`sepi.scoring.regions.in_frame`); default: all.
     thresholds : sequence of float
         See :func:`score`.
     bars : ErrorBars, optional
@@ -236,7 +236,7 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
     ----------
     light_field : LightField
         With ground truth. All of its own masks are used; ``discontinuities``, and ``occluded`` and ``textureless`` if
-        missing, are computed (:mod:`sepi.scoring.regions`, :mod:`sepi.scoring.edges`).
+        missing, are computed (:mod:`sepi.scoring.regions`).
 
     Returns
     -------
@@ -261,17 +261,13 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
     require_light_field(light_field)
     if light_field.ground_truth is None:
         raise SepiError(f"{light_field.name}: regions for evaluation need ground truth, but this scene has none")
-    names = ("occluded", "textureless")
     masks = dict(light_field.masks)
-    if not masks.keys() >= set(names):
-        from sepi.scoring import regions
-
-        if "occluded" not in masks:
-            masks["occluded"] = regions.occluded(light_field.ground_truth, light_field.baselines)
-        if "textureless" not in masks:
-            masks["textureless"] = regions.textureless(light_field.reference_view)
+    if "occluded" not in masks:
+        masks["occluded"] = occluded(light_field.ground_truth, light_field.baselines)
+    if "textureless" not in masks:
+        masks["textureless"] = textureless(light_field.reference_view)
     edges = edges_of(light_field.ground_truth).region
-    found = {name: masks[name] for name in names} | {DISCONTINUITIES: edges}
+    found = {name: masks[name] for name in ("occluded", "textureless")} | {DISCONTINUITIES: edges}
     return found | {name: masks[name] for name in sorted(masks) if name not in (WHOLE_MAP, *found)}
 
 

@@ -10,20 +10,20 @@ from contextlib import suppress
 from dataclasses import fields, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 from pydantic import Field, create_model
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES, TruthFile
 from sepi.io.readers.formats import FORMATS
-from sepi.io.readers.options import AS_GIVEN, ORDERS, Positive, ReadOptions
+from sepi.io.readers.options import AS_GIVEN, ORDERS, ReadOptions
 from sepi.io.scores import ExternalSource
 from sepi.lightfield import DisparityRange
 from sepi.registry import added
 from sepi.scenes import SCENES
 from sepi.validation import require_known
-from sepi.validation.models import CheckedModel, validated
+from sepi.validation.models import CheckedModel, Positive, model_of, validated
 from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.workflow.datasets import LONGEST_NAME, Dataset, Scene, own_scene, require_plain_path, scenes_in
 from sepi.workflow.settings import Report, Settings, stage_settings
@@ -80,10 +80,7 @@ class _Own(CheckedModel):
         return None if self.truth is None else TruthFile(Path(self.truth).expanduser(), self.truth_scale)
 
 
-_HINTS = get_type_hints(ReadOptions, include_extras=True)
-OwnLightField: type[_Own] = create_model(  # type: ignore[call-overload]
-    "OwnLightField", __base__=_Own, **{field.name: (_HINTS[field.name], field.default) for field in fields(ReadOptions)}
-)
+OwnLightField: type[_Own] = model_of(ReadOptions, _Own)
 """Keys of one of the ``light_fields``, including the reading flags of ``sepi depth``."""
 
 
@@ -108,9 +105,9 @@ class _Config(CheckedModel):
     light_fields: dict[str, dict[str, Any]] = Field(
         {},
         description="Dataset 'own': light fields of any format that 'sepi depth' reads, by names that you choose, such "
-        "as {lego: {path: /data/lego, grid: [17, 17]}}. Besides path: format, grid, pattern, axes, variable, central, "
-        "order, exclude, view, row_spacing, white, images, reference, crop_of, follow_links, which are flags of "
-        "'sepi depth'; truth, a ground truth file, and truth_scale, pixels per view step per unit of its values "
+        "as {lego: {path: /data/lego, grid: [17, 17]}}. Besides path: format, "
+        f"{', '.join(option.name for option in fields(ReadOptions))}, which are flags of 'sepi depth'; truth, a "
+        "ground truth file, and truth_scale, pixels per view step per unit of its values "
         "(docs/reproduce/real_truth.md).",
     )
     external: dict[str, dict[str, Any]] = Field(

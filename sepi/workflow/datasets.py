@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, ClassVar
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import TruthFile
 from sepi.io.images import SUFFIXES
-from sepi.io.readers import exported, hci, hci_2013
+from sepi.io.readers import exported, hci
 from sepi.io.readers.formats import Format, format_of, size_of
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import view_files
@@ -107,7 +107,7 @@ class Scene:
         if self.module is not None:
             return self.module
         # ingest reports an unknown format
-        return format_of.__module__ if self._format is None else self._format.reader.__name__
+        return format_of.__module__ if self._format is None else self._format.read.__module__
 
     @property
     def truth(self) -> tuple[Path, ...]:
@@ -267,10 +267,10 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str, truth
     # ingest reports an unknown format
     with suppress(SepiError):
         known = format_of(source, word)
-    if known is not None and hasattr(known.reader, "files_of"):
+    if known is not None and known.files_of is not None:
         given = dict(pairwise(flags))
         options = ReadOptions(images=given.get("--images"), crop_of=given.get("--crop-of"))
-        read, pictures = known.reader.files_of(source, options)
+        read, pictures = known.files_of(source, options)
         return Scene("own", name, source, tuple(read), *size_of(pictures), flags=flags, own_truth=truth)
     inside = [path for path in view_files(source) if path.is_file()] if source.is_dir() else [source]
     files = tuple(path for path in inside if not path.name.startswith("."))
@@ -311,7 +311,7 @@ def _archive_scenes(path: Path, depth: int = _DEPTH + 1) -> Iterator[Scene]:
         for inner in sorted(path.iterdir()):
             if not inner.name.startswith("."):
                 yield from _archive_scenes(inner, depth - 1)
-    elif hci_2013.matches(path):
+    elif hci.matches_2013(path):
         name = path.parent.name if path.stem.lower() == "lf" else path.stem
         yield Scene("hci_2013", name, path, (path,), *size_of((path,)))
 
@@ -319,5 +319,5 @@ def _archive_scenes(path: Path, depth: int = _DEPTH + 1) -> Iterator[Scene]:
 # dataset to the function that finds its scenes below a folder, and the kind of files that it expects
 _FINDERS: dict[str, tuple[Callable[[Path], Iterator[Scene]], str]] = {
     "hci": (_benchmark_scenes, f"folders with {VIEW_PATTERN}"),
-    "hci_2013": (_archive_scenes, f"HDF5 files with a dataset {hci_2013.VIEWS}"),
+    "hci_2013": (_archive_scenes, f"HDF5 files with a dataset {hci.VIEWS_2013}"),
 }

@@ -12,12 +12,11 @@ from typing import Any
 from pydantic import Field
 
 from sepi.errors import SepiError
-from sepi.io.readers.options import Index
 from sepi.io.scores import ExternalSource
 from sepi.registry import added
 from sepi.stage import Parameters
 from sepi.validation import require_known
-from sepi.validation.models import CheckedModel, validated
+from sepi.validation.models import CheckedModel, Index, validated
 from sepi.variants import STAGES, VARIANTS, Variant
 from sepi.workflow.datasets import Dataset, Scene
 from sepi.workflow.result_paths import RESULTS

@@ -22,8 +22,8 @@ from several_threads import SEVERAL, threads
 import sepi
 from sepi import ingest, initial
 from sepi.cli.main import main
+from sepi.io.disparity_maps import read_pfm, write_pfm
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
-from sepi.io.pfm import read_pfm, write_pfm
 from sepi.io.result_files import RESULT_FILES
 from sepi.lightfield import LightField
 from sepi.process.command import stage_command

@@ -10,9 +10,9 @@ from error_lines import done
 
 from sepi.cli.evaluate import NO_INTERVAL
 from sepi.io.all_views import write_all_views
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import write_png
-from sepi.io.pfm import write_pfm
 from sepi.io.provenance import origin_attributes
 from sepi.io.result_folder import write_result
 from sepi.scenes import render

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from error_lines import call, done, error_of
 
-from sepi.io.pfm import write_pfm
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.readers.options import ReadOptions
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
 from sepi.scenes import render, write_hci
-from sepi.scoring.crops import in_frame
+from sepi.scoring.regions import in_frame
 from sepi.scoring.scores import PROTOCOLS, region_masks, score, score_regions
 from sepi.stage import StageMaps
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from error_lines import call, error_of
 
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import write_png
-from sepi.io.pfm import write_pfm
 from sepi.io.result_folder import write_result
 from sepi.io.scores import without_nan
 from sepi.lightfield import LightField

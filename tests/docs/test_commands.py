@@ -29,7 +29,7 @@ from snakemake.cli import get_argument_parser, parse_config
 from workflow_copy import Workflow
 
 from sepi.cli.main import main
-from sepi.io.pfm import write_pfm
+from sepi.io.disparity_maps import write_pfm
 from sepi.lightfield import DisparityRange, LightField
 from sepi.process.command import SepiCommand
 from sepi.scenes import render, write_hci

@@ -73,13 +73,11 @@ def test_crosses_are_recognised(numbers: np.ndarray, name: str) -> None:
     assert not found.views[~found.present].any()
 
 
-def test_a_disc_is_recognised() -> None:
-    whole = LightField(render("curved_occluders", size=64).views[1:8, 1:8], "whole")
-    t, s = np.mgrid[-3:4, -3:4]
-    disc = t**2 + s**2 <= 10
-    found = arrange(LightField(whole.views[disc][None], "disc", arranged=False), ReadOptions())
-    np.testing.assert_array_equal(found.present, disc)
-    np.testing.assert_array_equal(found.views[disc], whole.views[disc])
+def test_missing_views_of_a_sequence_stay_missing() -> None:
+    present = np.ones((1, 25), bool)
+    present[0, [3, 17]] = False
+    found = arrange(LightField(sequence(GRID).views, "holes", present=present, arranged=False), ReadOptions())
+    np.testing.assert_array_equal(found.present.ravel(), present[0])
 
 
 def test_options_speak_of_the_grid() -> None:

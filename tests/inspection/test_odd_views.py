@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from sepi.inspection.odd_views import odd_views
+from sepi.inspection.view_order import odd_views
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field

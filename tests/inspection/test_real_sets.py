@@ -15,7 +15,7 @@ import pytest
 from sepi.errors import SepiWarning
 from sepi.inspection.disparity_range import estimate_range, unmatched
 from sepi.inspection.view_order import check_order
-from sepi.io.pfm import read_pfm
+from sepi.io.disparity_maps import read_pfm
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from real_scenes import views_of
 
-from sepi.inspection.row_spacing import estimate_row_spacing, settle_row_spacing
+from sepi.inspection.arrangement import estimate_row_spacing, settle_row_spacing
 from sepi.inspection.view_layouts import Views
 from sepi.inspection.view_order import check_order
 from sepi.io.readers.options import ORDERS

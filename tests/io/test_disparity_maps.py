@@ -10,8 +10,7 @@ import tifffile
 from PIL import Image, PngImagePlugin
 
 from sepi.errors import SepiError
-from sepi.io.disparity_maps import SUFFIXES, TruthFile, is_disparity, read_disparity
-from sepi.io.pfm import write_pfm
+from sepi.io.disparity_maps import SUFFIXES, TruthFile, is_disparity, read_disparity, write_pfm
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
 from sepi.stage import StageMaps

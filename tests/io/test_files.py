@@ -14,9 +14,9 @@ import pytest
 
 from sepi.errors import SepiError, SepiWarning
 from sepi.io import files
+from sepi.io.disparity_maps import read_pfm
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.hdf5 import create_hdf5, open_hdf5
-from sepi.io.pfm import read_pfm
 
 SOURCE = Path(__file__).parents[2]
 
@@ -142,7 +142,7 @@ from pathlib import Path
 import numpy as np
 from sepi.errors import SepiError
 from sepi.io.hdf5 import create_hdf5
-from sepi.io.pfm import write_pfm
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.images import write_png
 
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -15,9 +15,8 @@ from click.testing import CliRunner, Result
 from sepi import variants as built_in
 from sepi.evaluate import evaluation_of, evaluations_of
 from sepi.external import NO_FILE
-from sepi.io.hdf5 import read_stage, write_light_field, write_stage
+from sepi.io.hdf5 import read_stage, write_light_field, write_stage, write_truth
 from sepi.io.scores import Evaluation, ExternalMap, map_name, write_external, write_scores
-from sepi.io.truth import write_truth
 from sepi.lightfield import DisparityRange, LightField
 from sepi.report import numbers, tables
 from sepi.report.plan import Plan

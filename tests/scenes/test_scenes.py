@@ -15,13 +15,22 @@ from scipy import ndimage
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
-from sepi.scenes import SCENES, definitions, rendering, textures, write_hci
-from sepi.scenes.definitions import DEFINITIONS
+from sepi.scenes import SCENES, definitions, rendering, write_hci
+from sepi.scenes.definitions import (
+    DEFINITIONS,
+    PERIOD,
+    Plane,
+    Surface,
+    blob,
+    everywhere,
+    noise,
+    photograph,
+    rectangle,
+    shading,
+)
 
 # as it is drawn: the tests' other modules have it from a file
 from sepi.scenes.light_field import render, scene_truth, true_disparity
-from sepi.scenes.surfaces import Plane, Surface, blob, everywhere, rectangle
-from sepi.scenes.textures import PERIOD, noise, photograph, shading
 
 SIZE, VIEWS = 96, 5
 
@@ -30,7 +39,7 @@ SIZE, VIEWS = 96, 5
 def small_textures() -> Iterator[None]:
     """Textures that repeat after 128 texels: most of the time of a small picture goes into them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(textures, "PERIOD", 128)
+        patch.setattr(definitions, "PERIOD", 128)
         yield
 
 
@@ -38,7 +47,7 @@ def small_textures() -> Iterator[None]:
 @small_textures()
 def small_textured(name: str, *, period: int, **given: Any) -> LightField:
     """A scene with small textures, which its name in the tests' files has to tell."""
-    assert period == textures.PERIOD
+    assert period == definitions.PERIOD
     return render(name, **given)
 
 
@@ -261,11 +270,11 @@ def test_bad_arguments_are_named(arguments: dict, message: str) -> None:
 
 def test_textures_repeat_without_a_seam_and_keep_their_mean() -> None:
     """A seam would be an edge that no surface has."""
-    for texture in (noise(5, (0.3, 0.5, 0.6), 0.12), photograph("brick", (1.0, 0.9, 0.8), seed=2)):
+    for texture in (noise(5, (0.3, 0.5, 0.6), 0.12)(), photograph("brick", (1.0, 0.9, 0.8), seed=2)()):
         assert texture.shape == (PERIOD, PERIOD, 3)
         inside = np.abs(np.diff(texture, axis=0)).mean()
         assert np.abs(texture[0] - texture[-1]).mean() < 1.5 * inside
-    np.testing.assert_allclose(noise(5, (0.3, 0.5, 0.6), 0.12).mean(axis=(0, 1)), (0.3, 0.5, 0.6), atol=0.01)
+    np.testing.assert_allclose(noise(5, (0.3, 0.5, 0.6), 0.12)().mean(axis=(0, 1)), (0.3, 0.5, 0.6), atol=0.01)
 
 
 def test_hole_shows_what_is_behind() -> None:

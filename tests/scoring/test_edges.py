@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sepi.io.pfm import read_pfm
+from sepi.io.disparity_maps import read_pfm
 from sepi.io.scores import Scores
 from sepi.report.scores import edge_budget
-from sepi.scoring.edges import LEAST_DISCONTINUITY, REACH, edges_of, fattening_and_thinning
+from sepi.scoring.regions import LEAST_DISCONTINUITY, REACH, edges_of, fattening_and_thinning
 from sepi.scoring.scores import score
 
 SQUARE = np.zeros((30, 40), np.float32)

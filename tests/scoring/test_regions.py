@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from geometries import GEOMETRIES, grid_baselines, standing
 
-from sepi.io.pfm import read_pfm
+from sepi.io.disparity_maps import read_pfm
 from sepi.lightfield import LightField
 from sepi.scoring.regions import MIN_AREA, occluded, textureless
 

@@ -109,11 +109,11 @@ def test_every_version_of_python_gives_the_same(tree: Path) -> None:
 
 def test_a_light_field_is_read_again_for_its_own_reader_alone() -> None:
     """A word in another format's reader must not cost all maps."""
-    readers = {known.reader.__name__ for known in FORMATS.values()} - {FORMATS["sepi"].reader.__name__}
+    readers = {known.read.__module__ for known in FORMATS.values()} - {FORMATS["sepi"].read.__module__}
     for reader in (*readers, "sepi.scenes"):
         assert {reader, "sepi.io.hdf5"} <= imported_modules(*ingest_modules(reader))
-    numpy_files = "sepi.io.readers.numpy_files"
-    assert not imported_modules(*ingest_modules(numpy_files)) & (readers - {numpy_files})
+    arrays = "sepi.io.readers.array_files"
+    assert not imported_modules(*ingest_modules(arrays)) & (readers - {arrays})
     assert not any(name.startswith("sepi.scenes") for name in imported_modules("sepi.ingest"))
 
 

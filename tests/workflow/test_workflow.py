@@ -36,9 +36,9 @@ from workflow_copy import (
     wait_for,
 )
 
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import read_attributes, read_stage
 from sepi.io.images import write_png
-from sepi.io.pfm import write_pfm
 from sepi.io.result_folder import read_result
 from sepi.io.scores import Evaluation, read_scores, write_scores
 from sepi.pipeline import estimate_depth

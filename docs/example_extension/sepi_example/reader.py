@@ -8,8 +8,6 @@ from sepi.io.readers.formats import Format
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
-FORMAT = Format("raw views", "NAME.views", __name__)
-
 
 def matches(path: Path) -> bool:
     """Whether this is such a file."""
@@ -19,3 +17,6 @@ def matches(path: Path) -> bool:
 def read(path: Path, options: ReadOptions) -> LightField:
     """The light field in the file."""
     return LightField(np.fromfile(path, np.uint8).reshape(3, 3, 64, 64, 3), path.stem)
+
+
+FORMATS = {"raw-views": Format("raw views", "NAME.views", matches, read)}

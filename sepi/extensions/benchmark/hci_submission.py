@@ -28,8 +28,8 @@ import click
 import numpy as np
 
 from sepi.errors import SepiError
+from sepi.io.disparity_maps import read_pfm
 from sepi.io.files import atomic_path
-from sepi.io.pfm import read_pfm
 from sepi.io.result_files import RUNTIME
 from sepi.io.result_folder import read_result
 from sepi.process.command import SepiCommand
@@ -131,7 +131,7 @@ def write_submission(path: str | Path, entries: Mapping[str, Entry], *, partial:
     >>> from pathlib import Path
     >>> from zipfile import ZipFile
     >>> import numpy as np
-    >>> from sepi.io.pfm import write_pfm
+    >>> from sepi.io.disparity_maps import write_pfm
     >>> from sepi.extensions.benchmark.hci_submission import Entry, write_submission
     >>> write_pfm(Path("disparity.pfm"), np.zeros((512, 512), np.float32))
     >>> write_submission(Path("submission.zip"), {"cotton": Entry(Path("disparity.pfm"), 7.7)}, partial=True)
@@ -183,7 +183,7 @@ def problems_of(path: str | Path, *, partial: bool = False) -> list[str]:
 
     >>> from pathlib import Path
     >>> import numpy as np
-    >>> from sepi.io.pfm import write_pfm
+    >>> from sepi.io.disparity_maps import write_pfm
     >>> from sepi.extensions.benchmark.hci_submission import problems_of
     >>> write_pfm(Path("mine/disp_maps/dino.pfm"), np.zeros((384, 512), np.float32))
     >>> for problem in problems_of(Path("mine"), partial=True):

@@ -54,8 +54,7 @@ import numpy.typing as npt
 from sepi.camera.rig import WORLD
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.images import write_png
-from sepi.io.ply import write_ply
-from sepi.io.point_cloud import PointCloud
+from sepi.io.point_cloud import PointCloud, write_ply
 from sepi.lightfield import FloatMap
 from sepi.stage import Progress, no_progress
 

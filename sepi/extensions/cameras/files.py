@@ -239,7 +239,7 @@ def _points(path: Path, told: Mapping[str, Any]) -> Floats:
     name = told.get("ply_file_path")
     if not isinstance(name, str) or Path(name).is_absolute() or ".." in Path(name).parts:
         return np.zeros((0, 3))
-    from sepi.io.ply import read_positions
+    from sepi.io.point_cloud import read_positions
 
     file = path.parent / name
     return read_positions(file) if file.is_file() else np.zeros((0, 3))

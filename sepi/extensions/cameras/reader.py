@@ -19,15 +19,6 @@ if TYPE_CHECKING:
     from sepi.camera import Part
     from sepi.extensions.cameras.model import CameraModel
 
-
-FORMAT = Format(
-    "calibrated cameras",
-    "COLMAP model, transforms.json, cameras.csv or cameras.yaml",
-    __name__,
-    ("images", "reference"),
-    scales=False,
-)
-
 # distance of cameras from their plane, in view steps, beyond which rectification needs the depth of the scene
 _FLAT = 1e-3
 
@@ -80,6 +71,20 @@ def files_of(path: Path, options: ReadOptions) -> tuple[Sequence[Path], Sequence
     assert found is not None
     model = read_model(path, options.images, options.part)
     return (*described_by(found), *model.files), [picture.file for picture in model.pictures]
+
+
+FORMATS = {
+    "cameras": Format(
+        "calibrated cameras",
+        "COLMAP model, transforms.json, cameras.csv or cameras.yaml",
+        matches,
+        read,
+        ("images", "reference"),
+        scales=False,
+        files_of=files_of,
+        with_depths=with_depths,
+    )
+}
 
 
 def read_cameras(

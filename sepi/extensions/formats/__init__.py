@@ -2,10 +2,4 @@
 
 from sepi.registry import Extension
 
-EXTENSION = Extension(
-    readers={
-        "mosaic": f"{__name__}.mosaic",
-        "tiff-stack": f"{__name__}.tiff_stack",
-        "openlf": f"{__name__}.open_lf",
-    }
-)
+EXTENSION = Extension(readers=dict.fromkeys(("mosaic", "tiff-stack", "openlf"), f"{__name__}.readers"))

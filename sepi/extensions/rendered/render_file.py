@@ -26,8 +26,7 @@ from sepi.extensions.rendered.world import FloatArray, Pattern, Thing
 from sepi.io.hdf5 import attribute, create_hdf5, fixed_text, open_hdf5, read_dataset
 from sepi.kernels import reprojection as kernels
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.scoring.edges import edges_of
-from sepi.scoring.regions import textureless
+from sepi.scoring.regions import edges_of, textureless
 
 MASKS = ("textured", "textureless", "glossy", "mirror", "glass", "thin", "discontinuities", "occluded", "alone")
 """Names of the masks.

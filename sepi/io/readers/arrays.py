@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.readers.camera_positions import reordered
-from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers, position_of, unarranged
+from sepi.io.readers.options import ReadOptions, unarranged
+from sepi.io.readers.view_grid import Numbers, arrange_numbers, position_of
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
 
 # integer types that values of other types may stand for, and the least maximum of floats that are not whole numbers:
@@ -147,10 +148,10 @@ class UnclearAxesError(SepiError):
 
     def __init__(self, source: str, shape: tuple[int, ...], readings: Sequence[str]) -> None:
         self.readings = tuple(readings)
-        example = readings[0] if readings else "TSHWC" if len(shape) == _MOST_AXES else "TSHW"
+        likely = readings or ["TSHWC" if len(shape) == _MOST_AXES else "TSHW"]
         super().__init__(
             f"{source}: the shape {shape} does not tell which axis is which; say it with --axes, such as "
-            f"{' or '.join(f'--axes {letters}' for letters in readings or [example])} ({_AXES_HELP})"
+            f"{' or '.join(f'--axes {letters}' for letters in likely)} ({_AXES_HELP})"
         )
 
 
@@ -183,8 +184,8 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     UnclearAxesError
         If several orders of the axes are equally likely.
     SepiError
-        If the axes cannot be told apart or contradict the options, the values are of another type or range, or a view
-        that is not excluded holds values that are not finite.
+        If the axes contradict the options, the values are of another type or range, or a view that is not excluded
+        holds values that are not finite.
     """
     source = str(path)
     if array.dtype.kind not in "iuf" or array.dtype.itemsize > 8:

@@ -1,4 +1,4 @@
-"""A light field as a folder of images, with its properties in ``light_field.json``.
+"""A light field as it is exported: a folder of images with its properties in ``light_field.json``, or an HDF5 file.
 
 Views are PNG of 8 or 16 bit, or TIFF of floats, so nothing is lost. ``light_field.json`` gives the file of each place
 in the grid; the names and other files do not matter. ``sepi export`` writes such folders, and other programs may.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import re
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +18,15 @@ from pydantic import BaseModel
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
+from sepi.io.codecs import write_tiff
+from sepi.io.disparity_maps import read_pfm, write_pfm
 from sepi.io.files import atomic_path, filled_folder, naming, reading, remove_files
-from sepi.io.hdf5 import write_light_field
+from sepi.io.hdf5 import has_dataset, is_own, read_light_field, write_light_field
 from sepi.io.images import SUFFIXES, read_picture, write_png
-from sepi.io.pfm import read_pfm, write_pfm
 from sepi.io.readers.arrays import rearrange
 from sepi.io.readers.options import ReadOptions, in_grid, unarranged
 from sepi.io.readers.view_files import read_grid
 from sepi.io.result_files import require_target
-from sepi.io.tiff import write_tiff
 from sepi.lightfield import BoolMap, DisparityRange, LightField
 from sepi.validation.models import validated
 
@@ -230,3 +231,14 @@ def _earlier_files(folder: Path) -> set[str]:
         views = {name for row in known.views for name in row if name is not None and _VIEW.fullmatch(name)}
         return {*views, *masks, *([_TRUTH] if known.ground_truth == _TRUTH else [])}
     return set()
+
+
+def matches_own(path: Path) -> bool:
+    """Whether ``path`` is a light field of this package, or an HDF5 file too damaged to tell."""
+    return has_dataset(path, "views", is_own, if_damaged=True)
+
+
+def read_own(path: Path, options: ReadOptions) -> LightField:
+    """Light field as it was written, with its views arranged as the options ask."""
+    light_field = read_light_field(path)
+    return rearrange(light_field if light_field.source else replace(light_field, source=str(path)), options)

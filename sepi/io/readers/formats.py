@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
-from types import ModuleType
 from typing import NamedTuple
 
 import h5py
@@ -19,12 +18,12 @@ from sepi.io.disparity_maps import is_disparity
 from sepi.io.files import DEFLATE_RATIO, naming
 from sepi.io.hdf5 import has_dataset
 from sepi.io.images import SUFFIXES, picture_header
-from sepi.io.readers import eslf, matlab, numpy_files
-from sepi.io.readers.arrays import is_likely, with_white
-from sepi.io.readers.named_arrays import Shapes, hdf5_shapes, no_light_field
+from sepi.io.readers import array_files, eslf, exported, hci, image_folder, matlab
+from sepi.io.readers.array_files import Shapes, hdf5_shapes, no_light_field
+from sepi.io.readers.arrays import is_likely, readings, with_white
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import has_rows
-from sepi.lightfield import LightField, Truth
+from sepi.lightfield import DisparityRange, LightField, Truth
 from sepi.registry import Known
 from sepi.validation import require_known
 
@@ -36,36 +35,41 @@ class Format(NamedTuple):
     ----------
     name, description : str
         For messages.
-    module : str
-        Name of a module. Its ``matches(path)`` quickly says whether a path looks like this format, and never raises;
-        ``read(path, options)`` reads a light field. It may also have ``read_views``, which reads no ground truth and
-        masks, ``read_truth``, which reads only these, ``truth_files(path)``, which lists their files, ``size_of(path)``
-        (views, height, width, bytes of a pixel), ``files_of(path, options)`` (files that are read, and pictures of the
-        size of a view), and ``with_depths``, for cameras that need the depth of the scene.
+    matches : callable
+        Whether a path looks like this format; quick, and never raises.
+    read : callable
+        Light field of a path and :class:`ReadOptions`.
     options : tuple of str
-        Fields of :class:`ReadOptions` that not all formats use, and this one does.
+        Options that the format uses, of those that not every one does.
     scales : bool
         Whether it reads values of any scale, and uses the option ``white``.
     loose : bool
         Whether it also matches what another format describes better; formats of extensions are asked before.
+    read_views, read_truth : callable, optional
+        Light field without ground truth and masks, and these alone; default: both come from ``read``.
+    truth_files : callable
+        Files of a path with ground truth and masks.
+    size_of : callable, optional
+        Number of views, height, width and bytes of a pixel at a path.
+    files_of : callable, optional
+        Files that are read of a path with options, and pictures of the size of a view.
+    with_depths : callable, optional
+        The light field, read again if its cameras need the depth of the scene, which is given or found.
     """
 
     name: str
     description: str
-    module: str
+    matches: Callable[[Path], bool]
+    read: Callable[[Path, ReadOptions], LightField]
     options: tuple[str, ...] = ()
     scales: bool = True
     loose: bool = False
-
-    @property
-    def reader(self) -> ModuleType:
-        """Module of the format."""
-        return import_module(self.module)
-
-    def truth_files(self, path: Path) -> Sequence[Path]:
-        """Files with ground truth and masks."""
-        files: Sequence[Path] = self.reader.truth_files(path) if hasattr(self.reader, "truth_files") else ()
-        return files
+    read_views: Callable[[Path, ReadOptions], LightField] | None = None
+    read_truth: Callable[[Path, ReadOptions], Truth] | None = None
+    truth_files: Callable[[Path], Sequence[Path]] = lambda _: ()
+    size_of: Callable[[Path], tuple[int, int, int, int]] | None = None
+    files_of: Callable[[Path, ReadOptions], tuple[Sequence[Path], Sequence[Path]]] | None = None
+    with_depths: Callable[[Path, LightField, ReadOptions, DisparityRange | None], LightField] | None = None
 
 
 # most light fields that a message names
@@ -79,35 +83,74 @@ _ARRAY_OPTIONS = ("grid", "axes", "variable")
 # options that only some formats use
 _SOME = ("grid", "pattern", "axes", "variable", "images", "reference", "follow_links")
 
-_HERE = "sepi.io.readers"
+
+def _itself(path: Path) -> tuple[Path]:
+    """The file itself, which may hold ground truth and masks."""
+    return (path,)
+
+
 _OWN = {
     # before other folders: its images may have any names
-    "exported": Format("exported folder", "written by 'sepi export'", f"{_HERE}.exported", ("follow_links",)),
-    "hci": Format("HCI folder", "input_Cam000.png, ...", f"{_HERE}.hci", ("grid", "follow_links")),
+    "exported": Format(
+        "exported folder",
+        "written by 'sepi export'",
+        exported.matches,
+        exported.read,
+        ("follow_links",),
+        truth_files=exported.truth_files,
+    ),
+    "hci": Format(
+        "HCI folder",
+        "input_Cam000.png, ...",
+        hci.matches,
+        hci.read,
+        ("grid", "follow_links"),
+        read_views=hci.read_views,
+        read_truth=hci.read_truth,
+        truth_files=hci.truth_files,
+    ),
     "images": Format(
         "folder of views",
         "a numbered image for each",
-        f"{_HERE}.image_folder",
+        image_folder.matches,
+        image_folder.read,
         ("grid", "pattern", "follow_links"),
         loose=True,
     ),
-    "eslf": Format("Lytro lenslet image", "NAME_eslf.png", f"{_HERE}.eslf", ("grid",)),
+    "eslf": Format("Lytro lenslet image", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",)),
     # before other kinds of HDF5: MATLAB's has a header or suffix of its own
-    "matlab": Format("MATLAB file", ".mat with an array such as LF", f"{_HERE}.matlab", _ARRAY_OPTIONS),
-    "numpy": Format("NumPy file", ".npy or .npz", f"{_HERE}.numpy_files", _ARRAY_OPTIONS),
-    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", f"{_HERE}.hci_2013"),
+    "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS),
+    "numpy": Format("NumPy file", ".npy or .npz", array_files.matches_numpy, array_files.read_numpy, _ARRAY_OPTIONS),
+    "hci-2013": Format(
+        "HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci.matches_2013, hci.read_2013, truth_files=_itself
+    ),
     # after the kinds whose arrays have fixed names
-    "hdf5": Format("HDF5 file", "with an array of all views", f"{_HERE}.hdf5_arrays", _ARRAY_OPTIONS, loose=True),
+    "hdf5": Format(
+        "HDF5 file",
+        "with an array of all views",
+        array_files.matches_hdf5,
+        array_files.read_hdf5,
+        _ARRAY_OPTIONS,
+        loose=True,
+    ),
     # last, since it takes files too damaged to tell
-    "sepi": Format("sepi HDF5", "written by this package", f"{_HERE}.own_files", scales=False, loose=True),
+    "sepi": Format(
+        "sepi HDF5",
+        "written by this package",
+        exported.matches_own,
+        exported.read_own,
+        scales=False,
+        loose=True,
+        truth_files=_itself,
+    ),
 }
-FORMATS: Known[Format] = Known("readers", _OWN, lambda _, module: import_module(module).FORMAT)
+FORMATS: Known[Format] = Known("readers", _OWN, lambda name, module: import_module(module).FORMATS[name])
 """Word for ``--format`` to format."""
 
 
 def matching(path: Path) -> Format | None:
     """The format that a path looks like; those of extensions are asked only if no other but a loose one matches."""
-    return next((known for known in _as_asked() if known.reader.matches(path)), None)
+    return next((known for known in _as_asked() if known.matches(path)), None)
 
 
 def _as_asked() -> Iterator[Format]:
@@ -177,8 +220,9 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None, *, tr
     known = format_of(path, file_format)
     _require_used(path, known, options)
     with naming(path):
-        reader = known.reader
-        light_field: LightField = (reader.read if truth else getattr(reader, "read_views", reader.read))(path, options)
+        light_field = (
+            known.read(path, options) if truth or known.read_views is None else known.read_views(path, options)
+        )
         if not truth:
             light_field = replace(light_field, ground_truth=None, masks={})
         if options.white is not None and not known.scales:
@@ -191,12 +235,11 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None, *, tr
 def read_truth(path: Path, options: ReadOptions, file_format: str | None = None) -> Truth:
     """Ground truth and masks of the light field that :func:`read` gives with ``truth=False``."""
     known = format_of(path, file_format)
-    if not hasattr(known.reader, "read_truth"):
+    if known.read_truth is None:
         light_field = read(path, options, file_format)
         return light_field.ground_truth, light_field.masks
     with naming(path):
-        truth: Truth = known.reader.read_truth(path, options)
-        return truth
+        return known.read_truth(path, options)
 
 
 def _require_used(path: Path, known: Format, options: ReadOptions) -> None:
@@ -281,8 +324,8 @@ def size_of(files: Sequence[Path]) -> Size:
             header = picture_header(pictures[0])
             return Size(len(pictures), header.height, header.width, header.pixel_bytes)
         known = matching(files[0]) if len(files) == 1 else None
-        if known is not None and hasattr(known.reader, "size_of"):
-            return Size(*known.reader.size_of(files[0]))
+        if known is not None and known.size_of is not None:
+            return Size(*known.size_of(files[0]))
         if pictures:
             return _of_lenslets(pictures[0])
     except SepiError:
@@ -305,22 +348,24 @@ def _of_lenslets(path: Path) -> Size:
 
 
 def _of_array(shape: tuple[int, ...], itemsize: int) -> Size:
-    """Size of the views in an array of 4 or 5 axes."""
-    first, second = sorted(sorted(range(len(shape)), key=lambda axis: shape[axis])[-2:])
-    others = [size for axis, size in enumerate(shape) if axis not in (first, second)]
-    # colours are the last of 5 axes, or of 4 after a single axis of views
-    coloured = others if len(others) == 3 else others[1:] if others[0] > 4 else []
-    channels = next((size for size in reversed(coloured) if size in (3, 4)), 1)
-    return Size(max(1, math.prod(others) // channels), shape[first], shape[second], itemsize * channels)
+    """Size of the views in an array of 4 or 5 axes, in the first order of its axes that is likely."""
+    axes = (readings(shape) or ["NHWC" if len(shape) == 4 else "TSHWC"])[0]
+    size = dict(zip(axes, shape[len(shape) - len(axes) :], strict=True))
+    views = size.get("N", 1) * size.get("T", 1) * size.get("S", 1)
+    return Size(views, size["H"], size["W"], itemsize * size.get("C", 1))
 
 
 def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
     """Shape and bytes of a value of each array in a file that may be a light field, and that the file can hold."""
     shapes: Shapes = {}
     with suppress(SepiError):
-        reader = next((one for one in (numpy_files, matlab) if one.matches(path)), None)
-        # no digest check for many files: whoever reads the views checks the file
-        shapes = hdf5_shapes(path, check=False) if reader is None else reader.array_shapes(path)
+        if array_files.matches_numpy(path):
+            shapes = array_files.numpy_shapes(path)
+        elif matlab.matches(path):
+            shapes = matlab.array_shapes(path)
+        else:
+            # no digest check for many files: whoever reads the views checks the file
+            shapes = hdf5_shapes(path, check=False)
     most = path.stat().st_size * DEFLATE_RATIO
     sized = [(shape, kind.itemsize) for shape, kind in shapes.values() if is_likely(shape)]
     return [(shape, itemsize) for shape, itemsize in sized if 0 < math.prod(shape) * itemsize <= most]

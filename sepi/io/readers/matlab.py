@@ -31,8 +31,8 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import DEFLATE_RATIO, reading
+from sepi.io.readers.array_files import MATLAB_HDF5, Shapes, hdf5_array, hdf5_shapes, light_field_from_arrays
 from sepi.io.readers.arrays import Array, is_likely
-from sepi.io.readers.named_arrays import MATLAB_HDF5, Shapes, hdf5_shapes, light_field_from_arrays, read_hdf5
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
@@ -235,7 +235,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
 
     def load(name: str) -> Array:
         with reading(path, _KIND):
-            array: Array = (read_hdf5 if h5py.is_hdf5(path) else read_version_5)(path, name)
+            array: Array = (hdf5_array if h5py.is_hdf5(path) else read_version_5)(path, name)
         # restore the axes that MATLAB dropped
         while array.ndim < len(options.axes or "") <= 5:
             array = array[..., None]

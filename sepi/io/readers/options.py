@@ -22,30 +22,23 @@ Two orders of a grid of 2 x 3 views:
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from types import NoneType
-from typing import Annotated, Any
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import numpy.typing as npt
-from pydantic import Field
-
-from sepi.camera import Part
 from sepi.errors import SepiError
-from sepi.validation import described, is_finite, require_known, require_type, whole_pair
-from sepi.validation.models import AS_PAIR
 
-Numbers = npt.NDArray[np.int64]
-Map = npt.NDArray[Any]
+# the command line needs the flags alone: NumPy and pydantic are imported when an option is used
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
-Index = Annotated[int, Field(ge=0)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-_Count = Annotated[int, Field(ge=1)]
+    from sepi.camera import Part
+    from sepi.validation.models import Count, Grid, Position, Positive
 
 AS_GIVEN = "as-given"
 
-ORDERS: dict[str, Callable[[Numbers], Numbers]] = {
+ORDERS: dict[str, Callable[[npt.NDArray[np.int64]], npt.NDArray[np.int64]]] = {
     AS_GIVEN: lambda grid: grid,
     "flip-rows": lambda grid: grid[::-1],
     "flip-columns": lambda grid: grid[:, ::-1],
@@ -57,13 +50,21 @@ ORDERS: dict[str, Callable[[Numbers], Numbers]] = {
 }
 """The eight orders of a grid: functions from the given grid to the light field's."""
 
+POSITION = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*")
+"""Position of a view in text, ``T,S``."""
+
 _PART = re.compile(r"(\d{1,6})[xX](\d{1,6})\+(\d{1,6})\+(\d{1,6})")
-_POSITION = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*")
+
+
+def _option(description: str, metavar: str | None = None, default: Any = None) -> Any:
+    return field(default=default, metadata={"help": description, "metavar": metavar})
 
 
 @dataclass(frozen=True)
 class ReadOptions:
     """Options that the user gives for a light field; None or empty: the reader decides.
+
+    Flags of the command line, keys of the configuration and checks are made from this class.
 
     Attributes
     ----------
@@ -126,37 +127,40 @@ class ReadOptions:
     True
     """
 
-    grid: Annotated[tuple[_Count, _Count] | None, AS_PAIR] = None
-    pattern: str | None = None
-    axes: str | None = None
-    variable: str | None = None
-    central: _Count | None = None
-    order: str = AS_GIVEN
-    exclude: tuple[str, ...] = ()
-    view: Annotated[tuple[Index, Index] | None, AS_PAIR] = None
-    row_spacing: Positive | None = None
-    white: Positive | None = None
-    images: str | None = None
-    reference: str | None = None
-    crop_of: str | None = None
-    follow_links: bool = False
+    grid: Grid = _option("Grid of views in the files.", "ROWSxCOLUMNS")
+    pattern: str | None = _option(
+        "Names of views in a folder: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is any text."
+    )
+    axes: str | None = _option(
+        "Axes of an array in order, such as HWTSC: T S (view row, column; N for both in one), H W and C (colour)."
+    )
+    variable: str | None = _option("Name of the array in a .mat, .npz or HDF5 file with several.")
+    central: Count | None = _option("Use only the N x N views in the middle.", "N")
+    order: str = _option("Order of the views: a name that 'sepi check' prints.", default=AS_GIVEN)
+    exclude: tuple[str, ...] = _option(
+        "Leave out a view: ROW,COLUMN from 0, or a file; repeatable.", "VIEW", default=()
+    )
+    view: Position = _option("View whose depth is estimated; default: the centre view.", "ROW,COLUMN")
+    row_spacing: Positive | None = _option("Distance of rows of views in steps of columns, if they differ.", "F")
+    white: Positive | None = _option("Value of white: 1023 for 10 bits, 4095 for 12.", "W")
+    images: str | None = _option("Pictures of calibrated cameras, if not beside the model.", "FOLDER")
+    reference: str | None = _option(
+        "Picture of the calibrated camera whose depth is estimated; default: the most central one.", "PICTURE"
+    )
+    crop_of: str | None = _option(
+        "For crops: width and height of the whole picture, and column and row in it of a view's first pixel. "
+        "Sensor size and calibration are those of the whole picture.",
+        "WxH+X+Y",
+    )
+    follow_links: bool = _option("Read views that are links to files outside their folder.", default=False)
 
     def __post_init__(self) -> None:
-        for name, example in (("grid", "(5, 7)"), ("view", "(2, 3)")):
-            if (value := getattr(self, name)) is not None:
-                object.__setattr__(self, name, whole_pair(f"options: {name}", value, f"two whole numbers {example}"))
-        for name in ("pattern", "axes", "variable", "images", "reference", "crop_of"):
-            require_type(f"options: {name}", getattr(self, name), (str, NoneType), "text")
-        require_type("options: central", self.central, (int, np.integer, NoneType), "a whole number")
-        require_type("options: exclude", self.exclude, (tuple, list), 'positions and names such as ("0,0", "a.png")')
-        for view in self.exclude:
-            require_type("options: exclude", view, str, 'positions "T,S" or names of files')
-        object.__setattr__(self, "exclude", tuple(self.exclude))
-        if self.crop_of is not None and _PART.fullmatch(self.crop_of) is None:
-            raise SepiError(f"options: crop_of: expected WIDTHxHEIGHT+X+Y, got {described(self.crop_of)}")
-        for name in ("row_spacing", "white"):
-            if (number := getattr(self, name)) is not None and not (is_finite(number) and number > 0):
-                raise SepiError(f"options: {name}: expected a number above 0, got {described(number)}")
+        from sepi.validation.models import model_of, validated
+
+        if isinstance(self.crop_of, str) and self.part is None:
+            raise SepiError(f"options.crop_of: expected WIDTHxHEIGHT+X+Y, got {self.crop_of!r}")
+        for name, value in vars(validated(model_of(ReadOptions), vars(self), "options")).items():
+            object.__setattr__(self, name, value)
 
     @property
     def part(self) -> Part | None:
@@ -165,61 +169,9 @@ class ReadOptions:
         return None if found is None else (int(found[1]), int(found[2]), int(found[3]), int(found[4]))
 
 
-def cut_like_views(values: Map, shape: tuple[int, int], part: Part | None) -> Map:
-    """Map of the whole image, cropped like views of this ``shape`` (:attr:`ReadOptions.part`).
-
-    A map that does not have the size of the whole image stays unchanged.
-    """
-    if part is None or values.shape == shape or values.shape != part[1::-1]:
-        return values
-    left, top = part[2:]
-    return values[top : top + shape[0], left : left + shape[1]]
-
-
-def arrange_numbers(
-    source: str, grid: tuple[int, int], options: ReadOptions, names: Mapping[str, int] | None = None
-) -> Numbers:
-    """Number in the given grid of the view at each position of the light field's grid.
-
-    Parameters
-    ----------
-    source : str
-        Path, for messages.
-    grid : (int, int)
-        Rows and columns ``(T, S)`` of the given grid.
-    options : ReadOptions
-    names : mapping of str to int, optional
-        Number ``t * S + s`` of each file, for views excluded by name; -1 for files that are not views.
-
-    Returns
-    -------
-    ndarray, int64
-        Number ``t * S + s`` in the given grid; -1 for excluded views.
-
-    Raises
-    ------
-    SepiError
-        If ``central``, ``order``, ``exclude`` or ``view`` does not fit the grid.
-    """
-    T, S = grid
-    require_known("order", [options.order], ORDERS)
-    numbers, side = np.arange(T * S).reshape(T, S), options.central
-    if side is not None:
-        # around the centre view of the light field; an even grid has one more row before it than after it
-        top, left = T // 2 - side // 2, S // 2 - side // 2
-        if side < 1 or side % 2 == 0 or top < 0 or left < 0 or top + side > T or left + side > S:
-            raise SepiError(f"{source}: the central {side}x{side} views of {T}x{S}; expected an odd number that fits")
-        numbers = numbers[top : top + side, left : left + side]
-    numbers = ORDERS[options.order](numbers)
-    if options.view is not None:
-        _require_inside(source, numbers, options.view)
-    excluded = [_excluded(source, view, numbers, names or {}) for view in options.exclude]
-    return np.where(np.isin(numbers, excluded), -1, numbers)
-
-
 def is_position(view: str) -> bool:
     """Whether a view to exclude is named by its position."""
-    return _POSITION.fullmatch(view) is not None
+    return POSITION.fullmatch(view) is not None
 
 
 def unarranged(options: ReadOptions) -> ReadOptions:
@@ -231,27 +183,3 @@ def unarranged(options: ReadOptions) -> ReadOptions:
 def in_grid(options: ReadOptions) -> ReadOptions:
     """Options that still apply once the grid is found: files were excluded before."""
     return replace(options, exclude=tuple(filter(is_position, options.exclude)))
-
-
-def position_of(numbers: Numbers, number: int) -> tuple[int, int] | None:
-    """Position ``(t, s)`` of a view of the given grid; None if it was left out."""
-    positions = np.argwhere(numbers == number)
-    return (int(positions[0][0]), int(positions[0][1])) if len(positions) else None
-
-
-def _excluded(source: str, view: str, numbers: Numbers, names: Mapping[str, int]) -> int:
-    match = _POSITION.fullmatch(view)
-    if match is not None:
-        position = int(match[1]), int(match[2])
-        _require_inside(source, numbers, position)
-        return int(numbers[position])
-    if view not in names:
-        found = f" (found: {', '.join(sorted(names)[:3])}, ...)" if names else ""
-        raise SepiError(f"{source}: --exclude {view}: expected a position ROW,COLUMN or the file of a view{found}")
-    return names[view]
-
-
-def _require_inside(source: str, numbers: Numbers, position: tuple[int, int]) -> None:
-    T, S = numbers.shape
-    if not (0 <= position[0] < T and 0 <= position[1] < S):
-        raise SepiError(f"{source}: view {position[0]},{position[1]} lies outside the grid of {T}x{S}, counted from 0")

@@ -17,9 +17,9 @@ from sepi.errors import SepiError
 from sepi.io.files import reading
 from sepi.io.images import SUFFIXES, read_views
 from sepi.io.readers.arrays import Array, with_white
-from sepi.io.readers.name_groups import CAMERAS, Kind
-from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers
-from sepi.io.readers.view_names import infer_view_numbers, pair_view_numbers
+from sepi.io.readers.options import ReadOptions
+from sepi.io.readers.view_grid import Numbers, arrange_numbers
+from sepi.io.readers.view_names import CAMERAS, infer_view_numbers, pair_view_numbers
 from sepi.lightfield import BoolMap
 
 # number of a row or of a column, alone or after a word for it
@@ -85,9 +85,7 @@ def _is_row(folder: Path) -> bool:
     try:
         files = [file for file in files_in(folder) if file.suffix.lower() in SUFFIXES]
         # one image of each camera; a folder whose names give row and column is a light field itself
-        return (len(files) == 1 and match[1] is None) or (
-            infer_view_numbers(str(folder), numbered(files)).kind is not Kind.GRID
-        )
+        return (len(files) == 1 and match[1] is None) or not infer_view_numbers(str(folder), numbered(files)).is_grid
     except (SepiError, OSError):
         return False
 

@@ -11,8 +11,8 @@ from browser import canvas_pixels, choose, map_pixels, opened, part, point_at, r
 from error_lines import call, done, error_of
 
 from sepi.extensions.page.compare import Comparison, comparison_page
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import write_stage
-from sepi.io.pfm import write_pfm
 from sepi.lightfield import FloatMap
 from sepi.scenes import render, write_hci
 from sepi.scoring.scores import score

@@ -15,8 +15,7 @@ from sepi import ingest, truth
 from sepi.errors import SepiError
 from sepi.extensions.rendered.exposure import read_scene
 from sepi.extensions.rendered.worlds import RENDERED
-from sepi.io.hdf5 import read_light_field
-from sepi.io.truth import read_with_truth
+from sepi.io.hdf5 import read_light_field, read_with_truth
 from sepi.scoring.scores import region_masks, score_regions
 from sepi.workflow.code_digest import imported_modules, ingest_modules
 from sepi.workflow.config import load_settings

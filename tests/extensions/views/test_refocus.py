@@ -14,9 +14,9 @@ from PIL import Image
 import sepi
 from sepi.extensions.views import refocusing
 from sepi.extensions.views.refocus import stack_names
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import read_picture
-from sepi.io.pfm import write_pfm
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
 from sepi.scenes import render, write_hci

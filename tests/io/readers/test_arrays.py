@@ -16,6 +16,8 @@ from sepi.io.readers.arrays import light_field_from_array
 from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
+from sepi.reading import read_light_field
+from sepi.scenes import render
 
 T, S, H, W = 2, 5, 12, 14
 RNG = np.random.default_rng(7)
@@ -77,6 +79,18 @@ def test_stacks_of_views_and_batches_of_one(axes: str, shape: tuple[int, ...], v
     light_field = taken(np.ones(shape, np.uint8))
     assert (light_field.views.shape, light_field.arranged) == (views, "N" not in axes)
     assert f"axes taken as {' '.join(axes)}; --axes sets them otherwise" in light_field.notes
+
+
+@pytest.mark.parametrize("axes", ["NCHW", "HWCN", "TSHW"])
+def test_the_views_tell_colours_from_a_row_of_views(axes: str, tmp_path: Path) -> None:
+    """Three colours show no parallax: 25 pictures in colour were read as 25x3 grey views."""
+    views = render("curved_occluders", size=64, views=7).views
+    stack = views[1:6, 1:6].reshape(25, *views.shape[2:])
+    array = views[:, 2:5, :, :, 1] if axes == "TSHW" else np.moveaxis(stack, range(4), [axes.index(a) for a in "NHWC"])
+    np.save(tmp_path / "a.npy", array)
+    found = read_light_field(tmp_path / "a.npy")
+    assert found.grid == ((7, 3) if axes == "TSHW" else (5, 5))
+    assert any(f"axes taken as {' '.join(axes)}, for which the views fit together" in note for note in found.notes)
 
 
 def test_a_grid_that_is_given_tells_colours_from_a_row_of_views() -> None:
@@ -201,7 +215,7 @@ def test_white_of_pictures_and_own_files(tmp_path: Path) -> None:
         np.testing.assert_array_equal(read(tmp_path / name, ReadOptions(white=1023)).views, expected)
     with pytest.raises(SepiError, match=r"own\.h5: view 0,0 has values from .* within 0 to 100, white being 100"):
         read(tmp_path / "own.h5", ReadOptions(white=100))
-    with pytest.raises(SepiError, match="options: white: expected a number above 0, got 0"):
+    with pytest.raises(SepiError, match=r"options\.white: .*greater than 0, got 0"):
         ReadOptions(white=0)
 
 

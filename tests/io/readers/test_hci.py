@@ -10,7 +10,7 @@ import pytest
 from error_lines import reading_error
 
 from sepi.errors import SepiError, SepiWarning
-from sepi.io.pfm import write_pfm
+from sepi.io.disparity_maps import write_pfm
 from sepi.io.readers.formats import read_truth
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import DisparityRange

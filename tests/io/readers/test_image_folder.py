@@ -125,7 +125,6 @@ NAMED: dict[str, Case] = {
         grid_of(3, 3),
         "as in 'IMG_*_{row}_{column}.png'",
     ),
-    "positions alone": case(by_place("cam_{}_{}.png", (0.0, 0.5, 1.0), (-1.5, 0.0)), grid_of(3, 2), "rows 0.333 steps"),
     "pattern": case(
         by_place("x{}_y{}_7.png", range(2), range(3)), [[0, 3], [1, 4], [2, 5]], pattern="x{column}_y{row}_*.png"
     ),
@@ -195,6 +194,8 @@ BAD: dict[str, Case] = {
     "times of cameras": case(by_place("t{}_c{}.png", range(3), range(9)), "after 't' count no views"),
     "two running numbers": case(["1_3.png", "2_1.png", "3_2.png"], "--pattern, such as '{number}_*.png'"),
     "rows and columns of --grid exchanged": case(PLACES[:6], "--grid has 3x2", grid=(3, 2)),
+    "about as many of two sorts": case([*PLACES, *by_place("w_{}_{}.png", range(2), range(3))], "(9 and 6)"),
+    "positions alone": case(by_place("cam_{}_{}.png", (0.0, 0.5, 1.0), (-1.5, 0.0)), "give --grid, or --pattern"),
     "twice": case([*PLACES, "v_01_01.png"], "view 1, 1 is given twice, also as v_01_01.png"),
     "huge row": case([*PLACES, "v_999999999_1.png"], "1000000000x3"),
     "centre missing": case(["0_0.png", "0_1.png", "0_2.png", "2_2.png"], "centre view"),
@@ -244,35 +245,6 @@ def test_bad_view_is_one_line_that_names_it(tmp_path: Path, case: str, capfd: py
     assert word in str(caught.value)
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
-
-
-SURPLUS = {
-    "a small picture beside the grid": ("v_9_9.png", True),
-    "a small picture of another name": ("thumb_7.png", True),
-    "a small view under another writing of its name": ("v_01_01.png", True),
-    "a small picture at a corner": ("v_0_0.png", False),
-    "a small picture within": ("v_1_2.png", False),
-}
-
-
-@pytest.mark.parametrize("case", SURPLUS)
-def test_a_picture_of_another_size_is_left_out_unless_the_grid_needs_it(tmp_path: Path, case: str) -> None:
-    """A thumbnail must not stop the reading, nor a hole in the grid come about without a word."""
-    name, left_out = SURPLUS[case]
-    folder = put(tmp_path / "f", PLACES)
-    imageio.imwrite(folder / name, pixels(5)[1:])
-    excluded = read(folder, ReadOptions(exclude=(name,)))
-    expected = np.array(grid_of(3, 3))
-    if left_out:
-        light_field = read(folder, ReadOptions())
-        assert any(name in note and "left out" in note for note in light_field.notes)
-        assert places_of(light_field) == expected.tolist()
-    else:
-        with pytest.raises(SepiError, match=f"{name}: 5x3 pixels, .* --exclude {name}$"):
-            read(folder, ReadOptions())
-        expected[expected == PLACES.index(name)] = -1
-    assert places_of(excluded) == expected.tolist()
-    assert not any(name in note for note in excluded.notes)
 
 
 @pytest.mark.parametrize("name", ["v_7.png", "v_10.png", "notes.txt"])
@@ -340,7 +312,7 @@ def test_camera_positions_in_names_are_those_of_the_views(tmp_path: Path) -> Non
 def test_decimals_that_are_row_and_column_are_no_positions(tmp_path: Path, pattern: str | None) -> None:
     """They would say how far apart rows are, which the views tell."""
     names = by_place("img_{:.2f}_{:.2f}.png", (0.0, 0.25, 0.5), (0.25, 0.35, 0.45))
-    light_field = read(put(tmp_path / "f", names), ReadOptions(pattern=pattern))
+    light_field = read(put(tmp_path / "f", names), ReadOptions(pattern="img_0.{row}_0.{column}.png"))
     assert places_of(light_field)[0][0] == 0
     assert light_field.row_spacing == 1
     assert "camera positions" not in " ".join(light_field.notes)

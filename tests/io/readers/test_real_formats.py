@@ -10,8 +10,8 @@ import scipy.io
 from error_lines import done
 from real_scenes import final_scores, part
 
+from sepi.io.disparity_maps import read_pfm
 from sepi.io.hdf5 import write_light_field
-from sepi.io.pfm import read_pfm
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field

@@ -1,8 +1,16 @@
-"""Files with named arrays: which of them is the light field."""
+"""NumPy's and HDF5's files of arrays: which of them is the light field, and reading it.
+
+A NumPy file is the array in ``.npy``, or one of the arrays in ``.npz``. In HDF5 files of other programs, the array may
+have any name, at the root or in groups.
+"""
 
 from __future__ import annotations
 
+import functools
+import math
 import re
+import warnings
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +18,11 @@ from typing import Any
 
 import h5py
 import numpy as np
+from numpy.lib import format as npy
 
 from sepi.errors import SepiError, printable
-from sepi.io.hdf5 import attribute, open_hdf5, read_dataset
+from sepi.io.files import DEFLATE_RATIO, reading
+from sepi.io.hdf5 import attribute, has_dataset, is_own, open_hdf5, read_dataset
 from sepi.io.readers.arrays import Array, is_likely, light_field_from_array
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import MAX_VIEWS
@@ -135,7 +145,7 @@ def hdf5_shapes(path: Path, check: bool = True) -> Shapes:
     return found
 
 
-def read_hdf5(path: Path, name: str) -> Array:
+def hdf5_array(path: Path, name: str) -> Array:
     """Array of a name from :func:`hdf5_shapes`."""
     with open_hdf5(path) as file:
         cells = _cells(file[name])
@@ -178,3 +188,97 @@ def _class(entry: h5py.Dataset) -> str:
 def _is_numbers(entry: Any) -> bool:
     held = isinstance(entry, h5py.Dataset) and entry.shape is not None and entry.dtype.kind in "iuf"
     return held and _class(entry) in ("", *_NUMBERS)
+
+
+_NUMPY = "NumPy file"
+# first bytes of a ZIP archive with members, and of an empty one
+_ZIP_MAGICS = (b"PK\x03\x04", b"PK\x05\x06")
+_OBJECTS = "Python objects, which may be any program; save images as one array, numpy.stack(them)"
+_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+
+
+def matches_numpy(path: Path) -> bool:
+    """Whether ``path`` is a file or an archive of NumPy, by its content or its suffix ``.npy`` or ``.npz``."""
+    if not path.is_file():
+        return False
+    try:
+        return path.suffix.lower() in (".npy", ".npz") or bool(numpy_shapes(path))
+    except SepiError:
+        return False
+
+
+def read_numpy(path: Path, options: ReadOptions) -> LightField:
+    """Light field from the array of a NumPy file; of an archive, ``options.variable`` or the array that fits."""
+    return light_field_from_arrays(path, numpy_shapes(path), options, functools.partial(numpy_array, path))
+
+
+def read_array(path: Path) -> Array:
+    """Array of a ``.npy`` file, memory-mapped: values are read when used."""
+    with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"):
+        with path.open("rb") as file:
+            start = file.read(12)
+            # NumPy allocates this length before it reads; two bytes in version 1, four in later ones
+            length = int.from_bytes(start[8:10] if start[6:7] == b"\x01" else start[8:12], "little")
+            if length > path.stat().st_size:
+                raise ValueError(f"a header of {length} bytes")
+            if b"'|O'" in file.read(length):
+                raise SepiError(_OBJECTS)
+        array: Array = np.load(path, mmap_mode="r", allow_pickle=False)
+        return array
+
+
+def numpy_shapes(path: Path) -> Shapes:
+    """Shape and type of each array by name; a ``.npy`` has the file's own name. No values are read."""
+    found = {}
+    if not _is_zipped(path):
+        array = read_array(path)
+        return {path.stem: (array.shape, array.dtype)}
+    with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"), zipfile.ZipFile(path) as archive:
+        for info in archive.infolist():
+            if info.filename.endswith(".npy"):
+                _require_room(path, info)
+                with archive.open(info) as file:
+                    shape, _, kind = _HEADERS[npy.read_magic(file)](file)
+                # NumPy allocates this shape before it reads
+                if math.prod(shape) * kind.itemsize > info.file_size:
+                    raise ValueError(f"{info.filename} of shape {shape} cannot lie in {info.file_size} bytes")
+                found[info.filename.removesuffix(".npy")] = shape, kind
+    return found
+
+
+def numpy_array(path: Path, name: str) -> Array:
+    """Array of a name from :func:`numpy_shapes`."""
+    if not _is_zipped(path):
+        return read_array(path)
+    with reading(path, _NUMPY), np.load(path, allow_pickle=False) as archive:
+        if numpy_shapes(path)[name][1].hasobject:
+            raise SepiError(_OBJECTS)
+        array: Array = archive[name]
+        return array
+
+
+def _is_zipped(path: Path) -> bool:
+    with reading(path, _NUMPY), path.open("rb") as file:
+        return file.read(4) in _ZIP_MAGICS
+
+
+def _require_room(path: Path, info: zipfile.ZipInfo) -> None:
+    """Raise if a member of an archive cannot have the size that the archive states."""
+    held = min(info.compress_size, path.stat().st_size)
+    if info.file_size > held * (1 if info.compress_type == zipfile.ZIP_STORED else DEFLATE_RATIO):
+        raise SepiError(f"damaged NumPy file: {printable(info.filename)}: {info.file_size} bytes cannot lie in {held}")
+
+
+def matches_hdf5(path: Path) -> bool:
+    """Whether ``path`` is an HDF5 file of another program, with an array that may be a light field."""
+    try:
+        return has_dataset(path, "/", lambda root: not is_own(root)) and any(
+            is_likely(shape) for shape, _ in hdf5_shapes(path).values()
+        )
+    except SepiError:
+        return False
+
+
+def read_hdf5(path: Path, options: ReadOptions) -> LightField:
+    """Light field from the array ``options.variable``; default: the array that can be a light field."""
+    return light_field_from_arrays(path, hdf5_shapes(path), options, functools.partial(hdf5_array, path))
