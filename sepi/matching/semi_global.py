@@ -168,9 +168,8 @@ class AveragedCosts:
         Uniform, pixels per view step.
     guide : ndarray, shape (H, W, 3), float32
         Reference view, 0..1.
-    contrast : float
-        Expected squared difference of two pixels of one surface, summed over RGB: of noise, and of texture; widens the
-        window's colour weights.
+    contrast : ndarray, shape (H, W), float32
+        Expected squared difference of two pixels of one surface, summed over RGB; widens the window's colour weights.
     parameters : SmoothingParameters
     likely : ndarray, shape (2, H, W), int32, optional
         First and last candidate of each pixel that are used; default: all. Others cost 1.
@@ -181,7 +180,7 @@ class AveragedCosts:
         volumes: CostVolumes,
         disparities: FloatMap,
         guide: FloatMap,
-        contrast: float,
+        contrast: FloatMap,
         parameters: SmoothingParameters,
         likely: npt.NDArray[np.int32] | None = None,
     ) -> None:

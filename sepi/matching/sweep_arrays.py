@@ -82,13 +82,13 @@ class Window(NamedTuple):
     guide : ndarray, shape (3, H, W), float32
         Reference view.
     radius : int
-    variance : float32
+    variance : ndarray, shape (H, W), float32
         Squared colour distance that scales the weights.
     """
 
     guide: FloatMap
     radius: int
-    variance: np.float32
+    variance: FloatMap
 
 
 class ExpectedCosts(NamedTuple):

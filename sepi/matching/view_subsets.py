@@ -40,7 +40,7 @@ QUARTERS = (("left", "up"), ("left", "down"), ("right", "up"), ("right", "down")
 # most views, as a multiple of the number asked for
 _HARDLY_MORE = 1.2
 # reach from the reference view up to which no view is left out, and up to which far views matter more than aliases
-_SHORT, _MODERATE = 2, 4
+_SHORT, _MODERATE = 1, 4
 # least mean squared distance of a lattice's views from the reference view, as a multiple of that of all views
 _WIDE = 0.99
 # least number of frequencies along each axis at which repetitions are searched

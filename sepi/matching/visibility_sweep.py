@@ -22,6 +22,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import variance_of_residuals
+from sepi.image.texture import variance_within_surface
 from sepi.kernels import visibility as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import (
@@ -56,6 +57,10 @@ TEXTURE = 1.85
 
 In views without noise the measurement is of texture. In strong texture few pixels of a window have similar colours.
 """
+
+SHARE_AFTER_FIRST = 0.25
+"""Share of the texture around a pixel that widens its window after the first map, which needs all of it where texture
+repeats. More would join thin structures to what is behind them."""
 
 LIKELY_RADIUS, LIKELY_CANDIDATES = 8, 5
 """Radius of the window whose disparities are likely candidates, pixels, and the number of candidates beyond them."""
@@ -264,12 +269,13 @@ def _sweep(
     disparities = light_field.require_disparity_range().candidates(parameters.fewer(light_field, sampling))
     likely = None if disparity is None else _likely_candidates(disparity, disparities)
     guide = guide_of(light_field, mean)
-    variance = variance_of_residuals(_contrast_of_surfaces(light_field), guide.shape[2])
+    least = variance_of_residuals(_contrast_of_surfaces(light_field), guide.shape[2])
+    contrast = variance_within_surface(guide, least, 1.0 if disparity is None else SHARE_AFTER_FIRST)
     shown = light_field.present
     if light_field.missing is not None:
         shown = shown & ~light_field.missing.all(axis=(2, 3))
     smoothing = parameters.for_views(int(shown.sum()))
-    costs = AveragedCosts(volumes, disparities, guide, variance, smoothing, likely if refined else None)
+    costs = AveragedCosts(volumes, disparities, guide, contrast, smoothing, likely if refined else None)
     searched = np.zeros_like(present) if refined else _searched_views(light_field, present, parameters)
     for band in row_bands(light_field, present, float(np.abs(disparities).max()), BYTES_PER_PIXEL):
         visibility = _visibility(light_field, present, disparity, searched, likely, parameters, band)
@@ -281,7 +287,7 @@ def _sweep(
 
 
 def _contrast_of_surfaces(light_field: LightField) -> float:
-    """Standard deviation of one channel's colours within a surface."""
+    """Standard deviation of one channel's colours within a surface, at least."""
     noise = reference_noise(light_field)
     # denoising has taken noise and faint texture out of the guide
     return noise if isinstance(light_field, DenoisedLightField) else TEXTURE * noise

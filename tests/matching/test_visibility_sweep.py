@@ -235,7 +235,7 @@ def aggregate_twin(cost, guide, radius, variance):
     out = np.empty((H, W, K))
     for y, x in np.ndindex(H, W):
         rows, columns = np.s_[max(0, y - radius) : y + radius + 1], np.s_[max(0, x - radius) : x + radius + 1]
-        weight = np.exp(-((guide[rows, columns] - guide[y, x]) ** 2).sum(axis=2) / (2 * variance))
+        weight = np.exp(-((guide[rows, columns] - guide[y, x]) ** 2).sum(axis=2) / (2 * variance[y, x]))
         out[y, x] = (cost[:, rows, columns] * weight).sum(axis=(1, 2)) / weight.sum()
     return out
 
@@ -294,7 +294,8 @@ def test_smoothing_equals_a_plain_twin(large: float, scale: int, K: int, some: b
     cost, guide = random.random((K, H, W)).astype(np.float32), random.random((H, W, 3)).astype(np.float32) * 0.1
     likely = np.sort(random.integers(0, K, (2, H, W), np.int32), axis=0) if some else candidates_of(cost)
     places = Places.of_candidates(*likely, K)
-    volume = averaged_by_kernel(cost, guide, 2, 0.01, places)
+    variance = random.uniform(0.002, 0.02, (H, W)).astype(np.float32)
+    volume = averaged_by_kernel(cost, guide, 2, variance, places)
     averaged = laid_out(volume, places)[:, :, :K]
     told = np.isfinite(averaged)
     assert told.all() != some
@@ -303,7 +304,7 @@ def test_smoothing_equals_a_plain_twin(large: float, scale: int, K: int, some: b
         for (y, x), first, last in zip(np.ndindex(H, W), *likely.reshape(2, -1), strict=True)
     )
     np.testing.assert_allclose(
-        (averaged / semi_global.ONE)[told], aggregate_twin(cost, guide, 2, 0.01)[told], atol=2e-5
+        (averaged / semi_global.ONE)[told], aggregate_twin(cost, guide, 2, variance)[told], atol=2e-5
     )
     smoothed = np.full_like(volume, 7)
     semi_global.semi_global(volume, np.moveaxis(guide, 2, 0).copy(), places, 0.1, large, 5, 3, smoothed)
@@ -319,8 +320,9 @@ def test_a_window_may_be_wider_than_the_picture(shape: tuple[int, int], radius: 
     random = np.random.default_rng(4)
     cost, guide = random.random((5, *shape)).astype(np.float32), random.random((*shape, 3)).astype(np.float32) * 0.1
     places = Places.of_candidates(*candidates_of(cost), 5)
-    averaged = laid_out(averaged_by_kernel(cost, guide, radius, 0.01, places), places)[:, :, :5] / semi_global.ONE
-    np.testing.assert_allclose(averaged, aggregate_twin(cost, guide, radius, 0.01), atol=2e-5)
+    variance = random.uniform(0.002, 0.02, shape).astype(np.float32)
+    averaged = laid_out(averaged_by_kernel(cost, guide, radius, variance, places), places)[:, :, :5] / semi_global.ONE
+    np.testing.assert_allclose(averaged, aggregate_twin(cost, guide, radius, variance), atol=2e-5)
 
 
 def test_margin_tells_one_minimum_from_two() -> None:

@@ -83,13 +83,13 @@ void store_interleaved(const float *lines, Index stride, Index n, Number *__rest
 }
 
 // Weights of the windows of pixels begin..end of row y, summing to one, into weights ((2 radius + 1)^2, end - begin or more);
-// zero outside. They are exponentials of what exponent makes of squared distances in the guide (3, H, W).
-template <class Exponent>
-void window_weights(Array<const float, 3> guide, Index y, Index begin, Index end, Index radius, Array<float, 2> weights,
-                    Exponent exponent) {
+// zero outside: exp(-distance^2 / (2 variance)) of distances in the guide (3, H, W), by the variance (H, W) of the middle.
+inline void window_weights(Array<const float, 3> guide, Array<const float, 2> variance, Index y, Index begin, Index end, Index radius,
+                           Array<float, 2> weights) {
     const Index H = guide.shape[1], W = guide.shape[2], size = 2 * radius + 1;
     const auto totals = zeros<float, 1>(end - begin);
     float *__restrict total = totals.array().data;
+    const float *variances = variance.at(y, begin);
     std::fill_n(weights.data, size * size * weights.strides[0], 0.0f);
     for (Index i = std::max<Index>(0, radius - y); i < std::min(size, H - y + radius); ++i) {
         for (Index j = 0; j < size; ++j) {
@@ -99,7 +99,7 @@ void window_weights(Array<const float, 3> guide, Index y, Index begin, Index end
             float *__restrict weight = weights.at(i * size + j);
             for (Index x = first - begin; x < last - begin; ++x) {
                 const float r = here[0][x] - there[0][x], g = here[1][x] - there[1][x], b = here[2][x] - there[2][x];
-                weight[x] = exp_of_negative(exponent(r * r + g * g + b * b));
+                weight[x] = exp_of_negative(-0.5f * (r * r + g * g + b * b) / variances[x]);
                 total[x] += weight[x];
             }
         }

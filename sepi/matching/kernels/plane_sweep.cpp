@@ -239,8 +239,7 @@ struct TileSweep {
             if (!all_seen(run.y, x, 0)) counted.push_back(x - run.begin);
         }
         if (asked.empty()) return;
-        const auto exponent = [falloff = -0.5f / window.variance](float apart2) { return falloff * apart2; };
-        window_weights(window.guide, run.y, run.begin, run.end, window.radius, weights.array(), exponent);
+        window_weights(window.guide, window.variance, run.y, run.begin, run.end, window.radius, weights.array());
         aggregate(cost_ring.array(), run, asked, sums.array());
         aggregate(count_ring.array(), run, counted, numbers.array());
         for (const Index column : asked) {

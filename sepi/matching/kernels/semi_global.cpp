@@ -114,15 +114,14 @@ float margin_of(const std::uint16_t *costs, Index begin, Index end, const float 
     return least < NONE ? (least - least_of(own)) / ONE : 0.0f;
 }
 
-// Rows begin..end of the costs' mean over a window with weights exp(-|colour difference|^2 / (2 variance)), into out.
-// cost (K, n, W), 0..1, are of the rows from top on; those beyond the picture are its border's. guide (3, H, W).
-void aggregate(Array<const float, 3> cost, Index top, Array<const float, 3> guide, const Places &places, Index radius, float variance, Index begin,
-               Index end, Array<std::uint16_t, 1> out) {
+// Rows begin..end of the costs' mean over windows weighted by colour, into out. cost (K, n, W), 0..1, are of the rows from
+// top on; those beyond the picture are its border's. guide (3, H, W), variance (H, W).
+void aggregate(Array<const float, 3> cost, Index top, Array<const float, 3> guide, const Places &places, Index radius, Array<const float, 2> variance,
+               Index begin, Index end, Array<std::uint16_t, 1> out) {
     const Index K = cost.shape[0], H = guide.shape[1], W = guide.shape[2], size = 2 * radius + 1;
     parallel_for(begin, end, [&](Index y) {
         const Scratch<float, 2> weights(size * size, W + LANES);
-        const auto exponent = [width = 2 * double(variance)](float apart2) { return -double(apart2) / width; };
-        window_weights(guide, y, 0, W, radius, weights.array(), exponent);
+        window_weights(guide, variance, y, 0, W, radius, weights.array());
         // weights beyond the picture are 0, so other rows may be read there, within the memory
         const auto at_ends = zeros<float, 2>(size, W + 2 * radius + LANES);
         const Scratch<const float *, 1> places_of_row(size * size);

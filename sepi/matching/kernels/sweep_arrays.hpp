@@ -38,7 +38,7 @@ struct Candidates {
 struct Window {
     Array<const float, 3> guide;  // (3, H, W)
     Index radius;
-    float variance;
+    Array<const float, 2> variance;  // (H, W)
 
     bool fields(auto visit) { return visit(guide, radius, variance); }
 };

@@ -1,0 +1,42 @@
+"""Texture of a picture: by how much colours differ within one surface."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from sepi.lightfield import FloatMap
+
+RADIUS = 4
+"""Of the windows in which texture is measured, pixels."""
+
+
+def variance_within_surface(image: FloatMap, least: float, share: float) -> FloatMap:
+    """Squared difference that two pixels of one surface may have: that of neighbours around, or more.
+
+    In texture, neighbours differ all over a window; an edge between two plain surfaces fills a small part of one. Of
+    the windows that contain a pixel, that of the least texture counts, so that texture ends where it borders on
+    something plainer.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W, C), float32
+        Colours in 0..1.
+    least : float
+        Least squared difference, summed over channels, such as that of noise.
+    share : float
+        Of the texture that counts.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        ``share`` of the mean squared difference of neighbours, summed over channels, or ``least`` where that is more.
+    """
+    size = (2 * RADIUS + 1, 2 * RADIUS + 1)
+    energy = np.zeros(image.shape[:2], np.float32)
+    for own, picture in ((energy, image), (energy.T, image.transpose(1, 0, 2))):
+        squares = np.square(picture[1:] - picture[:-1]).sum(axis=2)
+        own[1:] += squares
+        own[:-1] += squares
+    plainest = cv2.erode(cv2.blur(energy / 4, size), np.ones(size, np.uint8))
+    return np.asarray(np.maximum(np.float32(share) * plainest, np.float32(least)))
