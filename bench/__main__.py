@@ -287,7 +287,6 @@ def cameras(scenes: tuple[str, ...], size: int, views: int, seeds: int, variant:
 @click.option(
     "--variant", "variants", type=click.Choice(list(VARIANTS)), multiple=True, help="Repeatable; best and fast."
 )
-@click.option("--narrow", multiple=True, help="Scene whose intervals may hardly widen; repeatable.")
 @click.option("--leave-out", is_flag=True, help="Judge each scene by a fit to all others.")
 @click.option("--kept", type=_PATH, help="Folder where pixels are kept for the next time.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
@@ -297,7 +296,6 @@ def errors(
     judge: tuple[str, ...],
     sigmas: tuple[float, ...],
     variants: tuple[str, ...],
-    narrow: tuple[str, ...],
     leave_out: bool,
     kept: Path | None,
     threads: int | None,
@@ -334,13 +332,13 @@ def errors(
 
     levels = sigmas or (0.0, 3.0, 8.0)
     samples = sampled(scenes or ("rack", "pencils"), levels) + sampled(steps, (0.0,))
-    calibration = fitted(samples, CALIBRATIONS[choice], narrow)
+    calibration = fitted(samples, CALIBRATIONS[choice])
     click.echo(as_code(choice.upper(), calibration))
     held_out = sampled(judge, levels, held_out=True)
     click.echo(tables.markdown(judgements(samples + held_out, {}, calibration)))
     if leave_out:
         click.echo("\nFitted to all other scenes:\n")
-        click.echo(tables.markdown(judgements(samples, left_out(samples, CALIBRATIONS[choice], narrow), calibration)))
+        click.echo(tables.markdown(judgements(samples, left_out(samples, CALIBRATIONS[choice]), calibration)))
     names = ", ".join(f"`{variant}`" for variant in variants)
     parts = {"of the fit": samples, "held out": held_out}
     rows = [{"maps": f"{names}: {len(some)} {of}", **pooled(some, calibration)} for of, some in parts.items() if some]

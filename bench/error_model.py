@@ -1,13 +1,12 @@
 """Fit of the error model (:mod:`sepi.error_bars`) by maximum likelihood, and its evaluation on left-out scenes.
 
-Light fields whose interval of 90 % holds too few of the errors gain weight in rounds, so that each kind is covered and
-not the mean alone. Powers are weakly regularised towards 0, in units of the variation of their cue's logarithm;
-where intervals of some scenes are to be kept, towards the present ones.
+Every light field and variant has the same weight. Powers are weakly regularised towards 0, in units of the variation of
+their cue's logarithm.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,21 +23,8 @@ from sepi.stage import CLOSE
 
 FloatArray = npt.NDArray[np.float64]
 
-PULL, PULL_BACK = 1e-3, 4e-3
-"""Weight of the sum of squared powers relative to the mean likelihood of a pixel, and of squared changes of numbers
-that are to stay near the present ones.
-"""
-
-LEAST_COVERAGE = 85.0
-"""Share of a light field's errors within the interval, %, below which it gains weight."""
-
-MOST_GROWTH, OF_GROWTH = -0.03, 20.0
-"""Growth of the mean logarithm of a scale that costs nothing, and weight of the square of what is beyond it. Outliers
-widen an interval, too.
-"""
-
-ROUNDS, MOST_WEIGHT = 6, 10.0
-"""Rounds of fitting, and the largest weight of a light field."""
+PULL = 1e-3
+"""Weight of the sum of squared powers relative to the mean likelihood of a pixel."""
 
 _PARTS = ("scale", "outlier_scale", "outlier", "rim")
 _CLIP = 12.0
@@ -62,59 +48,38 @@ class Judged(NamedTuple):
     ause_smooth: float
 
 
-def fitted(samples: Sequence[Sample], form: Calibration, kept: Collection[str] = ()) -> Calibration:
-    """The calibration with the same cues as ``form`` of maximal likelihood of the errors, in weighted rounds.
-
-    Scales of light fields of the scenes ``kept`` hardly grow beyond those by ``form``.
-    """
-    weights = np.ones(len(samples))
-    for _ in range(ROUNDS):
-        found = _most_likely(samples, weights / weights.sum(), form, kept)
-        lacking = LEAST_COVERAGE - np.array([judged(one, found).coverage for one in samples])
-        weights = np.minimum(weights * (1 + 0.1 * np.maximum(lacking, 0)), MOST_WEIGHT)
-    return found
-
-
-def _most_likely(
-    samples: Sequence[Sample], weights: FloatArray, form: Calibration, kept: Collection[str]
-) -> Calibration:
-    """That of weighted light fields."""
+def fitted(samples: Sequence[Sample], form: Calibration) -> Calibration:
+    """The calibration with the same cues as ``form`` that maximises the likelihood of the errors."""
     names = [list(part) for part in form.parts]
     columns = [np.concatenate([_columns(one, part) for one in samples]) for part in names]
-    spread = [np.append(1, column[:, 1:].std(axis=0) + 1e-6) for column in columns]
-    designs = [column / s for column, s in zip(columns, spread, strict=True)]
+    middle, spread = _scaling(columns)
+    designs = [(column - m) / s for column, m, s in zip(columns, middle, spread, strict=True)]
     data = _Data(
         np.concatenate([one.error for one in samples]),
         np.concatenate([one.cues["above"] for one in samples]),
         np.concatenate([one.cues["below"] for one in samples]),
         np.concatenate([np.full(one.error.size, one.step**2 / 12) for one in samples]),
-        np.concatenate([np.full(one.error.size, w / one.error.size) for one, w in zip(samples, weights, strict=True)]),
+        np.concatenate([np.full(one.error.size, 1 / (one.error.size * len(samples))) for one in samples]),
     )
-    present = [np.array(list(part.values())) * s for part, s in zip(form.parts, spread, strict=True)]
-    likely = [np.append(middle, 0 * part[1:]) for middle, part in zip((-5, -2, -2, -3), present, strict=True)]
-    start, pull = (present, PULL_BACK) if kept else (likely, PULL)
+    start = [np.zeros(len(part)) for part in names]
+    for values, first in zip(start, (-5.0, -2.0, -2.0, -3.0), strict=True):
+        values[0] = first
+    pulled = [np.arange(len(part)) > 0 for part in names]
     ends = np.cumsum([len(part) for part in names])[:-1]
-    means = np.stack([_columns(one, names[0]).mean(axis=0) for one in samples]) / spread[0]
-    most, held = means @ present[0] + MOST_GROWTH, np.array([one.world in kept for one in samples])
 
     def loss(all_powers: FloatArray) -> tuple[float, FloatArray]:
         powers = np.split(all_powers, ends)
         value, slopes = _likelihood(designs, powers, data)
-        changes = [p - first for p, first in zip(powers, start, strict=True)]
-        for change in changes if not kept else ():
-            change[0] = 0
-        value += pull * sum(float(np.sum(change**2)) for change in changes)
-        slopes = [g + 2 * pull * change for g, change in zip(slopes, changes, strict=True)]
-        beyond = np.maximum(means @ powers[0] - most, 0) * held
-        value += OF_GROWTH * float(np.sum(beyond**2))
-        slopes[0] += 2 * OF_GROWTH * means.T @ beyond
+        value += PULL * sum(float(np.sum(p[on] ** 2)) for p, on in zip(powers, pulled, strict=True))
+        slopes = [g + 2 * PULL * p * on for g, p, on in zip(slopes, powers, pulled, strict=True)]
         return value, np.concatenate(slopes)
 
     found = minimize(loss, np.concatenate(start), jac=True, method="L-BFGS-B", options={"maxiter": 500}).x
-    parts = [
-        {label: round(float(value), 3) for label, value in zip(labels, powers / s, strict=True)}
-        for labels, powers, s in zip(names, np.split(found, ends), spread, strict=True)
-    ]
+    parts: list[dict[str, float]] = []
+    for labels, powers, m, s in zip(names, np.split(found, ends), middle, spread, strict=True):
+        raw = powers / s
+        raw[0] = powers[0] - float(np.sum(raw[1:] * m[1:]))
+        parts.append({label: round(float(value), 3) for label, value in zip(labels, raw, strict=True)})
     scale, outlier_scale, outlier, rim = parts
     return Calibration(scale, outlier_scale, outlier, rim)
 
@@ -160,10 +125,10 @@ def pooled(samples: Sequence[Sample], calibration: Calibration) -> dict[str, str
     }
 
 
-def left_out(samples: Sequence[Sample], form: Calibration, kept: Collection[str] = ()) -> dict[str, Calibration]:
+def left_out(samples: Sequence[Sample], form: Calibration) -> dict[str, Calibration]:
     """Scene to the calibration that is fitted to all other scenes."""
     worlds = dict.fromkeys(one.world for one in samples)
-    return {world: fitted([one for one in samples if one.world != world], form, kept) for world in worlds}
+    return {world: fitted([one for one in samples if one.world != world], form) for world in worlds}
 
 
 def as_code(name: str, calibration: Calibration) -> str:
@@ -194,6 +159,13 @@ def _pictures(one: Sample) -> dict[str, npt.NDArray[np.float32]]:
 def _columns(one: Sample, part: Sequence[str]) -> FloatArray:
     columns = [np.log(np.maximum(one.cues[name], FLOORS[name])) for name in part if name != CONSTANT]
     return np.stack([np.ones(one.error.size), *columns], axis=1)
+
+
+def _scaling(columns: Sequence[FloatArray]) -> tuple[list[FloatArray], list[FloatArray]]:
+    middle, spread = [column.mean(axis=0) for column in columns], [column.std(axis=0) + 1e-6 for column in columns]
+    for m, s in zip(middle, spread, strict=True):
+        m[0], s[0] = 0, 1
+    return middle, spread
 
 
 def _likelihood(

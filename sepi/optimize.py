@@ -17,7 +17,6 @@ References
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import cv2
@@ -32,19 +31,10 @@ from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
-from sepi.matching.softening import compared_views, reference_sharpness
+from sepi.matching.softening import compared_views
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import WlsParameters, data_weight, rectified_confidence, smoothness_coefficient, solve
-from sepi.stage import (
-    LIGHT_DEVIATION,
-    Choice,
-    NoParameters,
-    OcclusionMarginParameters,
-    Progress,
-    StageMaps,
-    none,
-    require_previous,
-)
+from sepi.stage import Choice, NoParameters, OcclusionMarginParameters, Progress, StageMaps, none, require_previous
 
 if TYPE_CHECKING:
     from sepi.matching.gauss_newton import Evidence, Surfaces
@@ -251,21 +241,12 @@ def _with_bars(
     cues = {
         **cues_of_map(disparity, curvature, known),
         **cues_of_views(gradient, curvature, evidence, measured_noise(light_field).usual),
-        **cues_of_stage_before(
-            before.confidence,
-            before.mask("textureless"),
-            before.extra.get(LIGHT_DEVIATION, np.zeros_like(disparity)),
-            curvature,
-        ),
-        "sharpness": reference_sharpness(light_field),
+        **cues_of_stage_before(before.confidence, before.mask("textureless")),
     }
     if variance is not None:
         cues["deviation"] = np.sqrt(variance)
     bars = error_bars(disparity, cues, known, calibration)
-    kept = {name: values for name, values in before.extra.items() if name != LIGHT_DEVIATION}
-    return replace(before, extra=kept).updated(
-        disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high
-    )
+    return before.updated(disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high)
 
 
 def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMap:

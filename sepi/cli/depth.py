@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 
 _PATH = click.Path(path_type=Path)
 
-AMBIGUOUS = 0.5
-"""Confidence below which a depth is more likely wrong than right."""
-
 
 @click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
@@ -133,7 +130,7 @@ def depth(
 
 
 def _interval(maps: StageMaps, variant: str) -> str:
-    """Line on the width of the intervals of known pixels and on how many are ambiguous, or that there are none."""
+    """Line on the width of the intervals of known pixels, or that there are none."""
     import numpy as np
 
     from sepi.matching.unknown import UNKNOWN
@@ -142,12 +139,7 @@ def _interval(maps: StageMaps, variant: str) -> str:
         return f"no interval: {variant} has no error bars"
     width, known = maps.high - maps.low, ~maps.mask(UNKNOWN)
     half = float(np.median(width[known] if known.any() else width)) / 2
-    doubtful = known & (maps.confidence < AMBIGUOUS)
-    plain, other = (100 * float((doubtful & of).mean()) for of in (maps.mask("textureless"), ~maps.mask("textureless")))
-    return (
-        f"90 % interval: median half width {half:.2g} pixels per view step\n"
-        f"ambiguous: {plain:.2g} % of the pixels without texture, {other:.2g} % with; confidence below {AMBIGUOUS:g}"
-    )
+    return f"90 % interval: median half width {half:.2g} pixels per view step"
 
 
 def _candidates(made_by: MadeBy | None) -> str:

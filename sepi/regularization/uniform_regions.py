@@ -85,8 +85,8 @@ class UniformPlanesParameters(OcclusionMarginParameters, SofteningParameters, Bo
 
 def fill_uniform_regions(
     light_field: LightField, before: StageMaps, parameters: UniformPlanesParameters
-) -> tuple[FloatMap, BoolMap, FloatMap]:
-    """Disparity with planes in uniform regions, the mask of their pixels, and how well light tells the planes.
+) -> tuple[FloatMap, BoolMap]:
+    """Disparity with planes in uniform regions, and the mask of their pixels.
 
     Parameters
     ----------
@@ -100,8 +100,6 @@ def fill_uniform_regions(
     disparity : ndarray, shape (H, W), float32
     held : ndarray, shape (H, W), bool
         Pixels that got a plane and should keep it; where noise may hide faint texture, a border's plane is not held.
-    light_deviation : ndarray, shape (H, W), float32
-        Standard deviation of the disparity by the light of a region, pixels per view step; 0 where it is not asked.
 
     Raises
     ------
@@ -129,10 +127,6 @@ def fill_uniform_regions(
     known = light_field.require_disparity_range()
     planes = _planes_of(found, lit, before.disparity, mean, noisy, parameters)
     disparity, held = before.disparity.copy(), np.zeros_like(core)
-    light_deviation = np.zeros_like(disparity)
-    for n, plane in lit.items():
-        region, _ = found[n]
-        light_deviation[region.place][region.pixels] = plane.deviations(region.basis)
     for (region, _), chosen in zip(found, planes, strict=True):
         if chosen is not None:
             # a plane known at one side only may leave the range at the other
@@ -155,7 +149,7 @@ def fill_uniform_regions(
         # faint texture below the noise may tell the surface better than a border's plane
         faint = noisy and chosen.source == "border" and 2 * core[place][pixels].sum() < pixels.sum()
         held[place] |= pixels & np.bool_(not faint)
-    return disparity, held, light_deviation
+    return disparity, held
 
 
 def _variance_of_views(light_field: LightField, field: LightField, compared: BoolMap) -> FloatMap:

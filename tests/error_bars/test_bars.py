@@ -22,19 +22,3 @@ def test_an_unsure_pixel_lies_in_the_range_and_its_interval_holds_it(calibration
     assert (bars.high <= 1).all()
     assert ((bars.low <= disparity) & (disparity <= bars.high)).all()
     assert ((bars.confidence >= 0) & (bars.confidence <= 1)).all()
-
-
-@pytest.mark.parametrize(
-    ("name", "good", "bad"),
-    [("sharpness", 0.2, 0.33), ("agreement", 0.9, 0.5), ("few_views", 1.01, 2), ("light_deviation", 0, 0.2)],
-)
-def test_what_views_cannot_know_widens_the_interval(name: str, good: float, bad: float) -> None:
-    """Texture too sharp to interpolate, views that disagree, few views, a plain region whose light hardly tells."""
-    disparity = np.zeros((1, 2), np.float32)
-    sure = {cue: 0.8 for cue in FLOORS if cue.endswith(("confidence", "agreement"))} | {"above": 0, "below": 0}
-    cues = {cue: np.full_like(disparity, value) for cue, value in {**FLOORS, "range": 2, **sure}.items()}
-    cues[name] = np.array([[good, bad]], np.float32)
-    bars = error_bars(disparity, cues, DisparityRange(-1, 1, "given"), SECOND_ORDER)
-    better, worse = (bars.high - bars.low)[0]
-    assert worse > 1.1 * better
-    assert bars.confidence[0, 1] <= bars.confidence[0, 0]
