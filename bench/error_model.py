@@ -39,7 +39,7 @@ class Judged(NamedTuple):
         Share of the errors within the interval, %, and its median width, pixels per view step.
     ause, ause_smooth : float
         Area under the sparsification error curve (:func:`sepi.scoring.error_bars.ause`) by the standard deviation, and
-        by the smoothness of the map and the information of the views (the former confidence).
+        by the smoothness of the map and the information of the views.
     """
 
     coverage: float

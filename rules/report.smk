@@ -20,8 +20,8 @@ rule plan:
         "jinja2"
 
 
-# All numbers of a report in one table with facts about the scenes beside it, and what is made of them alone: tables, and
-# charts in print quality. The parts of variant best have files of their own, since `all` does not run those variants.
+# All numbers of a report in one table with facts about the scenes beside it, and what is made of them alone: tables,
+# and charts in print quality. The parts of variant best have files of their own, since `all` does not run those variants.
 for which, (_, plan) in NUMBERS.items():
 
     rule:

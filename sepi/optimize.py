@@ -241,7 +241,7 @@ def _with_bars(
     cues = {
         **cues_of_map(disparity, curvature, known),
         **cues_of_views(gradient, curvature, evidence, measured_noise(light_field).usual),
-        **cues_of_stage_before(before.confidence, before.mask("textureless")),
+        **cues_of_stage_before(before.confidence, before.mask("textureless"), curvature),
     }
     if variance is not None:
         cues["deviation"] = np.sqrt(variance)

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 _PATH = click.Path(path_type=Path)
 
+AMBIGUOUS = 0.5
+"""Confidence below which a depth is more likely wrong than right."""
+
 
 @click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
@@ -130,7 +133,7 @@ def depth(
 
 
 def _interval(maps: StageMaps, variant: str) -> str:
-    """Line on the width of the intervals of known pixels, or that there are none."""
+    """Line on the width of the intervals of known pixels and on how many are ambiguous, or that there are none."""
     import numpy as np
 
     from sepi.matching.unknown import UNKNOWN
@@ -139,7 +142,13 @@ def _interval(maps: StageMaps, variant: str) -> str:
         return f"no interval: {variant} has no error bars"
     width, known = maps.high - maps.low, ~maps.mask(UNKNOWN)
     half = float(np.median(width[known] if known.any() else width)) / 2
-    return f"90 % interval: median half width {half:.2g} pixels per view step"
+    doubtful = known & (maps.confidence < AMBIGUOUS)
+    plain = float((doubtful & maps.mask("textureless")).mean())
+    return (
+        f"90 % interval: median half width {half:.2g} pixels per view step\n"
+        f"ambiguous: {100 * float(doubtful.mean()):.2g} % of the pixels (confidence below {AMBIGUOUS:g}), "
+        f"{100 * plain:.2g} % in regions without texture"
+    )
 
 
 def _candidates(made_by: MadeBy | None) -> str:

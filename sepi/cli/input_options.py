@@ -336,8 +336,6 @@ def camera_of(path: Path, view: tuple[int, int] | None, result: Result, geometry
 
 def _as_it_was(origin: Origin, reading: Reading) -> Reading:
     """The flags, completed by those of a result."""
-    from sepi.io.readers.options import ReadOptions
-
     given, names = reading.options, [field.name for field in fields(ReadOptions)]
     unsaid = [name for name in names if getattr(given, name) == getattr(ReadOptions(), name)]
     changed = {name: getattr(origin.options, name) for name in unsaid}

@@ -1,5 +1,8 @@
 """Cues of error of a disparity map: from the map, from the views, and from the stage before.
 
+A pixel without texture matches a border beside it at the border's disparity, since nothing changes there. That is no
+evidence, so that wide windows about a bare pixel hold bare pixels alone.
+
 Their unit is the stages' view step, with the farthest view four view steps away.
 """
 
@@ -21,6 +24,9 @@ HALF_CONFIDENT_DIFFERENCE = 0.01
 
 IGNORANCE = 0.01
 """Amount added to the second difference for an information of 1 / (pixels per view step)^2; pixels per view step."""
+
+BARE_DEVIATION = 0.15
+"""Standard deviation by the information of 3x3 pixels from which a pixel is bare, pixels per view step."""
 
 STEP_REACH = 2
 """Distance within which a pixel may belong to a neighbour's surface, pixels."""
@@ -74,8 +80,9 @@ def cues_of_map(disparity: FloatMap, curvature: FloatMap, known: DisparityRange)
         the nearest neighbour is, and how much farther the farthest; ``range``: width of the disparity range.
     """
     difference = np.abs(cv2.Laplacian(disparity, cv2.CV_32F))
-    mean = np.maximum(_mean(difference, 5), 0)
-    unknown = mean + IGNORANCE / np.sqrt(np.maximum(_mean(curvature, 3), 0) + np.float32(1e-3))
+    bare = bare_pixels(curvature)
+    mean = np.maximum(_mean(difference, 5, bare), 0)
+    unknown = mean + IGNORANCE / np.sqrt(np.maximum(_mean(curvature, 3, bare), 0) + np.float32(1e-3))
     wide = cv2.copyMakeBorder(disparity, *(_LONG,) * 4, cv2.BORDER_REFLECT_101)
     inner, twice = np.s_[_LONG:-_LONG], 2 * disparity
     across = np.abs(wide[inner, 2 * _LONG :] + wide[inner, : -2 * _LONG] - twice)
@@ -111,14 +118,14 @@ def cues_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, n
         difference of this change between views on opposite sides; ``misfit``: residuals in units of the noise;
         ``agreement`` and ``detail_agreement``: mean robust weight of the views by colours and by detail.
     """
-    seeing = _mean(evidence.seeing, 3) + _LEAST
+    seeing, bare = _mean(evidence.seeing, 3) + _LEAST, bare_pixels(curvature)
     step = np.abs(_mean(gradient, 3) / (_mean(curvature, 3) + _LEAST))
     residual = np.maximum(_mean(evidence.misfit, 3) / (_mean(evidence.agreement, 3) + _LEAST), 0)
     return {
         "deviation": _deviation(_mean(curvature, 3)),
-        "wide_deviation": _deviation(_mean(curvature, 7)),
+        "wide_deviation": _deviation(_mean(curvature, 7, bare)),
         "step": step,
-        "wide_step": np.abs(_mean(gradient, 15) / (_mean(curvature, 15) + _LEAST)),
+        "wide_step": np.abs(_mean(gradient, 15, bare) / (_mean(curvature, 15, bare) + _LEAST)),
         "disagreement": _disagreement(evidence, curvature, step),
         "misfit": np.sqrt(residual / 3) / np.float32(max(noise, _LEAST_NOISE)),
         "agreement": _mean(evidence.agreement, 3) / seeing,
@@ -126,13 +133,18 @@ def cues_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, n
     }
 
 
-def cues_of_stage_before(confidence: FloatMap, plane: BoolMap) -> dict[str, FloatMap]:
+def cues_of_stage_before(confidence: FloatMap, plane: BoolMap, curvature: FloatMap) -> dict[str, FloatMap]:
     """Cues from the stage before: ``confidence``, ``wide_confidence`` over 15x15 pixels, and ``plane``, 1 on planes."""
     return {
         "confidence": confidence,
-        "wide_confidence": _mean(confidence, 15),
+        "wide_confidence": _mean(confidence, 15, bare_pixels(curvature)),
         "plane": plane.astype(np.float32),
     }
+
+
+def bare_pixels(curvature: FloatMap) -> BoolMap:
+    """Pixels whose own texture hardly tells a disparity, by the views' information; shape (H, W), bool."""
+    return np.asarray(_deviation(_mean(curvature, 3)) > BARE_DEVIATION)
 
 
 def _deviation(information: FloatMap) -> FloatMap:
@@ -158,5 +170,11 @@ def _disagreement(evidence: Evidence, curvature: FloatMap, step: FloatMap) -> Fl
     return np.asarray(np.sqrt(np.maximum(total, 0) / (pairs * (whole + _LEAST))), np.float32) if pairs else step
 
 
-def _mean(values: FloatMap, size: int) -> FloatMap:
-    return np.asarray(cv2.blur(values, (size, size)), np.float32)
+def _mean(values: FloatMap, size: int, bare: BoolMap | None = None) -> FloatMap:
+    """Mean over a window; that of a bare pixel over the bare ones, if these are given."""
+    mean = np.asarray(cv2.blur(values, (size, size)), np.float32)
+    if bare is not None and bare.any():
+        inside = bare.astype(np.float32)
+        share = cv2.blur(inside, (size, size))
+        mean[bare] = (cv2.blur(values * inside, (size, size))[bare] / share[bare]).astype(np.float32)
+    return mean

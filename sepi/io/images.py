@@ -185,7 +185,7 @@ def picture_header(path: Path) -> Header:
 
 
 def png_texts(path: Path) -> dict[str, str]:
-    """Text chunks of a PNG by key; empty if the file cannot be read or is not a PNG."""
+    """Uncompressed text chunks of a PNG by key; empty if the file cannot be read or is not a PNG."""
     data, at, texts = b"", len(_PNG), {}
     with suppress(OSError):
         data = path.read_bytes() if path.is_file() else b""
@@ -279,6 +279,8 @@ _Form = tuple[int, int] | tuple[int, int, int, bool] | tuple[int, int, int, bool
 
 def _png_form(file: IO[bytes], path: Path, size: int) -> _Form:
     head = file.read(_PNG_HEADER)
+    if len(head) < _PNG_HEADER or head[12:16] != b"IHDR":
+        raise ValueError("its header is missing")
     # decoding turns grey with transparency, or a palette, into colours
     width, height, bits, colours = struct.unpack_from(">IIBB", head, 16)
     grey = colours in (0, 4)

@@ -321,7 +321,7 @@ def write_ply(path: str | Path, cloud: Cloud, comments: Sequence[str] | None = N
     from plyfile import PlyData, PlyElement
 
     columns = dict(zip("xyz", np.asarray(cloud.positions, "<f4").T, strict=True))
-    columns |= dict(zip(("red", "green", "blue"), cloud.colours.T, strict=True))
+    columns |= dict(zip(("red", "green", "blue"), np.asarray(cloud.colours, np.uint8).T, strict=True))
     # a user's own class need not have it
     if (sigma := getattr(cloud, "sigma", None)) is not None:
         columns["sigma"] = np.asarray(sigma, "<f4")
@@ -344,5 +344,8 @@ def read_positions(path: Path) -> npt.NDArray[np.float64]:
     from plyfile import PlyData
 
     with reading(path, "PLY file of points"):
-        points = PlyData.read(path)["vertex"]
+        try:
+            points = PlyData.read(path)["vertex"]
+        except MemoryError as error:
+            raise SepiError("damaged: it cannot hold as many points as its header says") from error
         return np.column_stack([np.asarray(points[axis], np.float64) for axis in "xyz"])

@@ -207,7 +207,8 @@ def package_version() -> str:
 def version_of(name: str) -> str:
     """Version of a distribution; empty if it is not installed."""
     try:
-        text = distribution(name).read_text("METADATA") or ""
+        files = distribution(name)
+        text = files.read_text("METADATA") or files.read_text("PKG-INFO") or ""
     except PackageNotFoundError:
         return ""
     # the first lines alone: to read the others takes a job as long as a small stage

@@ -224,7 +224,7 @@ def weighted_means(values: pd.DataFrame, pixels: pd.Series, by: Any) -> pd.DataF
 
 
 def read_numbers(path: Path) -> Runs:
-    """The numbers in two files that ``python -m sepi.report.numbers`` wrote: this one, and ``.csv`` beside it.
+    """The numbers in two files that ``python -m sepi.report.tables`` wrote: this one, and ``.csv`` beside it.
 
     Raises
     ------
@@ -239,7 +239,7 @@ def read_numbers(path: Path) -> Runs:
     except OSError as error:
         raise SepiError(f"{table}: cannot be read ({error.strerror})") from error
     except ValueError as error:
-        raise SepiError(f"{table}: not the numbers of a report, which python -m sepi.report.numbers writes") from error
+        raise SepiError(f"{table}: not the numbers of a report, which python -m sepi.report.tables writes") from error
     return Runs(facts, numbers)
 
 

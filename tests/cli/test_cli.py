@@ -84,10 +84,16 @@ def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
     with np.load("pyramids-depth/interval.npz") as interval:
         half = np.median(interval["high"] - interval["low"]) / 2
     assert f"90 % interval: median half width {half:.2g} pixels per view step\n" in called.stdout
+    maps = read_stage(Path("pyramids-depth/result.h5"))
+    doubtful = (maps.confidence < 0.5) & ~maps.mask("unknown")
+    plain = 100 * float((doubtful & maps.mask("textureless")).mean())
+    assert (
+        f"ambiguous: {100 * doubtful.mean():.2g} % of the pixels (confidence below 0.5), {plain:.2g} %" in called.stdout
+    )
     disparity = read_pfm(Path("pyramids-depth/disparity.pfm"))
     assert disparity.shape == (64, 64)
     assert np.isfinite(disparity).all()
-    np.testing.assert_array_equal(read_stage(Path("pyramids-depth/result.h5")).disparity, disparity)
+    np.testing.assert_array_equal(maps.disparity, disparity)
 
 
 @pytest.mark.extension("methods")

@@ -73,8 +73,19 @@ def test_where_no_view_sees_signs_are_numbers() -> None:
     cues = {
         **cues_of_map(np.zeros((2, 3), np.float32), np.zeros((2, 3), np.float32), RANGE),
         **cues_of_views(gradient, curvature, nothing, noise=0.0),
-        **cues_of_stage_before(np.zeros(SHAPE, np.float32), np.ones(SHAPE, bool)),
+        **cues_of_stage_before(np.zeros(SHAPE, np.float32), np.ones(SHAPE, bool), np.ones(SHAPE, np.float32)),
     }
     for name, values in cues.items():
         assert np.isfinite(values).all(), name
     assert set(FLOORS) <= set(cues)
+
+
+def test_a_border_is_no_evidence_for_the_bare_pixels_beside_it() -> None:
+    """Sky beside a wire matches the wire's depth as well, since nothing changes there; the wire knows its own."""
+    wire = np.abs(x - 25) < 2
+    curvature, confidence = np.where(wire, 1e4, 1.0).astype(np.float32), np.where(wire, 0.9, 0.1).astype(np.float32)
+    gradient, _, told = evidence((0.0, 0.0, 0.0, 0.0))
+    cues = cues_of_views(gradient, curvature, told, noise=0.01) | cues_of_stage_before(confidence, ~wire, curvature)
+    for name, of_sky in (("wide_deviation", 1.0), ("wide_confidence", 0.1)):
+        np.testing.assert_allclose(cues[name][:, 29], of_sky, rtol=0.01)
+        assert np.abs(cues[name][:, 25] / of_sky - 1).min() > 0.5

@@ -417,3 +417,17 @@ def test_what_noise_puts_beyond_infinity_is_no_fault_of_the_camera(tmp_path: Pat
     write_result(tmp_path / "sky", light_field, maps(sky))
     with pytest.warns(SepiWarning, match="98 % of the pixels lie beyond infinity.* 0 "):
         write_result(tmp_path / "off", light_field, maps(sky - np.float32(0.5)))
+
+
+def test_an_interrupt_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of the maps beside those of an earlier run would be of no light field."""
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    light_field = render("dots", size=64, views=3)
+    maps = StageMaps(light_field.ground_truth, np.ones(light_field.shape, np.float32))
+    monkeypatch.setattr("sepi.io.result_folder.write_pfm", stop)
+    with pytest.raises(KeyboardInterrupt):
+        write_result(tmp_path / "out", light_field, maps)
+    assert names_in(tmp_path) == []

@@ -9,12 +9,11 @@ from scipy.ndimage import map_coordinates
 
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, residual_variance
-from sepi.image.texture import variance_within_surface
 from sepi.kernels import plane_sweep
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.denoising import sure_noise
 from sepi.matching.expected_costs import expected_costs
-from sepi.matching.plane_sweep import TEXTURE_SHARE, TILE_WIDTH, SweepParameters, sweep
+from sepi.matching.plane_sweep import TILE_WIDTH, SweepParameters, sweep
 from sepi.matching.stitched_epi import line_cost, stitched_epi
 from sepi.matching.sweep_arrays import sampled_candidates
 from sepi.matching.view_subsets import HALVES_AND_QUARTERS, halves_and_quarters
@@ -64,13 +63,12 @@ def twin(light_field, parameters, of_groups, groups, subset):
     noise = residual_variance(light_field.reference_view)
     sums, counts = (values[subset[: len(values)]].sum(axis=0) for values in of_groups)
     r = parameters.window_radius
-    variance = parameters.window_sigma**2 + variance_within_surface(light_field.reference_view, noise, TEXTURE_SHARE)
     cost, total = np.zeros_like(sums), np.zeros_like(counts)
     for down, across in product(range(-r, r + 1), repeat=2):
         at = np.s_[max(0, -down) : H - max(0, down), max(0, -across) : W - max(0, across)]
         other = np.s_[max(0, down) : H - max(0, -down), max(0, across) : W - max(0, -across)]
         distance = ((centre[at] - centre[other]) ** 2).sum(axis=2)
-        weight = np.exp(-0.5 * distance / variance[at])
+        weight = np.exp(-0.5 * distance / (parameters.window_sigma**2 + noise))
         cost[:, *at] += weight * sums[:, *other]
         total[:, *at] += weight * counts[:, *other]
     cost = np.where(total > 0, cost / np.maximum(total, 1e-300), 1)

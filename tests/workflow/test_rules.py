@@ -63,6 +63,7 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
         if command is None:
             continue
         checked.add(rule.name)
+        assert rule.name not in STAGES or command[1] == f"sepi.{rule.name}"
         code = dict(rule.params.items()).get("code")
         for name, chosen in STAGES.get(rule.name, {"": None}).items():
             if name == HANDED_ON:

@@ -1,5 +1,4 @@
 // Background behind the nearer surfaces beside depth steps, from the views that see it.
-#include <cmath>
 #include <limits>
 #include <vector>
 

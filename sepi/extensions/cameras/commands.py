@@ -75,9 +75,6 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
     click.echo(f"next: sepi depth {target}")
 
 
-_PATH = click.Path(path_type=Path)
-
-
 @click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @click.argument("result_path", metavar="RESULT", type=_PATH)

@@ -208,7 +208,6 @@ def read_model(path: Path, images: str | None = None, crop_of: Part | None = Non
         If there are none, the file is damaged, or pictures are missing.
     """
     # called for every path, so readers are imported when needed
-    from sepi.errors import SepiError
     from sepi.extensions.cameras.model import Pictures
 
     found = cameras_in(path)

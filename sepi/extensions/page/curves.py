@@ -17,10 +17,9 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.image.noise import residual_variance
-from sepi.image.texture import variance_within_surface
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.expected_costs import expected_costs
-from sepi.matching.plane_sweep import TEXTURE_SHARE, SweepParameters
+from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.softening import softened
 from sepi.matching.sweep_arrays import sample_offsets, sampled_candidates
 from sepi.matching.view_subsets import halves_and_quarters
@@ -144,8 +143,7 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     columns = np.arange(max(0, x - r), min(W, x + r + 1))
     reference_view = as_unit_float(light_field.rgb_views[t0, s0][np.ix_(rows, columns)]).transpose(2, 0, 1)
     difference = reference_view - reference_view[:, y - rows[0], x - columns[0], None, None]
-    texture = variance_within_surface(light_field.reference_view, noise, TEXTURE_SHARE)
-    weights = np.exp(-0.5 * (difference**2).sum(axis=0) / (parameters.window_sigma**2 + texture[y, x]))
+    weights = np.exp(-0.5 * (difference**2).sum(axis=0) / (parameters.window_sigma**2 + noise))
     weights = (weights / weights.sum()).astype(np.float32)
     scale2 = np.float32(parameters.scale**2 + noise)
     compared = softened(light_field, parameters.softening).rgb_views

@@ -93,18 +93,23 @@ def _write_rendered(
     }
     require_new(output, (folder.name for of_name in folders.values() for folder, _ in of_name))
     require_mitsuba()
+    paths = {name: output / f"{name}.h5" for name in folders}
+    # before anything is rendered, which takes minutes
+    for name, path in paths.items():
+        if path.is_file():
+            _known(name, options, path)
     for name, of_name in folders.items():
-        render = _rendered(name, options, output / f"{name}.h5")
+        if not paths[name].is_file():
+            with progress_bar(name) as progress:
+                render_world(name, world_of(name), options, paths[name], progress)
+        render = _known(name, options, paths[name])
         for folder, exposure in of_name:
             _write_folder(render, exposure, folder, all_views)
             click.echo(f"written: {folder}/")
 
 
-def _rendered(name: str, options: RenderOptions, path: Path) -> Render:
-    """The render of a scene, from its file if that is there and was made with these options."""
-    if not path.is_file():
-        with progress_bar(name) as progress:
-            render_world(name, world_of(name), options, path, progress)
+def _known(name: str, options: RenderOptions, path: Path) -> Render:
+    """The render of a scene in a file that was made with these options."""
     render = read_render(path)
     if render.made_by != made_by(name, options):
         raise SepiError(f"{path}: was rendered with other options; remove it, or choose another folder with -o")

@@ -315,7 +315,7 @@ def size_of(files: Sequence[Path]) -> Size:
     """Size of the light field that these files hold together; no values are read.
 
     Each of several images is a view. A single image is a stack, or a lenslet image of which the default views count.
-    In other files, the largest array counts, and its two longest axes are those of a view. If nothing tells, the
+    In other files, the largest array counts, with the first order of its axes that is likely. If nothing tells, the
     largest file is taken as uncompressed pixels. The reader reports damaged files.
     """
     pictures = [path for path in files if path.suffix.lower() in SUFFIXES]

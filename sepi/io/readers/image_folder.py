@@ -187,9 +187,8 @@ def _by_number(folder: Path, named: ViewNumbers, numbers: dict[str, int], grid: 
         step = 1 if highest - base < count else step
     counted = named.counted and (highest - base) // step < count
     if not counted and grid is not None and len(numbers) != count:
-        raise SepiError(
-            f"{folder}: {len(numbers)} images numbered {lowest} to {highest}; --grid gives {grid[0]}x{grid[1]}"
-        )
+        span = f" numbered {lowest} to {highest}" if named.counted else ""
+        raise SepiError(f"{folder}: {len(numbers)} images{span}; --grid gives {grid[0]}x{grid[1]}")
     ranks = {name: rank for rank, name in enumerate(sorted(numbers, key=numbers.__getitem__))}
     note = f"the numbers in the names count no views ({next(iter(numbers))}): views are in the order of their names"
     if counted:

@@ -1,5 +1,4 @@
 // Surfaces seen through gaps: farther surfaces of a similar colour, and residuals at both depths.
-#include <cmath>
 #include <vector>
 
 #include "kernels/arguments.hpp"

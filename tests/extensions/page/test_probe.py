@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
 
+from bench.noisy import with_noise
 from sepi.errors import SepiError
 from sepi.extensions.page.curves import cost_curves
 from sepi.extensions.page.pixels import APART, BORDER, InterestingPixel, interesting_pixels
@@ -209,3 +210,11 @@ def test_an_occluded_pixel_is_one_beside_its_occluder():
     (found,) = [pixel for pixel in interesting_pixels(light_field, maps, None) if "occluded" in pixel.label]
     assert found.label == "occluded, left half kept"
     assert 22 <= found.x < 28
+
+
+def test_curves_are_corrected_for_noise_like_the_sweep():
+    """A curve off by what noise costs would have its minimum elsewhere."""
+    light_field, parameters = with_noise(render("pyramids", size=64, views=5), 8), SweepParameters(num_disparities=61)
+    assert parameters.noise_to_correct(light_field) is not None
+    cost = sweep(light_field, parameters).cost[0, 20, 31]
+    assert cost_curves(light_field, 20, 31, parameters).costs[0].min() == pytest.approx(cost, abs=2e-5)
