@@ -86,10 +86,8 @@ def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
     assert f"90 % interval: median half width {half:.2g} pixels per view step\n" in called.stdout
     maps = read_stage(Path("pyramids-depth/result.h5"))
     doubtful = (maps.confidence < 0.5) & ~maps.mask("unknown")
-    plain = 100 * float((doubtful & maps.mask("textureless")).mean())
-    assert (
-        f"ambiguous: {100 * doubtful.mean():.2g} % of the pixels (confidence below 0.5), {plain:.2g} %" in called.stdout
-    )
+    whole, plain = (100 * of.mean() for of in (doubtful, doubtful & maps.mask("textureless")))
+    assert f"ambiguous: {whole:.2g} % of the pixels (confidence below 0.5), {plain:.2g} %" in called.stdout
     disparity = read_pfm(Path("pyramids-depth/disparity.pfm"))
     assert disparity.shape == (64, 64)
     assert np.isfinite(disparity).all()
