@@ -8,7 +8,7 @@ import numpy as np
 from sepi.lightfield import FloatMap
 
 RADIUS = 4
-"""Of the windows in which texture is measured, pixels; weights fall as a normal distribution of half of it."""
+"""Of the windows in which texture is measured, pixels; weights fall as a normal distribution of 0.4 of it."""
 
 
 def variance_within_surface(image: FloatMap, least: float, share: float) -> FloatMap:
@@ -38,5 +38,5 @@ def variance_within_surface(image: FloatMap, least: float, share: float) -> Floa
         squares = np.square(picture[1:] - picture[:-1]).sum(axis=2)
         own[1:] += squares
         own[:-1] += squares
-    plainest = cv2.erode(cv2.GaussianBlur(energy / 4, size, RADIUS / 2), np.ones(size, np.uint8))
+    plainest = cv2.erode(cv2.GaussianBlur(energy / 4, size, 0.4 * RADIUS), np.ones(size, np.uint8))
     return np.asarray(np.maximum(np.float32(share) * plainest, np.float32(least)))
