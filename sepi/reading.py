@@ -18,7 +18,7 @@ from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ReadOptions, in_grid, unarranged
 from sepi.lightfield import DisparityRange, LightField
-from sepi.process.memory import give_back_memory
+from sepi.process.memory import give_back_memory, take_blas_buffer
 from sepi.validation import described, require_type
 
 # 16-bit views darker than this, a sixteenth of the full scale, have fewer bits or hardly any light
@@ -88,6 +88,8 @@ def read_light_field(
     require_type(f"{path}: options", options, (ReadOptions, NoneType), "sepi.ReadOptions")
     options = options or ReadOptions()
     given = None if disparity_range is None else _given_range(path, disparity_range)
+    # before the views take the memory
+    take_blas_buffer()
     try:
         light_field = read(path, options, file_format, truth=truth)
     except UnclearAxesError as unclear:
