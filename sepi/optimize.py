@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from sepi.error_bars.bars import error_bars
@@ -92,8 +91,10 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     reliable_confidence: float = Field(
         0.5, gt=0, le=1, description="confidence within two pixels from which a discontinuity in the data is trusted"
     )
-    rtol: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the solver stops in the last round")
-    first_rtol: float = Field(3e-3, gt=0, lt=1, description="the same for the other rounds")
+    rtol: float = Field(
+        3e-4, ge=1e-5, lt=1, description="residual at which the solver stops in the last round, relative"
+    )
+    first_rtol: float = Field(3e-3, ge=1e-5, lt=1, description="the same for the other rounds")
     max_iterations: int = Field(200, ge=1, description="most iterations of the solver")
 
     @model_validator(mode="after")
@@ -285,7 +286,7 @@ class _Prior(NamedTuple):
 
     uniform: BoolMap
     reliability: FloatMap
-    colours: list[npt.NDArray[np.float64]]
+    colours: list[FloatMap]
     colour_variance: float
 
 

@@ -27,7 +27,7 @@ _FREQUENCIES = 128
 _LEAST = 1e-8
 
 
-def inverse_diagonal(weight: FloatMap, smoothness: list[npt.NDArray[np.float64]]) -> FloatMap:
+def inverse_diagonal(weight: FloatMap, smoothness: list[FloatMap]) -> FloatMap:
     """Diagonal of the inverse of the system of second-order smoothing, approximately.
 
     Parameters
