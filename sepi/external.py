@@ -32,10 +32,7 @@ _SOURCES = TypeAdapter(dict[str, ExternalSource])
 
 
 def external_maps(
-    light_field: LightField,
-    sources: Mapping[str, ExternalSource],
-    scene: str = "",
-    thresholds: Sequence[float] = (),
+    light_field: LightField, sources: Mapping[str, ExternalSource], scene: str = "", thresholds: Sequence[float] = ()
 ) -> dict[str, ExternalMap]:
     """External methods' maps of a light field with their scores, or with their problems.
 

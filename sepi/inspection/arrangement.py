@@ -20,19 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError, SepiWarning
-from sepi.inspection.view_layouts import (
-    AT_END,
-    FEWEST_POINTS,
-    MATCHED,
-    MOVEMENT,
-    Baseline,
-    Views,
-    baselines_under,
-    is_clear,
-    matched,
-    ring,
-    search_distances,
-)
+from sepi.inspection import view_layouts
+from sepi.inspection.view_layouts import AT_END, FEWEST_POINTS, MATCHED, MOVEMENT, Baseline, Views, is_clear, matched
 from sepi.inspection.view_order import odd_views
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_grid import arrange_numbers
@@ -200,7 +189,8 @@ def _cost(views: Views, present: npt.NDArray[np.bool_], positions: Positions, re
         near = _neighbours(positions, present, place, reach)
         if not present[place] or not near:
             continue
-        offsets = np.stack([baselines_under(order, positions[near] - positions[place]) for order in _ORDERS])
+        away = positions[near] - positions[place]
+        offsets = np.stack([view_layouts.baselines_under(order, away) for order in _ORDERS])
         here, *others = (_baseline(views, n) for n in (place, *near))
         found = matched(views, here, others, factor, offsets, most_points=_POINTS)
         if found is not None:
@@ -303,7 +293,7 @@ def estimate_row_spacing(views: Views) -> float | None:
         For the order in which the light field was read. None if rows are as far apart as columns, there is only one
         row or column, or the spacing is unclear.
     """
-    for reach, factor in search_distances(views):
+    for reach, factor in view_layouts.search_distances(views):
         trial = _tried(views, reach, factor)
         if trial is not None:
             measured = _measured(views, trial) if trial.clear else 1.0
@@ -319,7 +309,7 @@ def _tried(views: Views, reach: int, factor: int) -> _Trial | None:
 
     It is clear if it fits clearly better than equal spacing in any layout.
     """
-    baselines = views.worth_matching(ring(views.baselines, reach))
+    baselines = views.worth_matching(view_layouts.ring(views.baselines, reach))
     if not any(t for t, _ in baselines) or not any(s for _, s in baselines) or views.is_too_small(factor):
         return None
     count = round(_PER_OCTAVE * math.log2(_MOST))
@@ -393,5 +383,6 @@ def _is_seen_in_movements(views: Views, trial: _Trial, spacing: float) -> bool:
 
 def _offsets(baselines: list[Baseline], hypotheses: list[tuple[str, float]]) -> npt.NDArray[np.float64]:
     """Baselines (L, V, 2) under each order and spacing, in units of the longest: all search the same movement."""
-    laid = [baselines_under(order, np.array(baselines, np.float64) * (spacing, 1)) for order, spacing in hypotheses]
+    on_grid = np.array(baselines, np.float64)
+    laid = [view_layouts.baselines_under(order, on_grid * (spacing, 1)) for order, spacing in hypotheses]
     return np.stack([offsets / abs(offsets).max() for offsets in laid])

@@ -17,12 +17,7 @@ from sepi.lightfield import BoolMap, FloatMap
 
 
 def coarse_sweep(
-    reference: FloatMap,
-    views: FloatMap,
-    offsets: FloatMap,
-    candidates: FloatMap,
-    truncation: float,
-    radius: int,
+    reference: FloatMap, views: FloatMap, offsets: FloatMap, candidates: FloatMap, truncation: float, radius: int
 ) -> tuple[FloatMap, FloatMap, FloatMap, FloatMap]:
     """Match the reference view against other views at each candidate disparity.
 

@@ -139,9 +139,7 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     digits = max(2, 1 - math.floor(math.log10(margin)))
     scale = 10**digits
     return DisparityRange(
-        math.floor(scale * (low - margin)) / scale,
-        math.ceil(scale * (high + margin)) / scale,
-        "estimated",
+        math.floor(scale * (low - margin)) / scale, math.ceil(scale * (high + margin)) / scale, "estimated"
     )
 
 

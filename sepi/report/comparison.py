@@ -10,25 +10,14 @@ import pandas as pd
 from sepi.report import published
 from sepi.report.plan import BEST_VARIANT, Plan
 from sepi.report.published import PAPERS_METHOD
-from sepi.report.runs import (
-    AVERAGE,
-    EXTERNAL_NOTE,
-    LEARNED_NOTE,
-    PRINTED_AVERAGE,
-    PROTOCOL_NOTE,
-    REGIONS_NOTE,
-    SCENE,
-    Runs,
-    average_label,
-    count_note,
-    dataset_title,
-    datasets_of,
-    own_key,
-    own_names,
-    printed_label,
-)
+from sepi.report.runs import EXTERNAL_NOTE, PROTOCOL_NOTE, REGIONS_NOTE, Runs, count_note, datasets_of, own_key
 from sepi.report.table import Head, Kind, Section, Table, ranks, section, shown
 from sepi.scoring.scores import REGIONS
+
+SCENE, AVERAGE, PRINTED_AVERAGE = "scene", "average", "average printed"
+"""Kinds of rows in the CSV files."""
+
+LEARNED_NOTE = "* learned, supervised; ** learned, unsupervised."
 
 
 def scene_table(runs: Runs, score: str, paper: pd.DataFrame, title: str) -> Table:
@@ -66,6 +55,27 @@ def _counterparts(plan: Plan) -> str:
     """The methods whose published figures divide ours, for the caption."""
     papers = f"the paper's method, {published.methods()['label'][PAPERS_METHOD]}"
     return f"the same method, for this project's own variants {papers}" if plan.report else papers
+
+
+def own_names(plan: Plan) -> str:
+    """Names of the compared variants, for a caption."""
+    *names, last = (f"`{variant}`" for variant in plan.compared)
+    return f"{', '.join(names)} and {last}" if names else last
+
+
+def dataset_title(dataset: str) -> str:
+    """Title of a dataset, with the paper's name if it has one."""
+    return f"{dataset}: {published.DATASETS[dataset]}" if dataset in published.DATASETS else dataset
+
+
+def average_label(count: int) -> str:
+    """Name of the row with averages of our figures."""
+    return f"Average of {count} scene{'s' * (count != 1)} available"
+
+
+def printed_label(dataset: str) -> str:
+    """Name of the row with the paper's averages."""
+    return f"Average as printed ({len(published.scenes(dataset))} scenes)"
 
 
 def _dataset_section(

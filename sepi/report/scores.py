@@ -16,17 +16,7 @@ from sepi.report.plan import MAIN_VARIANT
 from sepi.report.runs import EXTERNAL, KEYS, PROTOCOL_NOTE, REGIONS_NOTE, Runs, own_key
 from sepi.report.table import Head, Kind, Section, Table, ranks, section, shown
 from sepi.scoring.regions import LEAST_DISCONTINUITY, REACH
-from sepi.scoring.scores import (
-    COUNTS,
-    DISCONTINUITIES,
-    EDGE_SCORES,
-    PROTOCOLS,
-    REGIONS,
-    SCORES,
-    WHOLE_MAP,
-    own_bad_pixel,
-    score_heads,
-)
+from sepi.scoring.scores import COUNTS, DISCONTINUITIES, EDGE_SCORES, PROTOCOLS, REGIONS, SCORES, WHOLE_MAP, score_heads
 from sepi.variants.built_in import PARTS_OF_BEST
 
 _PARTS = [region for region in REGIONS if region != WHOLE_MAP]
@@ -76,8 +66,8 @@ def parts_table(runs: Runs) -> Table:
 
 def _score_heads(runs: Runs, scores: Iterable[str]) -> dict[str, Head]:
     """Heads of scores, and of those for the user's thresholds."""
-    own = runs.plan.bad_thresholds
-    return {name: Head(score_heads(own)[name], Kind.OURS) for name in (*scores, *own_bad_pixel(own))}
+    heads = score_heads(runs.plan.bad_thresholds)
+    return {name: Head(heads[name], Kind.OURS) for name in (*scores, *[one for one in heads if one not in SCORES])}
 
 
 def _by_scene(runs: Runs, heads: Mapping[str, Head], ranked: Iterable[str] = ()) -> tuple[pd.DataFrame, list[Section]]:

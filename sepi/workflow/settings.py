@@ -88,8 +88,7 @@ class Report(CheckedModel):
         "failures",
     )
     parts_of_best: bool = Field(
-        False,
-        description="whether the page also shows the ablation of 'best'; 'all' then runs its variants too",
+        False, description="whether the page also shows the ablation of 'best'; 'all' then runs its variants too"
     )
 
 

@@ -19,19 +19,11 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.io.files import name_of
 from sepi.io.images import SUFFIXES
+from sepi.io.readers import view_names
 from sepi.io.readers.camera_positions import off_grid, positions_from_cameras
 from sepi.io.readers.options import ReadOptions, is_position, unarranged
 from sepi.io.readers.view_files import MAX_VIEWS, files_in, has_rows, numbered, read_grid, view_files
-from sepi.io.readers.view_names import (
-    EXAMPLES,
-    ViewNumbers,
-    decimals_in,
-    infer_view_numbers,
-    origin,
-    pair_view_numbers,
-    parse_view_numbers,
-    sorted_view_numbers,
-)
+from sepi.io.readers.view_names import EXAMPLES, ViewNumbers, decimals_in, origin
 from sepi.lightfield import LightField
 
 _POSITIONS_PER_PICTURE = 100
@@ -211,15 +203,15 @@ def _step_notes(step: int) -> list[str]:
 
 def _named(folder: Path, names: Sequence[str], options: ReadOptions) -> ViewNumbers:
     if options.pattern is not None:
-        return parse_view_numbers(str(folder), names, options.pattern)
+        return view_names.parse_view_numbers(str(folder), names, options.pattern)
     names = list(filter(_is_picture, names))
     try:
-        return pair_view_numbers(names) or infer_view_numbers(str(folder), names)
+        return view_names.pair_view_numbers(names) or view_names.infer_view_numbers(str(folder), names)
     except SepiError:
         # a given grid that is filled needs only an order
         if options.grid is None or prod(options.grid) != len(names):
             raise
-        return sorted_view_numbers(names)
+        return view_names.sorted_view_numbers(names)
 
 
 def _is_picture(name: str) -> bool:
@@ -248,12 +240,9 @@ def _with_positions(light_field: LightField, layout: _Layout, numbers: npt.NDArr
 def _left_out(names: Sequence[str]) -> list[str]:
     if not names:
         return []
-    what = (
-        "1 image whose name is unlike the views' was"
-        if len(names) == 1
-        else (f"{len(names)} images whose names are unlike the views' were")
-    )
-    return [f"{what} left out: {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}"]
+    number = len(names)
+    what, were = ("1 image whose name is", "was") if number == 1 else (f"{number} images whose names are", "were")
+    return [f"{what} unlike the views' {were} left out: {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}"]
 
 
 def _require_different(path: Path, named: ViewNumbers) -> None:
