@@ -159,13 +159,20 @@ def stage_message(stage, title):
     return f"{{wildcards.dataset}}/{{wildcards.scene}}: {title} ({choices})"
 
 
+# the command of every stage, after its inputs
+STAGE_FLAGS = (
+    "--choice {params.choice} --parameters {params.parameters:q} --threads {threads} "
+    "--output {output.maps:q} --timing {output.timing:q} 2> {log:q}"
+)
+
+
 def file_before(stage):
-    """Function of wildcards: the stage file that a stage reads, of the last stage that ran before it, if any."""
+    """Function of wildcards: the stage file that a stage reads, of the last stage that ran before it."""
     before = list(STAGES)[: list(STAGES).index(stage)]
 
     def file(wildcards):
         labels = {name: wildcards[name] for name in before}
-        return scene_files(wildcards.dataset, wildcards.scene).stage(labels, before[-1]) if before else []
+        return scene_files(wildcards.dataset, wildcards.scene).stage(labels, before[-1])
 
     return file
 
