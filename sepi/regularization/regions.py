@@ -43,17 +43,6 @@ class Region(NamedTuple):
         return basis_of(self.pixels)
 
 
-def seen_from(plane: Plane, one: Region, other: Region) -> Plane:
-    """The plane of one region in the axes of another."""
-    down, across = (
-        there.start - here.start + (longer - length) / 2
-        for here, length, there, longer in zip(
-            one.place, one.pixels.shape, other.place, other.pixels.shape, strict=True
-        )
-    )
-    return np.array([plane[0] + plane[1] * across + plane[2] * down, *plane[1:]])
-
-
 class Parts(NamedTuple):
     """The connected parts of a mask.
 
