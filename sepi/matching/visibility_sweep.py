@@ -269,7 +269,7 @@ def _sweep(
     disparities = light_field.require_disparity_range().candidates(parameters.fewer(light_field, sampling))
     likely = None if disparity is None else _likely_candidates(disparity, disparities)
     guide = guide_of(light_field, mean)
-    least = variance_of_residuals(_contrast_of_surfaces(light_field), guide.shape[2])
+    least = variance_of_residuals(_contrast_of_surfaces(light_field))
     contrast = variance_within_surface(guide, least, 1.0 if disparity is None else SHARE_AFTER_FIRST)
     shown = light_field.present
     if light_field.missing is not None:

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.image.noise import noise_level, variance_of_residuals
+from sepi.image.noise import noise_level
 from sepi.kernels import refocusing as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
 from sepi.matching.nearest_surfaces import EMPTY, nearest_surfaces, z_buffers
@@ -186,7 +186,7 @@ def all_in_focus(
         return np.clip(reference, 0, 1)
     disparity = np.where(np.isfinite(disparity), disparity, np.float32(np.nan))
     channels = reference.shape[2]
-    noise = variance_of_residuals(noise_level(light_field.reference_view), channels)
+    noise = 2 * channels * noise_level(light_field.reference_view) ** 2
     scale2 = np.float32(COLOUR_SCALE**2 * channels / 3 + noise)
     centre = reference
     for number in range(ROUNDS):
