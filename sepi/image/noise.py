@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.process.workspace import kept
@@ -44,7 +45,14 @@ def noise_level(image: FloatMap, region: BoolMap | None = None) -> float:
     response = response.reshape(image.shape)[region]
     if not response.size:
         return 0.0
-    return float(np.median(response).item() * _MEDIAN_TO_SIGMA / 6)
+    return median(response) * _MEDIAN_TO_SIGMA / 6
+
+
+def median(values: npt.NDArray[np.floating]) -> float:
+    """Median of a whole array; NumPy's also looks for NaN, and takes ten times as long."""
+    middle = values.size // 2
+    parted = np.partition(values, middle, axis=None)
+    return float(parted[middle] if values.size % 2 else (parted[:middle].max() + parted[middle]) / 2)
 
 
 def noise_of_reference_view(light_field: LightField) -> float:
@@ -54,7 +62,12 @@ def noise_of_reference_view(light_field: LightField) -> float:
 
 def mask_energy(image: FloatMap) -> FloatMap:
     """Squared response of the second difference, mean over channels; in white noise its mean is the variance."""
-    return np.asarray(np.square(_response(image).reshape(image.shape) / 6).mean(axis=2), np.float32)
+    return sum_of_channels(np.square(_response(image).reshape(image.shape) / 6)) / np.float32(image.shape[2])
+
+
+def sum_of_channels(image: FloatMap) -> FloatMap:
+    """Sum of the channels of an image (H, W, C), float32; NumPy takes thirty times as long over a short axis."""
+    return np.asarray(cv2.transform(image, np.ones((1, image.shape[2]), np.float32)).reshape(image.shape[:2]))
 
 
 def _response(image: FloatMap) -> FloatMap:

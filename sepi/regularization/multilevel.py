@@ -14,7 +14,9 @@ References
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,9 +33,6 @@ LEVELS = 5
 
 COUNTED = 2
 """Every second level is part of the preconditioner; the others only connect them."""
-
-HALF = np.float32(0.5)
-"""Height of a hat at the finer level's nodes beside its own."""
 
 MARGIN: int = kernels.MARGIN
 """Reach of the stencil, pixels, and so the width of the zeros round the solver's pictures."""
@@ -115,16 +114,14 @@ def conjugate_gradients(
     if not enough:
         return np.zeros_like(right)
     direction, bent = np.zeros_like(right), np.zeros_like(right)
-    kernels.bend(stencil, start, bent)
-    solution, residual, before = start.copy(), right - bent, 1.0
+    kernels.bend(stencil, start, 0.0, direction, bent)
+    solution, residual, before = start.copy(), right - bent, math.inf
     left = float(np.linalg.norm(residual)) ** 2
     for _ in range(max_iterations):
         if left < enough**2:
             break
         ahead, along = inverse(residual)
-        direction *= along / before
-        direction += ahead
-        curved = kernels.bend(stencil, direction, bent)
+        curved = kernels.bend(stencil, ahead, along / before, direction, bent)
         left = kernels.step(along / curved, direction, bent, solution, residual)
         before = along
     return solution
@@ -147,44 +144,24 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
         the returned picture.
     """
     inverse = _inverse(stencil[0], dtype)
-    hats = [_inverse(diagonal, dtype) for diagonal in _diagonals(stencil)]
-    levels = [np.empty(shape, dtype) for shape in _shapes(stencil)]
-    out = np.zeros(stencil.shape[1:], dtype)
+    hats, levels = [], []
+    for i, shape in enumerate(_shapes(stencil)):
+        diagonal = np.zeros(shape)
+        if i % COUNTED == 0:
+            kernels.diagonal_of_hats(stencil, kernels.SPACING << i, diagonal)
+        hats.append(_inverse(diagonal, dtype))
+        levels.append(np.empty(shape, dtype))
+    nothing, out = np.zeros([n // 2 + 1 for n in levels[-1].shape], dtype), np.zeros(stencil.shape[1:], dtype)
 
     def apply(residual: FloatArray) -> tuple[FloatArray, float]:
         kernels.onto_finest(residual, levels[0])
-        for i in range(1, LEVELS):
-            _onto_coarser(levels[i - 1], levels[i])
-        for i in reversed(range(LEVELS)):
-            if i % COUNTED:
-                levels[i][:] = 0
-            else:
-                levels[i] *= hats[i // COUNTED]
-            if i + 1 < LEVELS:
-                _add_coarser(levels[i + 1], levels[i])
+        for fine, coarse in pairwise(levels):
+            kernels.onto_coarser(fine, coarse)
+        for coarse, diagonal, fine in reversed(list(zip([*levels[1:], nothing], hats, levels, strict=True))):
+            kernels.onto_finer(coarse, diagonal, fine)
         return out, kernels.diagonal_and_finest(inverse, residual, levels[0], out)
 
     return apply
-
-
-def _onto_coarser(fine: FloatArray, out: FloatArray) -> None:
-    """Compute the inner products with hats (h, w) from those with finer hats (2 h - 1, 2 w - 1)."""
-    rows, halves = fine[::2].copy(), HALF * fine[1::2]
-    rows[1:] += halves
-    rows[:-1] += halves
-    out[:] = 0
-    out[:, 1:] += rows[:, 1::2]
-    out[:, :-1] += rows[:, 1::2]
-    out *= HALF
-    out += rows[:, ::2]
-
-
-def _add_coarser(coarse: FloatArray, fine: FloatArray) -> None:
-    """Add hats of heights (h, w) to the heights of the finer level (2 h - 1, 2 w - 1)."""
-    rows = np.repeat(coarse, 2, axis=0)[:-1]
-    rows[1::2] = HALF * (coarse[:-1] + coarse[1:])
-    fine[:, ::2] += rows
-    fine[:, 1::2] += HALF * (rows[:, :-1] + rows[:, 1:])
 
 
 def _shapes(stencil: FloatArray) -> list[tuple[int, int]]:
@@ -192,16 +169,6 @@ def _shapes(stencil: FloatArray) -> list[tuple[int, int]]:
     widest = kernels.SPACING << (LEVELS - 1)
     rows, columns = (-(-(n - 2 * kernels.MARGIN) // widest) for n in stencil.shape[1:])
     return [((rows << i) + 1, (columns << i) + 1) for i in reversed(range(LEVELS))]
-
-
-def _diagonals(stencil: FloatArray) -> list[FloatArray]:
-    """Diagonal of the matrix in the hats of each level of the preconditioner."""
-    found: list[FloatArray] = []
-    for i, shape in list(enumerate(_shapes(stencil)))[::COUNTED]:
-        diagonal = np.empty(shape)
-        kernels.diagonal_of_hats(stencil, kernels.SPACING << i, diagonal)
-        found.append(diagonal)
-    return found
 
 
 def _inverse(diagonal: FloatArray, dtype: npt.DTypeLike) -> FloatArray:

@@ -70,11 +70,13 @@ void weights_of_differences(Array<const float, 2> disparity, Array<const float, 
     });
 }
 
-// Computes the matrix times a direction, into out; returns the inner product of both.
+// Computes the next direction, ahead plus a share of the last one, and the matrix times it, into out; returns the inner
+// product of both.
 template <class Number>
-double bend(Array<const Number, 3> stencil, Array<const Number, 2> direction, Array<Number, 2> out) {
+double bend(Array<const Number, 3> stencil, Array<const Number, 2> ahead, Number share, Array<Number, 2> direction, Array<Number, 2> out) {
     const Index H = direction.shape[0] - 2 * MARGIN, W = direction.shape[1] - 2 * MARGIN;
     const Scratch<Number, 1> along(H);
+    parallel_for_pixels(direction.shape[0], direction.shape[1], [&](Index y, Index x) { direction(y, x) = share * direction(y, x) + ahead(y, x); });
     parallel_for(MARGIN, MARGIN + H, [&](Index y) {
         const Number *own = stencil.at(0, y, MARGIN), *here = direction.at(y, MARGIN);
         Number *__restrict target = out.at(y, MARGIN);
@@ -124,6 +126,34 @@ void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
             if (const Index y = 2 * i + n - down.before; 0 <= y && y < H) add(line + across.before, Number(down.height(n)), vector.at(y + MARGIN, MARGIN), W);
         Number *__restrict target = out.at(i);
         for (Index j = 0; j < w; ++j) target[j] = h[0] * line[2 * j] + h[1] * line[2 * j + 1] + h[2] * line[2 * j + 2] + h[3] * line[2 * j + 3];
+    });
+}
+
+// Inner products with hats (h, w) from those with finer hats (2 h - 1, 2 w - 1).
+template <class Number>
+void onto_coarser(Array<const Number, 2> fine, Array<Number, 2> out) {
+    parallel_for(0, out.shape[0], [&](Index i) {
+        const auto with_margin = zeros<Number, 1>(fine.shape[1] + 2);
+        Number *line = with_margin.array().data + 1;
+        for (const Index n : {-1, 1, 0})
+            if (0 <= 2 * i + n && 2 * i + n < fine.shape[0]) add(line, Number(n ? 0.5 : 1), fine.at(2 * i + n), fine.shape[1]);
+        for (Index j = 0; j < out.shape[1]; ++j) out(i, j) = line[2 * j] + (line[2 * j - 1] + line[2 * j + 1]) / 2;
+    });
+}
+
+// Multiply hats (2 h - 1, 2 w - 1) by an inverse, and add coarser hats (h, w).
+template <class Number>
+void onto_finer(Array<const Number, 2> coarse, Array<const Number, 2> inverse, Array<Number, 2> fine) {
+    parallel_for(0, fine.shape[0], [&](Index i) {
+        const Number *above = coarse.at(i / 2), *below = coarse.at((i + 1) / 2), *own = inverse.at(i);
+        Number *__restrict row = fine.at(i);
+        for (Index j = 0; j < fine.shape[1] / 2; ++j) {
+            const Number here = above[j] + below[j], next = above[j + 1] + below[j + 1];
+            row[2 * j] = own[2 * j] * row[2 * j] + here / 2;
+            row[2 * j + 1] = own[2 * j + 1] * row[2 * j + 1] + (here + next) / 4;
+        }
+        // the last of an odd number
+        if (const Index j = fine.shape[1] - 1; j % 2 == 0) row[j] = own[j] * row[j] + (above[j / 2] + below[j / 2]) / 2;
     });
 }
 
@@ -182,9 +212,11 @@ void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<doubl
 // The kernels of the second-order smoothing that work in single or double precision.
 template <class Number>
 void bind_of_numbers(nb::module_ &m) {
-    m.def("bend", &bend<Number>, Unlocked(), "stencil"_a, "direction"_a, "out"_a);
+    m.def("bend", &bend<Number>, Unlocked(), "stencil"_a, "ahead"_a, "share"_a, "direction"_a, "out"_a);
     m.def("step", &step<Number>, Unlocked(), "length"_a, "direction"_a, "bent"_a, "solution"_a, "residual"_a);
     m.def("onto_finest", &onto_finest<Number>, Unlocked(), "vector"_a, "out"_a);
+    m.def("onto_coarser", &onto_coarser<Number>, Unlocked(), "fine"_a, "out"_a);
+    m.def("onto_finer", &onto_finer<Number>, Unlocked(), "coarse"_a, "inverse"_a, "fine"_a);
     m.def("diagonal_and_finest", &diagonal_and_finest<Number>, Unlocked(), "inverse"_a, "vector"_a, "fine"_a, "out"_a);
 }
 
