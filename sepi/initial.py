@@ -84,8 +84,7 @@ def semi_global(
     >>> bool(np.median(np.abs(maps.disparity - light_field.ground_truth)) < 0.05)
     True
     """
-    result = first_depth(compared_views(light_field, parameters), parameters, progress)
-    return StageMaps(result.disparity, result.confidence)
+    return first_depth(compared_views(light_field, parameters), parameters, progress)
 
 
 def structure_tensor(

@@ -27,8 +27,8 @@ import numpy as np
 from pydantic import Field
 
 from sepi.image.edges import CannyParameters, canny_edges
-from sepi.image.superpixels import FloatArray, Superpixels, adjacency, colour_modes, superpixels
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.image.superpixels import Superpixels, adjacency, colour_modes, superpixels
+from sepi.lightfield import BoolMap, FloatArray, FloatMap, LightField
 from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, relative_confidence, require_previous
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.kernels import splines as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField, without_reference
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail
 from sepi.matching.row_bands import Rows
 from sepi.process.workspace import forget, kept
@@ -102,8 +102,7 @@ def spline_views(
     if rows == (0, height) and parameters.use_detail and (present == light_field.present).all():
         # the splines of all views take its place
         forget_detail(light_field)
-    others = present.copy()
-    others[reference] = False
+    others = without_reference(light_field, present)
     scales = parameters.colour_scale, parameters.detail_scale
     return SplineViews(
         splines,

@@ -23,10 +23,9 @@ import math
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.lightfield import FloatArray, FloatMap, LightField, as_unit_float
 from sepi.matching.view_subsets import grid_steps
 
 # smoothing before the differences, and of the tensor, pixels
@@ -82,7 +81,7 @@ def structure_tensor_depth(light_field: LightField) -> tuple[FloatMap, FloatMap]
     return best, confidence
 
 
-def _of_one_line(light_field: LightField, axis: int, step: float) -> tuple[npt.NDArray[np.float64], list[FloatMap]]:
+def _of_one_line(light_field: LightField, axis: int, step: float) -> tuple[FloatArray, list[FloatMap]]:
     """Views of the reference view's row (``axis`` 1) or column (0): baselines (N, 2) in ``step``, and pictures.
 
     For a column, pictures and baselines are transposed, so that its EPI is a horizontal one.
@@ -96,7 +95,7 @@ def _of_one_line(light_field: LightField, axis: int, step: float) -> tuple[npt.N
     return (baselines if axis else baselines[:, ::-1])[kept], images
 
 
-def _sheared(baselines: npt.NDArray[np.float64], images: list[FloatMap], shear: int) -> tuple[FloatMap, FloatMap]:
+def _sheared(baselines: FloatArray, images: list[FloatMap], shear: int) -> tuple[FloatMap, FloatMap]:
     """Disparity and coherence at the reference view from horizontal EPIs sheared by a whole disparity."""
     # after the shear, a surface of disparity `shear` has the same position in all views
     moved = np.stack([_shifted(image, shear * baseline) for baseline, image in zip(baselines, images, strict=True)])
@@ -119,7 +118,7 @@ def _sheared(baselines: npt.NDArray[np.float64], images: list[FloatMap], shear: 
     return disparity.astype(np.float32), coherence.astype(np.float32)
 
 
-def _shifted(image: FloatMap, pixels: npt.NDArray[np.float64]) -> FloatMap:
+def _shifted(image: FloatMap, pixels: FloatArray) -> FloatMap:
     """Image moved by ``pixels`` down and to the right, by cubic convolution [2]_; its borders are repeated."""
     for axis, distance in enumerate(pixels.round(6)):
         if not distance:

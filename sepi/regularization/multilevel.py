@@ -23,9 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.kernels import second_order as kernels
-from sepi.lightfield import FloatMap
+from sepi.lightfield import FloatArray, FloatMap
 
-FloatArray = npt.NDArray[np.float64]
 Inverse = Callable[[FloatArray], tuple[FloatArray, float]]
 
 LEVELS = 5

@@ -14,9 +14,9 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 
-from sepi.image.superpixels import Adjacency, FloatArray, Superpixels
+from sepi.image.superpixels import Adjacency, Superpixels
 from sepi.kernels import planes as kernels
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 from sepi.process.memory import take_blas_buffer
 
 UNIT = 15.0

@@ -14,8 +14,6 @@ References
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import cv2
 import numpy as np
 from pydantic import Field
@@ -24,6 +22,7 @@ from sepi.image.noise import noise_of_reference_view
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.denoising import DenoisedLightField
+from sepi.matching.gauss_newton import GaussNewton
 from sepi.matching.softening import SofteningParameters, compared_views
 from sepi.matching.view_noise import variance_map
 from sepi.matching.view_subsets import spread_views
@@ -34,9 +33,6 @@ from sepi.regularization.lit_planes import LitPlane, lit_planes
 from sepi.regularization.plane_choice import LIT_AREA, chosen_plane, kept_pixels
 from sepi.regularization.regions import Region, parts_of, widened
 from sepi.stage import OcclusionMarginParameters, StageMaps
-
-if TYPE_CHECKING:
-    from sepi.matching.gauss_newton import GaussNewton
 
 LEAST_NOISE = 1e-5
 """Least noise: rounding of float32. Integers have at least 0.3 levels."""
@@ -102,8 +98,6 @@ def fill_uniform_regions(
     SepiError
         If the disparity range is unknown.
     """
-    from sepi.matching.gauss_newton import GaussNewton
-
     # before the views take the memory
     take_blas_buffer()
     field = compared_views(light_field, parameters)

@@ -22,7 +22,7 @@ import numpy as np
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level
 from sepi.kernels import refocusing as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field, without_reference
 from sepi.matching.nearest_surfaces import EMPTY, nearest_surfaces, z_buffers
 from sepi.matching.row_bands import Rows
 from sepi.matching.sheared_views import ShearedViews
@@ -222,8 +222,7 @@ def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
     distance = np.hypot(*np.moveaxis(light_field.baselines, 2, 0))
     chosen = light_field.present & (distance <= aperture)
     if chosen.sum() < 2:
-        others = light_field.present.copy()
-        others[light_field.reference_position] = False
+        others = without_reference(light_field, light_field.present)
         raise SepiError(
             f"{light_field.name}: an aperture of {aperture:g} view steps has no view but the reference view; the "
             f"nearest other is {distance[others].min():g} away"
