@@ -46,15 +46,13 @@ from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters, 
 from sepi.matching.visibility_sweep import VisibleViewsParameters, depth_from_visible_views, occluded_in_any_view
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_previous
 
+# change of the initial depth that makes a pixel a candidate for occlusion, pixels per view step
+_DISCONTINUITY = 0.3
+
 
 class OcclusionParameters(SweepParameters, CannyParameters):
     """Parameters of both occlusion models: candidates, and when a half replaces the full SEPI."""
 
-    discontinuity_threshold: float = Field(
-        0.3,
-        gt=0,
-        description="change of the initial depth that makes a pixel a candidate for occlusion, pixels per view step",
-    )
     candidate_reach: int = Field(
         12, ge=0, le=50, description="distance from an edge within which pixels are candidates, in pixels"
     )
@@ -240,7 +238,7 @@ def visibility(
 def occlusion_candidates(reference_view: FloatMap, disparity: FloatMap, parameters: OcclusionParameters) -> BoolMap:
     """Pixels within reach of an edge of the reference view or of a depth discontinuity; shape (H, W), bool."""
     edges = canny_edges(reference_view, parameters)
-    edges |= depth_discontinuities(disparity, parameters.discontinuity_threshold)
+    edges |= depth_discontinuities(disparity, _DISCONTINUITY)
     return np.asarray(cv2.dilate(edges.astype(np.uint8), _box(parameters.candidate_reach)) > 0)
 
 
@@ -266,19 +264,11 @@ def nearer_on_hidden_side(
     -------
     ndarray, shape (H, W), bool
     """
-    nearest = np.full(surface.shape, -np.inf, np.float32)
-    H, W = surface.shape
-    for side in sides:
-        dt, ds = SIDES[side]
-        for distance in range(1, reach + 1):
-            # the views kept lie towards (dt, ds), so the occluder lies on the opposite side
-            dy, dx = -dt * distance, -ds * distance
-            if abs(dy) >= H or abs(dx) >= W:
-                break
-            here = np.s_[max(0, -dy) : H - max(0, dy), max(0, -dx) : W - max(0, dx)]
-            there = np.s_[max(0, dy) : H - max(0, -dy), max(0, dx) : W - max(0, -dx)]
-            np.maximum(nearest[here], surface[there], out=nearest[here])
-    return nearest > disparity + margin
+    # the views kept lie towards a side, so the occluder lies on the opposite one
+    hiding, steps = np.zeros((2 * reach + 1, 2 * reach + 1), np.uint8), np.arange(1, reach + 1)
+    for dt, ds in (SIDES[side] for side in sides):
+        hiding[reach - dt * steps, reach - ds * steps] = 1
+    return np.asarray(cv2.dilate(surface, hiding) > disparity + margin)
 
 
 def replace_where_better(

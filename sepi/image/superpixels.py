@@ -16,9 +16,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 

@@ -76,7 +76,7 @@ class GaussNewton(AlignedViews):
     @cached_property
     def colour_variance(self) -> float:
         """Divisor of the squared residuals of colours, in gradients and curvatures."""
-        return self._parameters.colour_scale**2 + variance_of_residuals(reference_noise(self._light_field), 3)
+        return self._parameters.colour_scale**2 + variance_of_residuals(reference_noise(self._light_field))
 
     def gradient_and_hessian(
         self, mean: FloatMap, disparity: FloatMap, slopes: tuple[FloatMap, FloatMap] | None = None

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.image.noise import residual_variance
+from sepi.image.noise import reference_residual_variance
 from sepi.kernels import LANES
 from sepi.kernels import plane_sweep as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
@@ -180,7 +180,7 @@ def sweep(
     groups, subsets = _without_empty(groups, subsets)
     mask = np.ones((H, W), bool) if mask is None else mask
     colours = planar(softened(light_field, parameters.softening))
-    noise = residual_variance(light_field.reference_view)
+    noise = reference_residual_variance(light_field)
     squared_scale = parameters.scale**2 + noise
     scale2 = np.float32(squared_scale * full_scale(colours.dtype) ** 2)
     shown = shown_columns(light_field)

@@ -14,7 +14,7 @@ from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.denoising import sure_noise
 from sepi.matching.expected_costs import expected_costs
 from sepi.matching.plane_sweep import TILE_WIDTH, SweepParameters, sweep
-from sepi.matching.stitched_epi import line_cost, stitched_epi
+from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.sweep_arrays import sampled_candidates
 from sepi.matching.view_subsets import HALVES_AND_QUARTERS, halves_and_quarters
 from sepi.scenes import render
@@ -153,7 +153,12 @@ def test_sweep_visits_the_samples_of_the_stitched_epi(disparity, geometry):
     scale = float(np.sqrt(parameters.scale**2 + residual_variance(light_field.reference_view)))
     result = sweep(light_field, parameters)
     for y, x in [(6, 7), (0, 3), (11, 14), (5, 1)]:
-        costs = [line_cost(light_field, y, x, disparity + offset, scale) for offset in (-0.5, 0, 0.5)]
+        costs = []
+        for candidate in (disparity - 0.5, disparity, disparity + 0.5):
+            samples, valid = stitched_epi(light_field, y, candidate).along_line(x)
+            valid[np.ravel_multi_index(light_field.reference_position, light_field.grid)] = False
+            squared = ((samples - light_field.reference_view[y, x]) ** 2).sum(axis=1)[valid]
+            costs.append(np.mean(squared / (squared + scale**2)) if squared.size else np.nan)
         assert result.cost[0, y, x] == pytest.approx(np.nanmin(costs), abs=1e-5)
 
 

@@ -149,10 +149,10 @@ def test_splines_that_are_kept_are_those_made_anew() -> None:
     """A stage that finds splines of the one before, of other views or without detail, computes with theirs."""
     scene = render("dots", size=64, views=5)
     rows, usual = Rows(0, scene.shape[0]), BaseDetailParameters()
-    colours, other = usual.model_copy(update={"use_detail": False}), usual.model_copy(update={"base_radius": 2})
+    colours = usual.model_copy(update={"use_detail": False})
     keeping = replace(scene, workspace=Workspace())
     few, all_views = spread_views(scene, 9), scene.present
-    made = ((colours, few), (usual, few), (usual, all_views), (other, few), (usual, few), (colours, all_views))
+    made = ((colours, few), (usual, few), (usual, all_views), (colours, few), (usual, few), (colours, all_views))
     for parameters, present in made:
         found, anew = (spline_views(field, parameters, rows, present) for field in (keeping, scene))
         np.testing.assert_array_equal(found.splines[present], anew.splines[present])

@@ -20,9 +20,9 @@ import cv2
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.image.noise import noise_level, variance_of_residuals
+from sepi.image.noise import noise_level
 from sepi.kernels import refocusing as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field, without_reference
 from sepi.matching.nearest_surfaces import EMPTY, nearest_surfaces, z_buffers
 from sepi.matching.row_bands import Rows
 from sepi.matching.sheared_views import ShearedViews
@@ -186,7 +186,7 @@ def all_in_focus(
         return np.clip(reference, 0, 1)
     disparity = np.where(np.isfinite(disparity), disparity, np.float32(np.nan))
     channels = reference.shape[2]
-    noise = variance_of_residuals(noise_level(light_field.reference_view), channels)
+    noise = 2 * channels * noise_level(light_field.reference_view) ** 2
     scale2 = np.float32(COLOUR_SCALE**2 * channels / 3 + noise)
     centre = reference
     for number in range(ROUNDS):
@@ -222,8 +222,7 @@ def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
     distance = np.hypot(*np.moveaxis(light_field.baselines, 2, 0))
     chosen = light_field.present & (distance <= aperture)
     if chosen.sum() < 2:
-        others = light_field.present.copy()
-        others[light_field.reference_position] = False
+        others = without_reference(light_field, light_field.present)
         raise SepiError(
             f"{light_field.name}: an aperture of {aperture:g} view steps has no view but the reference view; the "
             f"nearest other is {distance[others].min():g} away"
