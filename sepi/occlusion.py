@@ -226,7 +226,7 @@ def visibility(
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress, mean_reference)
     # denoising would mix the colours of both surfaces at a rim
     disparity = assigned_to_surfaces(given, result.disparity, parameters)
-    views = spread_views(light_field, parameters.views)
+    views = spread_views(light_field, parameters.first_views)
     disparity = without_specks(light_field, disparity, views, parameters)
     return before.updated(
         disparity,

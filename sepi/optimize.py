@@ -27,7 +27,7 @@ from sepi.error_bars.bars import error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
 from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_views
 from sepi.image.noise import reference_residual_variance
-from sepi.lightfield import BoolMap, FloatArray, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
 from sepi.matching.gauss_newton import ANY_SURFACE, Evidence, GaussNewton, Surfaces, windowed_step
@@ -98,8 +98,10 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     reliable_confidence: float = Field(
         0.5, gt=0, le=1, description="confidence within two pixels from which a discontinuity in the data is trusted"
     )
-    rtol: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the solver stops in the last round")
-    first_rtol: float = Field(3e-3, gt=0, lt=1, description="the same for the other rounds")
+    rtol: float = Field(
+        3e-4, ge=1e-5, lt=1, description="residual at which the solver stops in the last round, relative"
+    )
+    first_rtol: float = Field(3e-3, ge=1e-5, lt=1, description="the same for the other rounds")
     max_iterations: int = Field(200, ge=1, description="most iterations of the solver")
 
     @model_validator(mode="after")
@@ -284,7 +286,7 @@ class _Prior(NamedTuple):
 
     uniform: BoolMap
     reliability: FloatMap
-    colours: list[FloatArray]
+    colours: list[FloatMap]
     colour_variance: float
 
 

@@ -11,8 +11,8 @@ import click
 from sepi.process.command import SepiGroup, shown_errors
 from sepi.registry import Known
 
-# Libraries read these when imported. Products are small here, so threads of OpenBLAS would only wait. Pages of 2 MB take
-# time and memory, since arrays live shortly. Plugins of pydantic would be searched in all packages
+# Libraries read these when imported. Products are small here, so threads of OpenBLAS would only wait. Pages of 2 MB
+# take time and memory, since arrays live shortly. Plugins of pydantic would be searched in all packages
 _SETTINGS = {"OPENBLAS_NUM_THREADS": "1", "NUMPY_MADVISE_HUGEPAGE": "0", "PYDANTIC_DISABLE_PLUGINS": "1"}
 for _name, _value in _SETTINGS.items():
     os.environ.setdefault(_name, _value)

@@ -22,10 +22,14 @@ from itertools import combinations_with_replacement
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
+from sepi.image.noise import sum_of_channels
 from sepi.kernels import second_order as kernels
-from sepi.lightfield import FloatArray, FloatMap
+from sepi.lightfield import FloatMap
 from sepi.regularization.multilevel import MARGIN
+
+FloatArray = npt.NDArray[np.floating]
 
 # along x, along y and mixed: rows and columns of the pixels of a difference, and their factors
 _DIFFERENCES = (
@@ -45,7 +49,7 @@ _FREQUENCIES = 128
 _LEAST = 1e-8
 
 
-def colour_changes(guide: FloatMap) -> list[FloatArray]:
+def colour_changes(guide: FloatMap) -> list[FloatMap]:
     """Squared RGB distances within the second differences along x, along y and mixed.
 
     Parameters
@@ -55,12 +59,12 @@ def colour_changes(guide: FloatMap) -> list[FloatArray]:
 
     Returns
     -------
-    list of ndarray
+    list of ndarray, float32
         Of shapes (H, W - 2), (H - 2, W) and (H - 1, W - 1).
     """
 
-    def squared(difference: FloatMap) -> FloatArray:
-        return np.asarray(np.einsum("hwc,hwc->hw", difference, difference), np.float64)
+    def squared(difference: FloatMap) -> FloatMap:
+        return sum_of_channels(np.square(difference))
 
     right, down = (squared(np.diff(guide, axis=axis)) for axis in (1, 0))
     mixed = squared(guide[1:, 1:] - guide[:-1, :-1]) + squared(guide[:-1, 1:] - guide[1:, :-1])
@@ -76,8 +80,8 @@ def upper_quartile(disparity: FloatMap) -> float:
 
 
 def smoothness_weights(
-    disparity: FloatMap, colours: list[FloatArray], reliability: FloatMap, threshold: float, colour_variance: float
-) -> list[FloatArray]:
+    disparity: FloatMap, colours: list[FloatMap], reliability: FloatMap, threshold: float, colour_variance: float
+) -> list[FloatMap]:
     """Weights of the second differences along x, along y and mixed, 0..1.
 
     Parameters
@@ -95,14 +99,14 @@ def smoothness_weights(
 
     Returns
     -------
-    list of ndarray
+    list of ndarray, float32
         Of shapes (H, W - 2), (H - 2, W) and (H - 1, W - 1).
     """
     disparity, reliability = (np.ascontiguousarray(each, np.float32) for each in (disparity, reliability))
 
-    def weight(corners: tuple[tuple[int, int], ...], factors: tuple[float, ...], colour: FloatArray) -> FloatArray:
-        out, apart = np.empty(colour.shape), np.ascontiguousarray(colour, np.float64)
-        where, how = np.array(corners), np.array(factors)
+    def weight(corners: tuple[tuple[int, int], ...], factors: tuple[float, ...], colour: FloatMap) -> FloatMap:
+        out, apart = np.empty(colour.shape, np.float32), np.ascontiguousarray(colour)
+        where, how = np.array(corners), np.array(factors, np.float32)
         kernels.weights_of_differences(disparity, reliability, apart, where, how, threshold, colour_variance, out)
         return out
 
@@ -121,11 +125,11 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
 
     Returns
     -------
-    ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
+    ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), of the weights' type
         Entries of each pixel with itself and with the pixels to the right by 1 and 2, below by 1 and 2, below to the
         right, and below to the left; the matrix is symmetric. The margin is zero.
     """
-    stencil = np.zeros((7, shape[0] + 2 * MARGIN, shape[1] + 2 * MARGIN))
+    stencil = np.zeros((7, shape[0] + 2 * MARGIN, shape[1] + 2 * MARGIN), weights[0].dtype)
     for (corners, factors), weight in zip(_DIFFERENCES, weights, strict=True):
         height, width = weight.shape
         pairs = combinations_with_replacement(zip(corners, factors, strict=True), 2)
@@ -135,7 +139,7 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
     return stencil
 
 
-def inverse_diagonal(weight: FloatMap, smoothness: list[FloatArray]) -> FloatMap:
+def inverse_diagonal(weight: FloatMap, smoothness: list[FloatMap]) -> FloatMap:
     """Diagonal of the inverse of the system of second-order smoothing, approximately.
 
     Parameters
