@@ -48,6 +48,8 @@ from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_
 
 # change of the initial depth that makes a pixel a candidate for occlusion, pixels per view step
 _DISCONTINUITY = 0.3
+# mean-shift patch of 2 r + 1 pixels, and its bandwidths: RGB distance, colours in 0..1; pixels per view step
+_PATCH = 4, 0.05, 0.3
 
 
 class OcclusionParameters(SweepParameters, CannyParameters):
@@ -64,9 +66,6 @@ class OcclusionParameters(SweepParameters, CannyParameters):
 class HalfSepiParameters(OcclusionParameters):
     """Parameters of the half-SEPI."""
 
-    patch_radius: int = Field(4, ge=1, le=20, description="mean-shift patch of 2 r + 1 pixels")
-    patch_sigma_colour: float = Field(0.05, gt=0, description="mean-shift bandwidth, RGB distance, colours in 0..1")
-    patch_sigma_disparity: float = Field(0.3, gt=0, description="mean-shift bandwidth, pixels per view step")
     side_reach: int = Field(16, ge=1, le=50, description="distance within which the nearer surface is searched, pixels")
     side_margin: float = Field(0.1, ge=0, description="by how much the occluder must be nearer, pixels per view step")
     gain_unconfirmed: float = Field(
@@ -130,17 +129,9 @@ def half_sepi(
     before = require_previous(previous)
     candidates = occlusion_candidates(light_field.reference_view, before.disparity, parameters)
     views = halves_and_quarters(light_field)
-    result = sweep(
-        light_field, parameters, groups=views.groups, subsets=views.subsets, mask=candidates, progress=progress
-    )
-    surface = patch_modes(
-        light_field.reference_view,
-        before.disparity,
-        cv2.dilate(candidates.astype(np.uint8), _box(parameters.side_reach)) > 0,
-        radius=parameters.patch_radius,
-        sigma_colour=parameters.patch_sigma_colour,
-        sigma_disparity=parameters.patch_sigma_disparity,
-    )
+    result = sweep(light_field, parameters, subsets=views, mask=candidates, progress=progress)
+    near = cv2.dilate(candidates.astype(np.uint8), _box(parameters.side_reach)) > 0
+    surface = patch_modes(light_field.reference_view, before.disparity, near, *_PATCH)
     cost = result.cost.copy()
     for n, name in enumerate(views.names[1:], start=1):
         sides = name.split("-")
@@ -184,9 +175,7 @@ def wang(
     before = require_previous(previous)
     candidates = occlusion_candidates(light_field.reference_view, before.disparity, parameters)
     views = half_planes(light_field, parameters.directions)
-    result = sweep(
-        light_field, parameters, groups=views.groups, subsets=views.subsets, mask=candidates, progress=progress
-    )
+    result = sweep(light_field, parameters, subsets=views, mask=candidates, progress=progress)
     # the middles of the two halves lie along the edge's normal and against it
     normal = edge_angle(light_field.reference_view, parameters)
     first = np.floor(normal / np.pi * parameters.directions).astype(np.int64) % (2 * parameters.directions)

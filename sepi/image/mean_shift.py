@@ -26,7 +26,7 @@ _UNLIKE = np.float32(1e4)
 
 
 def patch_modes(
-    image: FloatMap, disparity: FloatMap, mask: BoolMap, *, radius: int, sigma_colour: float, sigma_disparity: float
+    image: FloatMap, disparity: FloatMap, mask: BoolMap, radius: int, sigma_colour: float, sigma_disparity: float
 ) -> FloatMap:
     """Disparity of each masked pixel's mode in colour and disparity.
 

@@ -146,7 +146,7 @@ def base_detail_decomposition(
     detail, missing = _detail_so_far(light_field, parameters, rows, present)
     edge = float(np.hypot(_EDGE, 3 * noise))
     if detail.size and missing.any():
-        _make_detail(views, unit, missing, edge, rows, detail)
+        kernels.detail_of_views(views, float(unit), missing, rows.low, *_window(edge), DETAIL_UNIT, detail)
     return BaseDetail(
         views,
         unit,
@@ -181,24 +181,17 @@ def compared_with(views: BaseDetail, picture: FloatMap, parameters: BaseDetailPa
     """
     detail = views.reference_detail
     if parameters.use_detail:
-        made = np.zeros((1, 1, *detail.shape), np.int16)
-        _make_detail(picture[None, None], np.float32(1), np.ones((1, 1), bool), views.edge, rows, made)
+        made, window = np.zeros((1, 1, *detail.shape), np.int16), _window(views.edge)
+        kernels.detail_of_views(picture[None, None], 1.0, np.ones((1, 1), bool), rows.low, *window, DETAIL_UNIT, made)
         detail = made[0, 0]
     return views._replace(guide=picture, reference_detail=detail, noise=views.noise / 2)
 
 
-def _make_detail(
-    views: npt.NDArray[Any],
-    unit: np.float32,
-    wanted: BoolMap,
-    edge: float,
-    rows: Rows,
-    out: npt.NDArray[np.int16],
-) -> None:
+def _window(edge: float) -> tuple[FloatMap, float]:
+    """Weights of the bilateral filter by distance, and what it multiplies squared sums of differences with."""
     squared = np.arange(_RADIUS + 1) ** 2
     nearness = np.exp(-0.5 * (squared[:, None] + squared) / _WIDTH**2)
-    window = nearness.astype(np.float32), 1 / (64 * edge * edge)
-    kernels.detail_of_views(views, float(unit), wanted, rows.low, *window, DETAIL_UNIT, out)
+    return nearness.astype(np.float32), 1 / (64 * edge * edge)
 
 
 def forget_detail(light_field: LightField) -> None:

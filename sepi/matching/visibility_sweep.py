@@ -276,10 +276,21 @@ def _sweep(
     smoothing = parameters.for_views(int(shown.sum()))
     costs = AveragedCosts(volumes, disparities, guide, contrast, smoothing, likely if refined else None)
     searched = np.zeros_like(present) if refined else _searched_views(light_field, present, parameters)
+    candidates = sampled_candidates(disparities, light_field.baselines)
     for band in row_bands(light_field, present, float(np.abs(disparities).max()), BYTES_PER_PIXEL):
         visibility = _visibility(light_field, present, disparity, searched, likely, parameters, band)
-        # the smoothing takes about a tenth of the time
-        _add_costs(light_field, present, visibility, mean, parameters, band, disparities, costs, progress)
+        views = base_detail_decomposition(light_field, parameters, band.rows, present)
+        if mean is not None:
+            views = compared_with(views, mean, parameters, band.rows)
+        scales = parameters.colour_scale, parameters.detail_scale
+        scales2 = np.array([views.squared_scale(scale) for scale in scales], np.float32)
+        for begin in range(band.begin, band.end, ROWS_AT_ONCE):
+            end = min(band.end, begin + ROWS_AT_ONCE)
+            room = costs.room(end - begin)
+            kernels.sweep_visible_rows(views, visibility, scales2, parameters.shares, candidates, begin, end, room)
+            costs.add(end - begin)
+            # the smoothing takes about a tenth of the time
+            progress(0.9 * end / light_field.shape[0])
     result = costs.smoothed()
     progress(1.0)
     return result
@@ -290,32 +301,6 @@ def _contrast_of_surfaces(light_field: LightField) -> float:
     noise = reference_noise(light_field)
     # denoising has taken noise and faint texture out of the guide
     return noise if isinstance(light_field, DenoisedLightField) else TEXTURE * noise
-
-
-def _add_costs(
-    light_field: LightField,
-    present: BoolMap,
-    visibility: Visibility,
-    mean: FloatMap | None,
-    parameters: VisibilitySweepParameters,
-    band: Band,
-    disparities: FloatMap,
-    costs: AveragedCosts,
-    progress: Progress,
-) -> None:
-    """Add the cost of every candidate for the rows of a band."""
-    views = base_detail_decomposition(light_field, parameters, band.rows, present)
-    if mean is not None:
-        views = compared_with(views, mean, parameters, band.rows)
-    scales = parameters.colour_scale, parameters.detail_scale
-    scales2 = np.array([views.squared_scale(scale) for scale in scales], np.float32)
-    candidates = sampled_candidates(disparities, light_field.baselines)
-    for begin in range(band.begin, band.end, ROWS_AT_ONCE):
-        end = min(band.end, begin + ROWS_AT_ONCE)
-        room = costs.room(end - begin)
-        kernels.sweep_visible_rows(views, visibility, scales2, parameters.shares, candidates, begin, end, room)
-        costs.add(end - begin)
-        progress(0.9 * end / light_field.shape[0])
 
 
 def _searched_views(light_field: LightField, present: BoolMap, parameters: VisibilitySweepParameters) -> BoolMap:

@@ -138,7 +138,7 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
     return stencil
 
 
-def inverse_diagonal(weight: FloatMap, smoothness: list[FloatArray]) -> FloatMap:
+def inverse_diagonal(weight: FloatMap, smoothness: list[FloatMap]) -> FloatMap:
     """Diagonal of the inverse of the system of second-order smoothing, approximately.
 
     Parameters

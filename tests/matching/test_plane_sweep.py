@@ -90,7 +90,7 @@ def twin(light_field, parameters, of_groups, groups, subset):
 def sweep_and_twin(light_field, parameters, numbers):
     """Disparities of the sweep and of its twin, of subsets of the views; their costs are the same."""
     views = halves_and_quarters(light_field)
-    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    result = sweep(light_field, parameters, subsets=views)
     of_groups = twin_sums(light_field, parameters, views.groups)
     disparities = []
     for n in numbers:
@@ -221,7 +221,7 @@ def test_subset_without_views_matches_nothing():
     light_field = random_light_field(grid=(3, 3), shape=(40, 44)).seen_from((0, 0))
     views = halves_and_quarters(light_field)
     parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=1, window_sigma=0.5, softening=0)
-    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    result = sweep(light_field, parameters, subsets=views)
     empty = views.names.index("left-up")
     assert (result.cost[empty] == 1).all()
     assert (result.mean[empty] == 1).all()
