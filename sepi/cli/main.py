@@ -45,9 +45,8 @@ class _Imported(Known[Any]):
         return [(name, super(_Imported, self).__getitem__(name)[1]) for name in sorted(self)]
 
 
-_COMMANDS = _Imported(
-    "commands", {name: (f"{__package__}.{module}", text) for name, (module, text) in _MODULES.items()}
-)
+_PLACES = {name: (f"{__package__}.{module}", text) for name, (module, text) in _MODULES.items()}
+_COMMANDS = _Imported("commands", _PLACES)
 
 
 class _Commands(SepiGroup):

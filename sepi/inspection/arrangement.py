@@ -11,7 +11,6 @@ and beside it, for each spacing and layout tried: in the right one, all views ag
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
@@ -19,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sepi.errors import SepiError, SepiWarning
+from sepi.errors import SepiError, warn
 from sepi.inspection import view_layouts
 from sepi.inspection.view_layouts import AT_END, FEWEST_POINTS, MATCHED, MOVEMENT, Baseline, Views, is_clear, matched
 from sepi.inspection.view_order import odd_views
@@ -110,19 +109,10 @@ def arrange(light_field: LightField, options: ReadOptions) -> LightField:
         )
     best, reason = tried[ranked[0]], "in which they fit together"
     if len(tried) > 1 and not _CLEAR_RATIO * costs[ranked[0]] + _LEAST_DIFFERENCE <= costs[ranked[1]] < math.inf:
-        square = next(
-            (way for way in tried if way.grid[0] == way.grid[1] and len(way.positions) == way.grid[0] ** 2), None
-        )
+        square = next((one for one in tried if one.grid[0] ** 2 == len(one.positions) == one.grid[1] ** 2), None)
         if square is None:
-            raise SepiError(
-                f"{source}: {count} views without row and column, and their arrangement is unclear "
-                f"({names}); give --grid ROWSxCOLUMNS"
-            )
-        warnings.warn(
-            f"{source}: the grid of the views is unclear; taken for {square.name}, set another by --grid",
-            SepiWarning,
-            stacklevel=2,
-        )
+            raise SepiError(f"{source}: {count} views whose arrangement is unclear ({names}); give --grid ROWSxCOLUMNS")
+        warn(f"{source}: the grid of the views is unclear; taken for {square.name}, set another by --grid")
         best, reason = square, "since the views are unclear"
     note = f"{count} numbered views taken for {best.name}, {reason}; set another by --grid"
     return _placed(light_field, best, options, note)
@@ -197,8 +187,7 @@ def _cost(views: Views, present: npt.NDArray[np.bool_], positions: Positions, re
             costs.append(found[0].mean(axis=0))
     if not costs:
         return math.inf
-    worst = np.sort(np.stack(costs), axis=0)[-math.ceil(len(costs) / _WORST) :]
-    return float(worst.mean(axis=0).min())
+    return float(np.sort(np.stack(costs), axis=0)[-math.ceil(len(costs) / _WORST) :].mean(axis=0).min())
 
 
 def _neighbours(positions: Positions, present: npt.NDArray[np.bool_], place: int, reach: int) -> list[int]:
@@ -227,10 +216,8 @@ def _placed(light_field: LightField, way: Arrangement, options: ReadOptions, not
     files = None if light_field.files is None else np.where(present, light_field.files[0][order], "")
     views = light_field.views[0][order]
     views[~present] = 0
-    notes = (*light_field.notes, note)
-    return replace(
-        light_field, views=views, present=present, view=options.view, arranged=True, files=files, notes=notes
-    )
+    known = {"views": views, "present": present, "files": files, "notes": (*light_field.notes, note)}
+    return replace(light_field, view=options.view, arranged=True, **known)
 
 
 # Spacings tried, and how many between one and its double
@@ -332,8 +319,7 @@ def _tried(views: Views, reach: int, factor: int) -> _Trial | None:
     if moved.size < FEWEST_POINTS or np.quantile(moved, 1 - AT_END) > 0.95 * MOVEMENT:
         return None
     order, spacing = hypotheses[best]
-    clear = is_clear(cost[:, best], cost[:, usual])
-    return _Trial(spacing, order, baselines, factor * float(moved.max()), clear)
+    return _Trial(spacing, order, baselines, factor * float(moved.max()), is_clear(cost[:, best], cost[:, usual]))
 
 
 def _measured(views: Views, trial: _Trial) -> float:

@@ -186,8 +186,7 @@ def point_cloud(
     """
     require_type("point cloud: picture", picture, np.ndarray, "a view")
     require_map("point cloud: disparity", disparity)
-    given = {"disparity": disparity, "confidence": confidence, "unknown": unknown, "sigma": sigma}
-    for name, values in given.items():
+    for name, values in {"disparity": disparity, "confidence": confidence, "unknown": unknown, "sigma": sigma}.items():
         require_type(f"point cloud: {name}", values, (np.ndarray, NoneType), "an array")
         if values is not None and values.shape != picture.shape[:2]:
             raise SepiError(f"point cloud: {name} is {values.shape}, the view {picture.shape[:2]} (height, width)")

@@ -139,8 +139,7 @@ def _dataset_section(
 
 def _texts(figures: pd.DataFrame, kinds: pd.Series, decimals: int) -> pd.DataFrame:
     """Figures as texts, published ones with the two decimals that the paper prints."""
-    printed = kinds == Kind.PUBLISHED
-    return shown(figures, decimals).assign(**shown(figures.loc[:, printed]))
+    return shown(figures, decimals).assign(**shown(figures.loc[:, kinds == Kind.PUBLISHED]))
 
 
 def region_table(runs: Runs) -> Table:
@@ -167,11 +166,11 @@ def region_table(runs: Runs) -> Table:
         most = here.map({True: len(scenes), False: len(of_paper)})
         notes[column] = [count_note([n], m) for n, m in zip(found.fillna(0).astype(int), most, strict=True)]
         # ours rank among published averages only if the scenes are the same
-        compares = not of_paper or sorted(of_paper) == sorted(
-            filter(None, map(partial(published.paper_scene, dataset), scenes))
-        )
+        theirs = filter(None, map(partial(published.paper_scene, dataset), scenes))
+        compares = not of_paper or sorted(of_paper) == sorted(theirs)
         ranked[column] = (known["learning"] == "none") & (compares | ~here)
     texts = shown(figures)
+    named = texts.assign(name=known["head"])
     rows = pd.concat([shown(figures[here], 4).replace("n/a", ""), texts[~here]]).loc[known.index].join(counts)
     rows = known[["learning"]].join(rows[[name for pair in zip(figures, counts, strict=True) for name in pair]])
     available = "; ".join(f"{dataset}: {', '.join(runs.scored(dataset)) or 'none'}" for dataset in datasets)
@@ -182,11 +181,7 @@ def region_table(runs: Runs) -> Table:
         "where none or fewer are named. "
         f"{REGIONS_NOTE} {LEARNED_NOTE}" + (f" {EXTERNAL_NOTE}" if plan.external else ""),
         rows.reset_index(names="method"),
-        [
-            section(
-                "", heads, texts.assign(name=known["head"]), ranks(texts.where(ranked, "")), notes, list(known["kind"])
-            )
-        ],
+        [section("", heads, named, ranks(texts.where(ranked, "")), notes, list(known["kind"]))],
         "Marked: best and second best in a column, of the published methods that are not learned, and of this code "
         "where it ran on every scene that the published averages are over",
     )
@@ -214,8 +209,7 @@ def mean_by_region(runs: Runs, dataset: str, variants: list[str]) -> tuple[pd.Da
 
 
 def _of(runs: Runs, dataset: str, region: str, variants: list[str]) -> pd.DataFrame:
-    found = runs.of("mse100", dataset, region)
-    return found.reindex(columns=map(own_key, variants)).set_axis(variants, axis=1)
+    return runs.of("mse100", dataset, region).reindex(columns=map(own_key, variants)).set_axis(variants, axis=1)
 
 
 def _ablation_section(runs: Runs, dataset: str, variants: list[str]) -> tuple[pd.DataFrame, Section]:

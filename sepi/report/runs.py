@@ -172,8 +172,7 @@ class Runs:
     def problem(self, dataset: str, scenes: Sequence[str], method: str) -> str:
         """Why an external method has no scores of scenes, or of how many it has some; empty if of all."""
         problems = [self.scenes[dataset, scene]["external"][method]["problem"] for scene in scenes]
-        alike = len(set(problems)) < 2
-        return "".join(problems[:1]) if alike else f"{problems.count('')} of {len(scenes)} scenes"
+        return "".join(problems[:1]) if len(set(problems)) < 2 else f"{problems.count('')} of {len(scenes)} scenes"
 
     def problems(self, dataset: str, scenes: Sequence[str]) -> pd.Series:
         """The :meth:`problem` of every method in the tables, empty but for external ones."""
@@ -192,8 +191,7 @@ class Runs:
 
 def weighted_means(values: pd.DataFrame, pixels: pd.Series, by: Any) -> pd.DataFrame:
     """Means over the pixels of several maps, with their number in the column ``pixels``; NaN over none."""
-    products = values.mul(pixels, axis=0)[pixels > 0]
-    sums = products.groupby(by, sort=False).agg(lambda column: column.sum(skipna=False))
+    sums = values.mul(pixels, axis=0)[pixels > 0].groupby(by, sort=False).agg(lambda column: column.sum(skipna=False))
     every = pixels.groupby(by, sort=False).sum()
     return sums.reindex(every.index).div(every, axis=0).assign(pixels=every)
 

@@ -206,9 +206,7 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
     if arranged and reference in [*black, *unknown]:
         t, s = reference
-        raise SepiError(
-            f"{source}: view {t},{s}, whose depth is estimated, is black or NaN; choose another by --view ROW,COLUMN"
-        )
+        raise SepiError(f"{source}: view {t},{s}, whose depth is made, is black or NaN; choose another by --view")
     assumed = [] if given else [f"axes taken as {' '.join(letters)}; --axes sets them otherwise"]
     missing = [*_missing_notes("all zeros", black), *_missing_notes("NaN throughout", unknown)]
     notes = (*assumed, *channel_notes, *assumptions, *missing)
@@ -238,8 +236,7 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
 
 def with_white(views: Array, present: BoolMap, path: Path, white: float) -> Array:
     """Views (T, S, H, W, C) scaled so that ``white`` becomes the white of their type."""
-    numbers = np.where(present, np.arange(present.size).reshape(present.shape), -1)
-    return _scaled(str(path), views, numbers, white)[0]
+    return _scaled(str(path), views, np.where(present, np.arange(present.size).reshape(present.shape), -1), white)[0]
 
 
 def _checked_axes(source: str, array: Array, text: str) -> str:

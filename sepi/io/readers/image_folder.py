@@ -69,12 +69,10 @@ def read(path: Path, options: ReadOptions) -> LightField:
     pixels, present, numbers, names = read_grid(path, views, layout.grid, options)
     told = (*_left_out([name for name in named.unmatched if _is_picture(name)]), *layout.notes)
     arranged, name = layout.arranged, str(name_of(path))
-    light_field = LightField(
-        pixels, name, str(path), present, view=options.view, notes=told, arranged=arranged, files=names
-    )
+    found = LightField(pixels, name, str(path), present, view=options.view, notes=told, arranged=arranged, files=names)
     # of decimals of which a part is row or column, none is a position
     counted = re.search(r"[0-9}*]\.\{|\}\.[0-9{*]", options.pattern or "")
-    return _with_positions(light_field, layout, numbers) if arranged and not counted else light_field
+    return _with_positions(found, layout, numbers) if arranged and not counted else found
 
 
 @dataclass(frozen=True)
@@ -150,9 +148,8 @@ def _by_row_and_column(folder: Path, named: ViewNumbers, numbers: Numbers, optio
                 f"images; say which numbers are row and column with --pattern, such as {EXAMPLES}"
             )
     if spread[0] // step >= grid[0] or spread[1] // step >= grid[1]:
-        raise SepiError(
-            f"{folder}: rows {top} to {max(rows)}, columns {left} to {max(columns)}; --grid has {grid[0]}x{grid[1]}"
-        )
+        ends = f"rows {top} to {max(rows)}, columns {left} to {max(columns)}"
+        raise SepiError(f"{folder}: {ends}; --grid has {grid[0]}x{grid[1]}")
     notes = []
     if named.said:
         notes = [f"the names say row and column{_like(named)}"]
@@ -161,10 +158,8 @@ def _by_row_and_column(folder: Path, named: ViewNumbers, numbers: Numbers, optio
     if top not in (0, 1) or left not in (0, 1):
         notes.append(f"the names count rows from {top}, columns from {left}")
     notes += _step_notes(step)
-    positions = {
-        name: (row - top) // step * grid[1] + (column - left) // step for name, (row, column) in numbers.items()
-    }
-    return _Layout(grid, positions, notes)
+    places = {name: ((row - top) // step, (column - left) // step) for name, (row, column) in numbers.items()}
+    return _Layout(grid, {name: row * grid[1] + column for name, (row, column) in places.items()}, notes)
 
 
 def _by_number(folder: Path, named: ViewNumbers, numbers: dict[str, int], grid: tuple[int, int] | None) -> _Layout:
