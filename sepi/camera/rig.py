@@ -357,9 +357,8 @@ class Rig:
         -------
         str
         """
-        views = [[*at, asdict(view.shot) | {"zoom": view.zoom}] for at, view in self.views.items()]
-        known = {"rotation": self.rotation, "origin": self.origin, "step": self.step, "units": self.units}
-        return json.dumps(known | {"views": views}, default=np.ndarray.tolist)
+        views = [[*at, {**asdict(view.shot), "zoom": view.zoom}] for at, view in self.views.items()]
+        return json.dumps({**vars(self), "views": views}, default=np.ndarray.tolist)
 
     @staticmethod
     def from_text(text: str) -> Rig:
@@ -381,19 +380,23 @@ class Rig:
         try:
             told = json.loads(text)
             views = {(int(t), int(s)): _rectified(view) for t, s, view in told["views"]}
-            rotation, origin = np.array(told["rotation"], np.float64), np.array(told["origin"], np.float64)
-            step, units = float(told["step"]), str(told["units"])
-            sound = (rotation.shape, origin.shape) == ((3, 3), (3,)) and step > 0
-            if not (sound and np.isfinite([*rotation.ravel(), *origin, step]).all()):
-                raise ValueError("no rotation, place and length")
+            step = float(told["step"])
+            if not 0 < step < np.inf:
+                raise ValueError("no length")
+            return Rig(*_pose(told, "origin"), step, str(told["units"]), views)
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError) as error:
             raise SepiError("damaged: it does not tell the poses of its cameras") from error
-        return Rig(rotation, origin, step, units, views)
+
+
+def _pose(told: Mapping[str, Any], place: str) -> tuple[Floats, Floats]:
+    rotation, at = (np.array(told[key], np.float64) for key in ("rotation", place))
+    if not (np.isfinite(rotation).all() and np.isfinite(at).all()):
+        raise ValueError("no rotation and place")
+    return rotation.reshape(3, 3), at.reshape(3)
 
 
 def _rectified(told: Mapping[str, Any]) -> Rectified:
     lens = told["lens"]
     pairs = {key: tuple(map(float, lens[key])) for key in ("focal", "principal", "distortion")}
     known = Lens(int(lens["width"]), int(lens["height"]), kind=str(lens["kind"]), **pairs)  # type: ignore[arg-type]
-    rotation, centre = np.array(told["rotation"], np.float64), np.array(told["centre"], np.float64)
-    return Rectified(Shot(str(told["name"]), known, rotation.reshape(3, 3), centre.reshape(3)), float(told["zoom"]))
+    return Rectified(Shot(str(told["name"]), known, *_pose(told, "centre")), float(told["zoom"]))
