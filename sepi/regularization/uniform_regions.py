@@ -120,18 +120,15 @@ def fill_uniform_regions(
         for n, (region, border) in enumerate(found)
     ]
     disparity, held = before.disparity.copy(), np.zeros_like(core)
-    for (region, _), chosen in zip(found, planes, strict=True):
-        if chosen is not None:
-            # a plane known at one side only may leave the range at the other
-            values = np.clip(region.basis @ chosen.plane, known.minimum, known.maximum)
-            disparity[region.place][region.pixels] = values
+    known_planes = [(region, chosen) for (region, _), chosen in zip(found, planes, strict=True) if chosen is not None]
+    for region, chosen in known_planes:
+        # a plane known at one side only may leave the range at the other
+        values = np.clip(region.basis @ chosen.plane, known.minimum, known.maximum)
+        disparity[region.place][region.pixels] = values
     regions = disparity != before.disparity
     asked = compared, parameters.occlusion_margin, float(np.median(variance))
     against = contradicted(light_field, before.disparity, disparity, regions, *asked)
-    for (region, _), chosen in zip(found, planes, strict=True):
-        place, pixels = region
-        if chosen is None:
-            continue
+    for (place, pixels), chosen in known_planes:
         kept = pixels & against[place]
         if kept.sum() > MOST_CONTRADICTED * pixels.sum():
             kept = pixels
@@ -232,7 +229,7 @@ def uniform_regions(
     parameters: UniformPlanesParameters,
     fewest: int,
 ) -> BoolMap:
-    """Plain pixels, and pixels of their colour around them.
+    """Plain pixels, and pixels of their colour around them, also in gaps too narrow for a plain window.
 
     Parameters
     ----------
@@ -243,7 +240,7 @@ def uniform_regions(
     confidence : ndarray, shape (H, W), float32
     parameters : UniformPlanesParameters
     fewest : int
-        Plain pixels within reach of a pixel of their colour.
+        Plain pixels within reach of a pixel of their colour; one is enough between pixels of the region.
 
     Returns
     -------
@@ -255,5 +252,8 @@ def uniform_regions(
     near = cv2.blur(core.astype(np.float32), (size, size))
     colour = cv2.blur(mean * core[..., None].astype(np.float32), (size, size)) / np.maximum(near, 1e-9)[..., None]
     alike = np.sum(cv2.split((mean - colour) ** 2), axis=0) < 27 * variance + parameters.colour_tolerance**2
+    alike &= confidence < parameters.grow_confidence
     # half a pixel is more than the rounding errors of a running sum
-    return np.asarray(core | ((near > (fewest - 0.5) / size**2) & alike & (confidence < parameters.grow_confidence)))
+    uniform = core | (alike & (near > (fewest - 0.5) / size**2))
+    between = cv2.morphologyEx(uniform.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)) > 0
+    return np.asarray(uniform | (alike & between & (near > 0.5 / size**2)))

@@ -6,7 +6,7 @@ from scipy.ndimage import gaussian_filter
 
 from sepi.lightfield import DisparityRange, LightField
 from sepi.regularization.border_planes import support
-from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions
+from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions, uniform_regions
 from sepi.stage import StageMaps
 
 SHAPE = (60, 90)
@@ -96,6 +96,16 @@ def test_a_wall_in_steps_of_integers_is_bare() -> None:
     light_field.views[..., 10:40, 10:60, :] = 120 + np.arange(30)[:, None, None] // 12
     _, filled = fill_uniform_regions(light_field, maps, UniformPlanesParameters(growth=0, ransac_iterations=40))
     assert filled[16:34, 16:54].mean() > 0.95
+
+
+def test_a_gap_between_pixels_of_a_wall_belongs_to_it() -> None:
+    """Between a box and a ball a wall is too narrow to be plain: a few rows there kept the ball's depth."""
+    plain = np.zeros((60, 30), bool)
+    plain[:10] = plain[[34, 37], 15] = True
+    grey, doubt = np.full((*plain.shape, 3), 0.5, np.float32), np.zeros(plain.shape, np.float32)
+    found = uniform_regions(grey, plain, 1e-6, doubt, UniformPlanesParameters(window_radius=4, growth=8), 2)
+    # one plain pixel is within reach of rows 22 to 24, and of rows 47 to 49, where the wall may end
+    assert np.flatnonzero(found[:, 15]).tolist() == list(range(47))
 
 
 def test_what_is_found_in_one_region_does_not_move_the_plane_of_the_next() -> None:
