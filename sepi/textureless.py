@@ -12,7 +12,8 @@ edges around them:
    neighbourhood. (Noise lowers the confidence of good depth, but not its agreement.)
 
 ``uniform_planes`` finds textureless regions by comparison with the noise, and gives each the plane of its border
-(:mod:`sepi.regularization.uniform_regions`). ``none`` returns the depth unchanged.
+(:mod:`sepi.regularization.uniform_regions`). Beside them it decides again what is near or far. ``none`` returns the
+depth unchanged.
 
 :class:`sepi.stage.Choice` describes arguments and results of all choices.
 
@@ -26,6 +27,8 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
+from sepi.boundaries.decision import assigned_to_surfaces
+from sepi.boundaries.parameters import BoundaryParameters
 from sepi.image.edges import CannyParameters, canny_edges
 from sepi.image.superpixels import Superpixels, adjacency, colour_modes, superpixels
 from sepi.lightfield import BoolMap, FloatArray, FloatMap, LightField
@@ -157,9 +160,12 @@ def uniform_planes(
     True
     """
     before = require_previous(previous)
-    disparity, uniform = fill_uniform_regions(light_field, before, parameters)
+    filled, uniform = fill_uniform_regions(light_field, before, parameters)
+    # beside what moved back, the map had no depth step at which to decide
+    rims = BoundaryParameters(occlusion_margin=parameters.occlusion_margin)
+    disparity = assigned_to_surfaces(light_field, filled, rims, before.disparity)
     progress(1.0)
-    return before.updated(disparity, before.confidence, textureless=uniform)
+    return before.updated(disparity, before.confidence, textureless=uniform & (disparity == filled))
 
 
 def superpixel_size(shape: tuple[int, int], parameters: LtiParameters) -> int:
