@@ -199,12 +199,7 @@ _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0
 
 def matches_numpy(path: Path) -> bool:
     """Whether ``path`` is a file or an archive of NumPy, by its content or its suffix ``.npy`` or ``.npz``."""
-    if not path.is_file():
-        return False
-    try:
-        return path.suffix.lower() in (".npy", ".npz") or bool(numpy_shapes(path))
-    except SepiError:
-        return False
+    return path.is_file() and (path.suffix.lower() in (".npy", ".npz") or bool(numpy_shapes(path)))
 
 
 def read_numpy(path: Path, options: ReadOptions) -> LightField:
@@ -271,11 +266,8 @@ def _require_room(path: Path, info: zipfile.ZipInfo) -> None:
 
 def matches_hdf5(path: Path) -> bool:
     """Whether ``path`` is an HDF5 file of another program, with an array that may be a light field."""
-    try:
-        others = has_dataset(path, "/", lambda root: not is_own(root))
-        return others and any(is_likely(shape) for shape, _ in hdf5_shapes(path).values())
-    except SepiError:
-        return False
+    others = has_dataset(path, "/", lambda root: not is_own(root))
+    return others and any(is_likely(shape) for shape, _ in hdf5_shapes(path).values())
 
 
 def read_hdf5(path: Path, options: ReadOptions) -> LightField:

@@ -36,7 +36,7 @@ class Format(NamedTuple):
     name, description : str
         For messages.
     matches : callable
-        Whether a path looks like this format; quick, and never raises.
+        Whether a path looks like this format; quick. An error of reading counts as no.
     read : callable
         Light field of a path and :class:`ReadOptions`.
     options : tuple of str
@@ -150,7 +150,13 @@ FORMATS: Known[Format] = Known("readers", _OWN, lambda name, module: import_modu
 
 def matching(path: Path) -> Format | None:
     """The format that a path looks like; those of extensions are asked only if no other but a loose one matches."""
-    return next((known for known in _as_asked() if known.matches(path)), None)
+    return next((known for known in _as_asked() if _matches(known, path)), None)
+
+
+def _matches(known: Format, path: Path) -> bool:
+    with suppress(SepiError, OSError):
+        return known.matches(path)
+    return False
 
 
 def _as_asked() -> Iterator[Format]:
@@ -358,9 +364,9 @@ def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
     """Shape and bytes of a value of each array in a file that may be a light field, and that the file can hold."""
     shapes: Shapes = {}
     with suppress(SepiError):
-        if array_files.matches_numpy(path):
+        if _matches(_OWN["numpy"], path):
             shapes = array_files.numpy_shapes(path)
-        elif matlab.matches(path):
+        elif _matches(_OWN["matlab"], path):
             shapes = matlab.array_shapes(path)
         else:
             # no digest check for many files: whoever reads the views checks the file

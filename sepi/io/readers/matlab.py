@@ -206,10 +206,7 @@ def matches(path: Path) -> bool:
     """Whether ``path`` is a file with MATLAB's header or the suffix ``.mat``."""
     if path.suffix.lower() == ".mat" or not path.is_file():
         return path.is_file()
-    try:
-        head = _head(path)
-    except SepiError:
-        return False
+    head = _head(path)
     return head[-4:] in _ORDERS or head.startswith(MATLAB_HDF5)
 
 
