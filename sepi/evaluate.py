@@ -17,7 +17,7 @@ from sepi.io.provenance import scene_attributes
 from sepi.io.scores import Evaluation, map_name, write_scores
 from sepi.lightfield import FloatMap, LightField, require_light_field
 from sepi.matching.unknown import with_unknown
-from sepi.process.command import SepiCommand, bad_thresholds
+from sepi.process.command import PATH, SepiCommand, bad_thresholds
 from sepi.scoring.error_bars import ErrorBars, reliability
 from sepi.scoring.regions import edges_of
 from sepi.scoring.scores import DISCONTINUITIES, region_masks, score_regions
@@ -141,16 +141,13 @@ def _scored(light_field: LightField, maps: StageMaps) -> FloatMap | StageMaps:
     return StageMaps(final.disparity, final.confidence, {name: final.extra[name] for name in ERROR_BARS})
 
 
-_PATH = click.Path(path_type=Path)
-
-
 @click.command(name="python -m sepi.evaluate", cls=SepiCommand)
-@click.option("--light-field", "light_field_path", type=_PATH, required=True, help="From ingest.")
-@click.option("--truth", type=_PATH, help="Ground truth from sepi.truth; default: the light field's own.")
-@click.option("--stages", type=_PATH, required=True, help="Folder of the stage files, whose paths name the maps.")
+@click.option("--light-field", "light_field_path", type=PATH, required=True, help="From ingest.")
+@click.option("--truth", type=PATH, help="Ground truth from sepi.truth; default: the light field's own.")
+@click.option("--stages", type=PATH, required=True, help="Folder of the stage files, whose paths name the maps.")
 @bad_thresholds
-@click.option("--output", type=_PATH, required=True, help="Score file (HDF5) to write.")
-@click.argument("paths", nargs=-1, type=_PATH, metavar="STAGE_FILE...", required=True)
+@click.option("--output", type=PATH, required=True, help="Score file (HDF5) to write.")
+@click.argument("paths", nargs=-1, type=PATH, metavar="STAGE_FILE...", required=True)
 def command(
     light_field_path: Path,
     truth: Path | None,

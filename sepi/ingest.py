@@ -15,21 +15,19 @@ from sepi.cli.input_options import Reading, range_to_search, reading_flags, scen
 from sepi.inspection.coded_views import comparable
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import write_light_field
-from sepi.process.command import SepiCommand
+from sepi.process.command import PATH, SepiCommand
 from sepi.process.threads import use_threads
 from sepi.validation import settings_of
 
-_PATH = click.Path(path_type=Path)
-
 
 @click.command(name="python -m sepi.ingest", cls=SepiCommand)
-@click.argument("path", type=_PATH, required=False)
+@click.argument("path", type=PATH, required=False)
 @scene_flags
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Setting of the module; repeatable.")
 @range_to_search
 @reading_flags
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
-@click.option("--output", type=_PATH, required=True, help="HDF5 file to write.")
+@click.option("--output", type=PATH, required=True, help="HDF5 file to write.")
 def main(
     path: Path | None,
     builtin: str | None,

@@ -84,7 +84,7 @@ _ARRAY_OPTIONS = ("grid", "axes", "variable")
 _SOME = ("grid", "pattern", "axes", "variable", "images", "reference", "follow_links")
 
 
-def _itself(path: Path) -> tuple[Path]:
+def _alone(path: Path) -> tuple[Path]:
     """The file itself, which may hold ground truth and masks."""
     return (path,)
 
@@ -121,9 +121,7 @@ _OWN = {
     # before other kinds of HDF5: MATLAB's has a header or suffix of its own
     "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS),
     "numpy": Format("NumPy file", ".npy or .npz", array_files.matches_numpy, array_files.read_numpy, _ARRAY_OPTIONS),
-    "hci-2013": Format(
-        "HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci.matches_2013, hci.read_2013, truth_files=_itself
-    ),
+    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci.matches_2013, hci.read_2013, truth_files=_alone),
     # after the kinds whose arrays have fixed names
     "hdf5": Format(
         "HDF5 file",
@@ -141,7 +139,7 @@ _OWN = {
         exported.read_own,
         scales=False,
         loose=True,
-        truth_files=_itself,
+        truth_files=_alone,
     ),
 }
 FORMATS: Known[Format] = Known("readers", _OWN, lambda name, module: import_module(module).FORMATS[name])
