@@ -39,9 +39,7 @@ _STYLES = (str.lower, str.upper, str.capitalize)
 _LISTED = 12
 
 
-def light_field_from_arrays(
-    path: Path, shapes: Shapes, options: ReadOptions, load: Callable[[str], Array]
-) -> LightField:
+def light_field_of(path: Path, shapes: Shapes, options: ReadOptions, load: Callable[[str], Array]) -> LightField:
     """Light field from one of a file's arrays, or from three that are its channels.
 
     Parameters
@@ -204,7 +202,7 @@ def matches_numpy(path: Path) -> bool:
 
 def read_numpy(path: Path, options: ReadOptions) -> LightField:
     """Light field from the array of a NumPy file; of an archive, ``options.variable`` or the array that fits."""
-    return light_field_from_arrays(path, numpy_shapes(path), options, functools.partial(numpy_array, path))
+    return light_field_of(path, numpy_shapes(path), options, functools.partial(numpy_array, path))
 
 
 def read_array(path: Path) -> Array:
@@ -272,4 +270,4 @@ def matches_hdf5(path: Path) -> bool:
 
 def read_hdf5(path: Path, options: ReadOptions) -> LightField:
     """Light field from the array ``options.variable``; default: the array that can be a light field."""
-    return light_field_from_arrays(path, hdf5_shapes(path), options, functools.partial(hdf5_array, path))
+    return light_field_of(path, hdf5_shapes(path), options, functools.partial(hdf5_array, path))

@@ -32,7 +32,7 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import DEFLATE_RATIO, reading
-from sepi.io.readers.array_files import MATLAB_HDF5, Shapes, hdf5_array, hdf5_shapes, light_field_from_arrays
+from sepi.io.readers.array_files import MATLAB_HDF5, Shapes, hdf5_array, hdf5_shapes, light_field_of
 from sepi.io.readers.arrays import Array, is_likely
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
@@ -221,7 +221,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
             array = array[..., None]
         return array
 
-    return light_field_from_arrays(path, array_shapes(path), options, load)
+    return light_field_of(path, array_shapes(path), options, load)
 
 
 def array_shapes(path: Path) -> Shapes:
