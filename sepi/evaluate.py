@@ -17,9 +17,9 @@ from sepi.io.provenance import scene_attributes
 from sepi.io.scores import Evaluation, map_name, write_scores
 from sepi.lightfield import FloatMap, LightField, require_light_field
 from sepi.matching.unknown import with_unknown
-from sepi.process.command import SepiCommand, bad_thresholds
+from sepi.process.command import PATH, SepiCommand, bad_thresholds
 from sepi.scoring.error_bars import ErrorBars, reliability
-from sepi.scoring.regions import Edges, edges_of
+from sepi.scoring.regions import edges_of
 from sepi.scoring.scores import DISCONTINUITIES, region_masks, score_regions
 from sepi.stage import ERROR_BARS, StageMaps
 from sepi.validation import require_map, require_type
@@ -109,38 +109,28 @@ def evaluations_of(
         require_map(f"{light_field.name}: disparity{name and f' of {name}'}", _disparity(found), light_field.shape)
     if light_field.ground_truth is None or not maps:
         return {name: Evaluation() for name in maps}
-    masks = region_masks(light_field)
+    truth, masks = light_field.ground_truth, region_masks(light_field)
     sources = {name: "scene" if name in light_field.masks else "computed" for name in masks}
-    sources[DISCONTINUITIES] = "computed"
-    edges = edges_of(light_field.ground_truth)
-    common = Evaluation(regions=masks, region_sources=sources)
-    return {name: _evaluation(light_field, found, common, edges, thresholds) for name, found in maps.items()}
-
-
-def _evaluation(
-    light_field: LightField, maps: FloatMap | StageMaps, common: Evaluation, edges: Edges, thresholds: Sequence[float]
-) -> Evaluation:
-    """Evaluation of one map, with the masks that all maps of the scene share."""
-    disparity, truth = _disparity(maps), light_field.ground_truth
-    assert truth is not None
-    bars = ErrorBars.of(maps, light_field.reach) if isinstance(maps, StageMaps) else None
-    scores = score_regions(disparity, truth, common.regions, edges=edges, thresholds=thresholds, bars=bars)
-    found = replace(common, scores=scores, error=_error(disparity, truth))
-    if bars is None or bars.close is None:
-        return found
-    known = np.isfinite(truth)
-    right = reliability(bars.confidence[known], disparity[known] - truth[known], bars.close)
-    return replace(found, reliability=np.array(right))
+    # masks that all maps of the scene share
+    common = Evaluation(regions=masks, region_sources=sources | {DISCONTINUITIES: "computed"})
+    edges, known = edges_of(truth), np.isfinite(truth)
+    evaluations: dict[str, Evaluation] = {}
+    for name, one in maps.items():
+        disparity = _disparity(one)
+        bars = ErrorBars.of(one, light_field.reach) if isinstance(one, StageMaps) else None
+        scores = score_regions(disparity, truth, masks, edges=edges, thresholds=thresholds, bars=bars)
+        # NaN where either is not finite
+        nowhere, both = np.full(truth.shape, np.nan, np.float32), known & np.isfinite(disparity)
+        error = np.subtract(disparity, truth, out=nowhere, where=both)
+        evaluations[name] = replace(common, scores=scores, error=error)
+        if bars is not None and bars.close is not None:
+            right = reliability(bars.confidence[known], disparity[known] - truth[known], bars.close)
+            evaluations[name] = replace(evaluations[name], reliability=np.array(right))
+    return evaluations
 
 
 def _disparity(maps: FloatMap | StageMaps) -> FloatMap:
     return maps.disparity if isinstance(maps, StageMaps) else maps
-
-
-def _error(disparity: FloatMap, ground_truth: FloatMap) -> FloatMap:
-    """Estimate minus ground truth; NaN where either is not finite."""
-    known = np.isfinite(ground_truth) & np.isfinite(disparity)
-    return np.subtract(disparity, ground_truth, out=np.full(ground_truth.shape, np.nan, np.float32), where=known)
 
 
 def _scored(light_field: LightField, maps: StageMaps) -> FloatMap | StageMaps:
@@ -151,16 +141,13 @@ def _scored(light_field: LightField, maps: StageMaps) -> FloatMap | StageMaps:
     return StageMaps(final.disparity, final.confidence, {name: final.extra[name] for name in ERROR_BARS})
 
 
-_PATH = click.Path(path_type=Path)
-
-
 @click.command(name="python -m sepi.evaluate", cls=SepiCommand)
-@click.option("--light-field", "light_field_path", type=_PATH, required=True, help="From ingest.")
-@click.option("--truth", type=_PATH, help="Ground truth from sepi.truth; default: the light field's own.")
-@click.option("--stages", type=_PATH, required=True, help="Folder of the stage files, whose paths name the maps.")
+@click.option("--light-field", "light_field_path", type=PATH, required=True, help="From ingest.")
+@click.option("--truth", type=PATH, help="Ground truth from sepi.truth; default: the light field's own.")
+@click.option("--stages", type=PATH, required=True, help="Folder of the stage files, whose paths name the maps.")
 @bad_thresholds
-@click.option("--output", type=_PATH, required=True, help="Score file (HDF5) to write.")
-@click.argument("paths", nargs=-1, type=_PATH, metavar="STAGE_FILE...", required=True)
+@click.option("--output", type=PATH, required=True, help="Score file (HDF5) to write.")
+@click.argument("paths", nargs=-1, type=PATH, metavar="STAGE_FILE...", required=True)
 def command(
     light_field_path: Path,
     truth: Path | None,

@@ -12,17 +12,15 @@ from sepi.io.provenance import history_of
 from sepi.io.result_files import remove_result
 from sepi.io.result_folder import write_result
 from sepi.matching.unknown import with_unknown
-from sepi.process.command import SepiCommand
+from sepi.process.command import PATH, SepiCommand
 from sepi.stage import MadeBy
-
-_PATH = click.Path(path_type=Path)
 
 
 @click.command(cls=SepiCommand)
-@click.option("--light-field", "light_field_path", type=_PATH, required=True, help="HDF5 file from ingest.")
-@click.option("--maps", type=_PATH, required=True, help="File of the last stage.")
+@click.option("--light-field", "light_field_path", type=PATH, required=True, help="HDF5 file from ingest.")
+@click.option("--maps", type=PATH, required=True, help="File of the last stage.")
 @click.option("--variant", required=True, help="Name of the variant, for the attributes of the files.")
-@click.option("--output", type=_PATH, required=True, help="Folder to write.")
+@click.option("--output", type=PATH, required=True, help="Folder to write.")
 def main(light_field_path: Path, maps: Path, variant: str, output: Path) -> None:
     """Write disparity.pfm, result.h5 and pictures of a stage file, with unknown pixels marked."""
     light_field = read_light_field(light_field_path)

@@ -20,7 +20,7 @@ from sepi.io.disparity_maps import map_file, read_disparity
 from sepi.io.hdf5 import read_with_truth
 from sepi.io.scores import ExternalMap, ExternalSource, write_external
 from sepi.lightfield import LightField
-from sepi.process.command import SepiCommand, bad_thresholds
+from sepi.process.command import PATH, SepiCommand, bad_thresholds
 
 NO_FILE = "no file"
 NOT_READABLE = "not readable"
@@ -106,12 +106,12 @@ def _sources(text: str) -> dict[str, ExternalSource]:
 
 
 @click.command(name="python -m sepi.external", cls=SepiCommand)
-@click.option("--light-field", "path", type=click.Path(path_type=Path), required=True, help="From ingest.")
-@click.option("--truth", type=click.Path(path_type=Path), help="From sepi.truth; default: the light field's own.")
+@click.option("--light-field", "path", type=PATH, required=True, help="From ingest.")
+@click.option("--truth", type=PATH, help="From sepi.truth; default: the light field's own.")
 @click.option("--maps", required=True, help='JSON: {"METHOD": {"path": FILE, "scale": NUMBER, "offset": NUMBER}, ...}.')
 @click.option("--scene", default="", help="Name of the scene in messages; default: the light field's own.")
 @bad_thresholds
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="File to write (HDF5).")
+@click.option("--output", type=PATH, required=True, help="File to write (HDF5).")
 def command(path: Path, truth: Path | None, maps: str, scene: str, thresholds: tuple[float, ...], output: Path) -> None:
     """Read and score the disparity maps that external methods made of a light field."""
     write_external(output, external_maps(read_with_truth(path, truth), _sources(maps), scene, thresholds))

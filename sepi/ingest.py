@@ -5,7 +5,6 @@ Ground truth has a file of its own (:mod:`sepi.truth`), so that a change of it r
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -16,22 +15,19 @@ from sepi.cli.input_options import Reading, range_to_search, reading_flags, scen
 from sepi.inspection.coded_views import comparable
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import write_light_field
-from sepi.process.command import SepiCommand, write_timing
+from sepi.process.command import PATH, SepiCommand
 from sepi.process.threads import use_threads
 from sepi.validation import settings_of
 
-_PATH = click.Path(path_type=Path)
-
 
 @click.command(name="python -m sepi.ingest", cls=SepiCommand)
-@click.argument("path", type=_PATH, required=False)
+@click.argument("path", type=PATH, required=False)
 @scene_flags
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Setting of the module; repeatable.")
 @range_to_search
 @reading_flags
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
-@click.option("--output", type=_PATH, required=True, help="HDF5 file to write.")
-@click.option("--timing", type=_PATH, help="JSON file to write: seconds and peak memory.")
+@click.option("--output", type=PATH, required=True, help="HDF5 file to write.")
 def main(
     path: Path | None,
     builtin: str | None,
@@ -43,10 +39,8 @@ def main(
     reading: Reading,
     threads: int,
     output: Path,
-    timing: Path | None,
 ) -> None:
     """Read the light field at PATH and write it as one HDF5 file with a disparity range."""
-    started = time.perf_counter()
     use_threads(threads)
     if (path is None) == (builtin is None):
         raise click.UsageError("expected PATH or --builtin NAME")
@@ -63,8 +57,6 @@ def main(
     light_field = settle_range(light_field, disparity_range)
     # found out here once for all stages
     write_light_field(output, light_field, comparable(light_field) is light_field)
-    if timing is not None:
-        write_timing(timing, started, threads)
 
 
 if __name__ == "__main__":

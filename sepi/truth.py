@@ -11,18 +11,16 @@ from sepi.cli.input_options import Reading, reading_flags, scene_flags, truth_fl
 from sepi.io.disparity_maps import TruthFile
 from sepi.io.hdf5 import read_light_field, write_truth
 from sepi.lightfield import Truth
-from sepi.process.command import SepiCommand
-
-_PATH = click.Path(path_type=Path)
+from sepi.process.command import PATH, SepiCommand
 
 
 @click.command(name="python -m sepi.truth", cls=SepiCommand)
-@click.argument("path", type=_PATH, required=False)
+@click.argument("path", type=PATH, required=False)
 @scene_flags
 @reading_flags
 @truth_flags
-@click.option("--light-field", type=_PATH, help="HDF5 file from ingest, whose size --truth must have.")
-@click.option("--output", type=_PATH, required=True, help="HDF5 file to write.")
+@click.option("--light-field", type=PATH, help="HDF5 file from ingest, whose size --truth must have.")
+@click.option("--output", type=PATH, required=True, help="HDF5 file to write.")
 def main(
     path: Path | None,
     builtin: str | None,

@@ -199,9 +199,8 @@ class Lens:
             below = 1 + square * (k4 + square * (k5 + square * k6))
             scale = (1 + square * (k1 + square * (k2 + square * k3))) / below
             x, y = flat.T
-            bent = np.column_stack(
-                [2 * p1 * x * y + p2 * (square + 2 * x * x), p1 * (square + 2 * y * y) + 2 * p2 * x * y]
-            )
+            across = 2 * p1 * x * y + p2 * (square + 2 * x * x)
+            bent = np.column_stack([across, p1 * (square + 2 * y * y) + 2 * p2 * x * y])
             return np.asarray((flat * scale[:, None] + bent) * self.focal + self.principal)
         radius = np.maximum(np.sqrt(square), 1e-12)
         angle = np.arctan(radius)

@@ -9,12 +9,11 @@ import click
 
 from sepi.cli.input_options import Geometry, camera_flags, camera_of, view_of_result
 from sepi.errors import SepiError
-from sepi.process.command import SepiCommand
+from sepi.process.command import PATH, SepiCommand
 
 if TYPE_CHECKING:
     from sepi.lightfield import FloatMap
 
-_PATH = click.Path(path_type=Path)
 # names of sepi.stage, written out because its import takes longer than the help
 _BARS = "sigma", "low", "high"
 _STEPS, _METRES = "pixels per view step", "metres"
@@ -32,8 +31,8 @@ _PFM = ".pfm"
 
 
 @click.command(cls=SepiCommand)
-@click.argument("result_path", metavar="RESULT", type=_PATH)
-@click.argument("output", metavar="FILE", type=_PATH)
+@click.argument("result_path", metavar="RESULT", type=PATH)
+@click.argument("output", metavar="FILE", type=PATH)
 @click.option("--map", "name", type=click.Choice(list(_MAPS)), help="Map to write; default in .exr: all maps.")
 @click.option("--to", "kind", type=click.Choice(["rgbd"]), help="Colour and depth side by side, for displays.")
 @view_of_result
@@ -111,8 +110,8 @@ def _maps(path: Path, view: tuple[int, int] | None, geometry: Geometry | None) -
 
 
 @click.command(cls=SepiCommand)
-@click.argument("result_path", metavar="RESULT", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="PLY file to write; default: points[_ROW_COLUMN].ply in RESULT.")
+@click.argument("result_path", metavar="RESULT", type=PATH)
+@click.option("-o", "--output", type=PATH, help="PLY file to write; default: points[_ROW_COLUMN].ply in RESULT.")
 @click.option("--min-confidence", type=float, default=0.0, metavar="X", help="Least confidence of points, 0 to 1.")
 @click.option("--max-depth", type=float, metavar="M", help="Leave out points farther than this, metres.")
 @click.option(

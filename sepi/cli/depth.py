@@ -13,7 +13,7 @@ import click
 from sepi.cli.info import range_text, size_text
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, range_to_search, reading_flags
 from sepi.errors import SepiError
-from sepi.process.command import SepiCommand, progress_bar
+from sepi.process.command import PATH, SepiCommand, progress_bar
 
 # other imports stand in the functions, since `sepi depth --help` does not need them
 if TYPE_CHECKING:
@@ -24,15 +24,14 @@ if TYPE_CHECKING:
     # writes maps of all views: folder of the result, light field, maps, variant, parameters, limit of memory in bytes
     _Also = Callable[[Path, LightField, StageMaps, Variant, dict[str, dict[str, Any]], int | None], None]
 
-_PATH = click.Path(path_type=Path)
 
 AMBIGUOUS = 0.5
 """Confidence below which a depth is more likely wrong than right."""
 
 
 @click.command(cls=SepiCommand)
-@click.argument("light_field_path", metavar="INPUT", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="Folder to write; default: NAME-depth for an INPUT called NAME.")
+@click.argument("light_field_path", metavar="INPUT", type=PATH)
+@click.option("-o", "--output", type=PATH, help="Folder to write; default: NAME-depth for an INPUT called NAME.")
 @click.option("--variant", default="best", show_default=True, help="Named choice of stages; see above.")
 @range_to_search
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")

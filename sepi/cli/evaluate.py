@@ -12,21 +12,20 @@ import click
 
 from sepi.cli.input_options import Pair, Reading, read_ground_truth, reading_flags, truth_flags
 from sepi.errors import SepiError, warn
-from sepi.process.command import SepiCommand, bad_thresholds
+from sepi.process.command import PATH, SepiCommand, bad_thresholds
 
 if TYPE_CHECKING:
     from sepi.io.disparity_maps import TruthFile
     from sepi.io.scores import AllScores
 
-_PATH = click.Path(path_type=Path)
 
 NO_INTERVAL = "no interval: the map has no error bars"
 """Line for a map without error bars."""
 
 
 @click.command(cls=SepiCommand)
-@click.argument("estimate", type=_PATH)
-@click.argument("ground_truth", metavar="[GROUND_TRUTH|SCENE]", type=_PATH, required=False)
+@click.argument("estimate", type=PATH)
+@click.argument("ground_truth", metavar="[GROUND_TRUTH|SCENE]", type=PATH, required=False)
 @truth_flags
 @bad_thresholds
 @click.option("--border", type=click.IntRange(min=0), help="Pixels left out on each side, in place of both protocols.")

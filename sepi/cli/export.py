@@ -12,17 +12,15 @@ import click
 from sepi.cli.info import range_text, size_text
 from sepi.cli.input_options import Geometry, Reading, camera_flags, range_to_search, reading_flags, truth_flags
 from sepi.errors import SepiError
-from sepi.process.command import SepiCommand
+from sepi.process.command import PATH, SepiCommand
 
 if TYPE_CHECKING:
     from sepi.io.disparity_maps import TruthFile
 
-_PATH = click.Path(path_type=Path)
-
 
 @click.command(cls=SepiCommand)
-@click.argument("light_field_path", metavar="INPUT", type=_PATH)
-@click.argument("output", metavar="OUT", type=_PATH)
+@click.argument("light_field_path", metavar="INPUT", type=PATH)
+@click.argument("output", metavar="OUT", type=PATH)
 @range_to_search
 @click.option("--force", is_flag=True, help="Also replace existing files.")
 @truth_flags
@@ -71,7 +69,7 @@ def export(
 
 @click.command(cls=SepiCommand)
 @click.argument("names", metavar="[NAME]...", nargs=-1)
-@click.option("-o", "--output", type=_PATH, default=Path("scenes"), show_default=True, help="Folder to write to.")
+@click.option("-o", "--output", type=PATH, default=Path("scenes"), show_default=True, help="Folder to write to.")
 @click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Pixels a side of a view.")
 @click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Views a side of the grid.")
 @click.option("--list", "only_list", is_flag=True, help="List the scenes and write nothing.")

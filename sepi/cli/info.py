@@ -12,13 +12,12 @@ import click
 
 from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
 from sepi.errors import SepiError
-from sepi.process.command import SepiCommand
+from sepi.process.command import PATH, SepiCommand
 
 # other imports stand in the functions, since `sepi --help` does not need them
 if TYPE_CHECKING:
     from sepi.lightfield import DisparityRange, LightField
 
-_PATH = click.Path(path_type=Path)
 # share of a range that may lie beyond infinity, as its margin does
 _BEYOND = 0.25
 _RANGE_SOURCES = {
@@ -31,7 +30,7 @@ _as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON 
 
 
 @click.command(cls=SepiCommand)
-@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@click.argument("light_field_path", metavar="INPUT", type=PATH)
 @camera_flags
 @reading_flags
 @_as_json
@@ -93,7 +92,7 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as
 
 
 @click.command(cls=SepiCommand)
-@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@click.argument("light_field_path", metavar="INPUT", type=PATH)
 @reading_flags
 @_as_json
 @click.pass_context

@@ -181,7 +181,8 @@ def _cost(views: Views, present: npt.NDArray[np.bool_], positions: Positions, re
             continue
         away = positions[near] - positions[place]
         offsets = np.stack([view_layouts.baselines_under(order, away) for order in _ORDERS])
-        here, *others = (_baseline(views, n) for n in (place, *near))
+        # baselines from the middle view
+        here, *others = ((0, n - views.middle[1]) for n in (place, *near))
         found = matched(views, here, others, factor, offsets, most_points=_POINTS)
         if found is not None:
             costs.append(found[0].mean(axis=0))
@@ -197,11 +198,6 @@ def _neighbours(positions: Positions, present: npt.NDArray[np.bool_], place: int
     near = np.flatnonzero(present & (far <= reach) & (far > (reach - 1) // 2))
     rank = sorted(near.tolist(), key=lambda n: (min(*steps[n], abs(steps[n][0] - steps[n][1])), int(far[n]), n))
     return rank[:_NEIGHBOURS]
-
-
-def _baseline(views: Views, place: int) -> Baseline:
-    """Baseline from the middle view to a view of the sequence."""
-    return 0, place - views.middle[1]
 
 
 def _placed(light_field: LightField, way: Arrangement, options: ReadOptions, note: str) -> LightField:

@@ -183,17 +183,13 @@ def sigma_picture(sigma: FloatMap, unknown: BoolMap | None = None) -> Picture:
     counted = finite & (sigma > 0)
     if unknown is not None:
         counted &= ~unknown
-    low, high = _span(sigma[counted])
+    shown = sigma[counted].astype(np.float64)
+    least, most = np.quantile(shown, (BEYOND, 1 - BEYOND)) if shown.size else (0.01, 0.01)
+    wider = math.sqrt(max(1.0, _LEAST_SPAN / float(most / least)))
+    low, high = float(least) / wider, float(most) * wider
     with np.errstate(divide="ignore", invalid="ignore"):
         unit = np.log(sigma / np.float32(low)) / np.float32(math.log(high / low))
     return _beside_scale(in_colours(np.where(finite, np.clip(unit, 0, 1), np.nan), unknown), low, high)
-
-
-def _span(values: FloatMap) -> tuple[float, float]:
-    """Least and greatest value of the scale."""
-    low, high = np.quantile(values.astype(np.float64), (BEYOND, 1 - BEYOND)) if values.size else (0.01, 0.01)
-    wider = math.sqrt(max(1.0, _LEAST_SPAN / float(high / low)))
-    return float(low) / wider, float(high) * wider
 
 
 def _beside_scale(colours: Picture, low: float, high: float) -> Picture:

@@ -82,6 +82,9 @@ class SepiCommand(click.Command):
             return super().invoke(ctx)
 
 
+PATH = click.Path(path_type=Path)
+"""Type of an argument or flag that is a path."""
+
 bad_thresholds = click.option(
     "--bad",
     "thresholds",
@@ -242,17 +245,16 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     from sepi.validation import require_known
     from sepi.validation.models import validated
 
-    existing = click.Path(path_type=Path)
     choices = stage_choices(stage, own)
 
     @click.command(name=f"python -m sepi.{stage}", cls=SepiCommand, help=f"Run the stage '{stage}' on one light field.")
-    @click.option("--light-field", "light_field_path", type=existing, required=True, help="HDF5 file from ingest.")
-    @click.option("--previous", type=existing, help="File of the stage before; not for the first stage.")
+    @click.option("--light-field", "light_field_path", type=PATH, required=True, help="HDF5 file from ingest.")
+    @click.option("--previous", type=PATH, help="File of the stage before; not for the first stage.")
     @click.option("--choice", metavar="NAME", required=True, help="Choice of this stage.")
     @click.option("--parameters", default="{}", show_default=True, help="JSON object of parameters.")
     @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
-    @click.option("--output", type=existing, required=True, help="Stage file to write.")
-    @click.option("--timing", type=existing, help="JSON file to write: seconds, peak memory, machine.")
+    @click.option("--output", type=PATH, required=True, help="Stage file to write.")
+    @click.option("--timing", type=PATH, help="JSON file to write: seconds, peak memory, machine.")
     def command(
         light_field_path: Path,
         previous: Path | None,

@@ -35,12 +35,15 @@ def scene_table(runs: Runs, score: str, paper: pd.DataFrame, title: str) -> Tabl
         Title on the page.
     """
     plan = runs.plan
+    counterparts = f"the paper's method, {published.methods()['label'][PAPERS_METHOD]}"
+    if plan.report:
+        counterparts = f"the same method, for this project's own variants {counterparts}"
     elsewhere = published.methods().index.difference(paper.columns)
     parts = [_dataset_section(runs, dataset, score, paper, elsewhere) for dataset in datasets_of(plan)]
     return Table(
         title,
         f"{PROTOCOL_NOTE} This code: variants {own_names(plan)}; then each figure of these divided by "
-        f"the published one of {_counterparts(plan)}. Other columns: as the "
+        f"the published one of {counterparts}. Other columns: as the "
         f"paper prints them; empty where the scene was in the method's training set. {LEARNED_NOTE} A scene "
         "without a figure of this code is not available or has no ground truth here; one without published figures is "
         "not in the paper. The average of the scenes available is empty where a method has no figure for one of them."
@@ -49,12 +52,6 @@ def scene_table(runs: Runs, score: str, paper: pd.DataFrame, title: str) -> Tabl
         [found for rows, found in parts if len(rows)],
         "Marked: best and second best in a row, of this code and the published methods that are not learned",
     )
-
-
-def _counterparts(plan: Plan) -> str:
-    """The methods whose published figures divide ours, for the caption."""
-    papers = f"the paper's method, {published.methods()['label'][PAPERS_METHOD]}"
-    return f"the same method, for this project's own variants {papers}" if plan.report else papers
 
 
 def own_names(plan: Plan) -> str:

@@ -21,7 +21,7 @@ from sepi.io.hdf5 import read_stage, read_with_truth
 from sepi.io.images import write_png
 from sepi.io.scores import read_evaluations, read_external
 from sepi.matching.unknown import with_unknown
-from sepi.process.command import SepiCommand
+from sepi.process.command import PATH, SepiCommand
 from sepi.registry import added
 from sepi.report.drawing import write_curves, write_overview
 from sepi.report.panels import Panel, SceneResults, panels_of
@@ -69,13 +69,13 @@ def write_scene(results: SceneResults, panels: Sequence[Panel], title: str, fold
 
 
 @click.command(name="python -m sepi.report.figures", cls=SepiCommand)
-@click.option("--results", type=click.Path(path_type=Path), required=True, help="Folder of the results.")
+@click.option("--results", type=PATH, required=True, help="Folder of the results.")
 @click.option("--plan", "text", required=True, help="JSON: scenes per dataset, choices per variant and stage.")
 @click.option("--dataset", required=True, help="Dataset of the scene.")
 @click.option("--scene", required=True, help="Scene to draw.")
 @click.option("--pixels", default="[]", show_default=True, help="JSON: pixels to look into, [[row, column], ...].")
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")
-@click.option("--page", type=click.Path(path_type=Path), help="JSON file to write: the scene for a page.")
+@click.option("--output", type=PATH, required=True, help="Folder to write to.")
+@click.option("--page", type=PATH, help="JSON file to write: the scene for a page.")
 def command(results: Path, text: str, dataset: str, scene: str, pixels: str, output: Path, page: Path | None) -> None:
     """Write the pictures of one scene."""
     plan = Plan.from_json(results, text)

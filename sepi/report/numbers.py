@@ -9,7 +9,7 @@ import hashlib
 import itertools
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
@@ -109,8 +109,10 @@ def collect(plan: Plan) -> Runs:
         ran_with = parameters[stage].setdefault(plan.variants[variant][stage], [])
         for known, value in ((machines, timing["machine"]), (ran_with, timing["parameters"])):
             known += [] if value in known else [value]
+    newest = max((file.stat().st_mtime for file in plan.number_inputs() if file.is_file()), default=0.0)
+    date = datetime.fromtimestamp(newest).astimezone().isoformat(timespec="seconds")
     facts = {
-        "made": {"date": _newest(plan.number_inputs()), "machines": machines},
+        "made": {"date": date, "machines": machines},
         "protocols": dict(PROTOCOLS),
         "plan": json.loads(plan.to_json()),
         "parameters": parameters,
@@ -135,12 +137,6 @@ def write_numbers(runs: Runs, path: Path) -> None:
     ):
         with atomic_path(file) as temporary:
             temporary.write_text(text, encoding="utf-8", newline="\n")
-
-
-def _newest(files: Sequence[Path]) -> str:
-    """Date of the newest file, without the time of day."""
-    newest = max((file.stat().st_mtime for file in files if file.is_file()), default=0.0)
-    return datetime.fromtimestamp(newest).astimezone().isoformat(timespec="seconds")
 
 
 def _timing(plan: Plan, dataset: str, scene: str, variant: str, stage: str) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import AfterValidator
 from pydantic.dataclasses import dataclass
@@ -88,6 +88,7 @@ class Plan:
     choosing: Names = ()
     missing: Names = ()
     bad_thresholds: Annotated[Sequence[float], AfterValidator(tuple)] = ()
+    stages: ClassVar[list[str]] = list(STAGES)
 
     @classmethod
     def from_json(cls, results: Path, text: str) -> Plan:
@@ -154,11 +155,6 @@ class Plan:
     def charts(self) -> tuple[str, ...]:
         """Names of the charts."""
         return CHARTS.get(self.report, ())
-
-    @property
-    def stages(self) -> list[str]:
-        """Stages, in order."""
-        return list(STAGES)
 
     @property
     def pairs(self) -> list[tuple[str, str]]:

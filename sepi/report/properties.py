@@ -43,9 +43,9 @@ def property_table(runs: Runs, score: str) -> Table:
     # the squared error counts finite estimates only
     counted = scenes["pixels"] - (scenes["non_finite"] if score == "mse100" else 0)
     by = [scenes[name] for name in (*_LEVEL, "region")]
-    figures = (
-        together.set_index([*_LEVEL, "region"]) if score == "q25" else weighted_means(scenes[[score]], counted, by)
-    )
+    figures = weighted_means(scenes[[score]], counted, by)
+    if score == "q25":
+        figures = together.set_index([*_LEVEL, "region"])
     shares = ", ".join(f"{title} {100 * pixels[region] / pixels[WHOLE_MAP]:.1f} %" for region, title in titles.items())
     return _table(
         runs,

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from sepi.io.files import atomic_path
-from sepi.process.command import SepiCommand
+from sepi.process.command import PATH, SepiCommand
 from sepi.report import published
 from sepi.report.comparison import ablation_table, region_table, scene_table
 from sepi.report.numbers import collect, write_numbers
@@ -57,15 +57,12 @@ def write_tables(runs: Runs, folder: Path) -> None:
                 temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-_PATH = click.Path(path_type=Path)
-
-
 @click.command(name="python -m sepi.report.tables", cls=SepiCommand)
-@click.option("--results", type=_PATH, required=True, help="Folder of the results.")
-@click.option("--plan", "path", type=_PATH, required=True, help="JSON: scenes of datasets, choices of variants.")
-@click.option("--output", type=_PATH, required=True, help="JSON file to write, a CSV beside it.")
-@click.option("--tables", "folder", type=_PATH, required=True, help="Folder for the tables.")
-@click.option("--charts", "figures", type=_PATH, help="Folder for the charts; default: none are drawn.")
+@click.option("--results", type=PATH, required=True, help="Folder of the results.")
+@click.option("--plan", "path", type=PATH, required=True, help="JSON: scenes of datasets, choices of variants.")
+@click.option("--output", type=PATH, required=True, help="JSON file to write, a CSV beside it.")
+@click.option("--tables", "folder", type=PATH, required=True, help="Folder for the tables.")
+@click.option("--charts", "figures", type=PATH, help="Folder for the charts; default: none are drawn.")
 def command(results: Path, path: Path, output: Path, folder: Path, figures: Path | None) -> None:
     """Write all numbers of a report, its tables, and its charts."""
     told = read_json(path, {"scenes", "variants"}, "the plan of a report", "snakemake")

@@ -49,10 +49,8 @@ class Drawing(NamedTuple):
 def drawing(surfaces: Sequence[Surface], size: int, *, textured: bool = True) -> Drawing:
     """Surfaces in pixels of an image of ``size`` by ``size``; without textures if only positions are needed."""
     edges = [np.concatenate([np.hstack([o, np.roll(o, -1, axis=0)]) for o in one.outlines]) for one in surfaces]
-    planes = []
-    for at_centre, across, down in (surface.plane for surface in surfaces):
-        b, c = across / size, down / size
-        planes.append((at_centre - (b + c) * (size - 1) / 2, b, c))
+    at_centre, across, down = np.array([surface.plane for surface in surfaces], np.float64).T
+    b, c = across / size, down / size
     asked = {id(surface.texture): surface.texture for surface in surfaces} if textured else {}
     textures = {key: texture() if callable(texture) else texture for key, texture in asked.items()}
     sizes = [len(texture) * (len(texture) + kernels.BEYOND) for texture in textures.values()]
@@ -61,7 +59,7 @@ def drawing(surfaces: Sequence[Surface], size: int, *, textured: bool = True) ->
     return Drawing(
         edges=np.concatenate(edges) * size - 0.5,
         first_edge=np.cumsum([0, *map(len, edges)]).astype(np.int64),
-        planes=np.array(planes, np.float64),
+        planes=np.stack([at_centre - (b + c) * (size - 1) / 2, b, c], axis=1),
         texels=np.concatenate([np.empty((0, 4), np.float32), *map(_coefficients, textures.values())]),
         first_texel=np.array([begin[key] for key in own], np.int64),
         side=np.array([len(textures[key]) for key in own], np.int64),

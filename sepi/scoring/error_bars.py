@@ -64,7 +64,9 @@ def sparsification(confidence: FloatMap, error: FloatMap) -> FloatArray:
     """
     for name, values in (("confidence", confidence), ("error", error)):
         require_type(name, values, np.ndarray, "an array of numbers")
-    sums = np.cumsum(np.abs(_by_confidence(confidence, error)))
+    known = np.isfinite(error)
+    order = np.argsort(-confidence[known], kind="stable")
+    sums = np.cumsum(np.abs(error[known][order].astype(np.float64)))
     if sums.size == 0:
         return np.full(STEPS, np.nan)
     kept = np.maximum(1, np.rint(sums.size * (1 - np.arange(STEPS) / STEPS))).astype(np.int64)
@@ -97,11 +99,6 @@ def oracle(error: FloatMap) -> FloatArray:
     """
     require_type("error", error, np.ndarray, "an array of numbers")
     return sparsification(-np.abs(error), error)
-
-
-def _by_confidence(confidence: FloatMap, error: FloatMap) -> FloatArray:
-    known = np.isfinite(error)
-    return np.asarray(error[known][np.argsort(-confidence[known], kind="stable")], np.float64)
 
 
 ERROR_BAR_SCORES: dict[str, str] = {
@@ -318,9 +315,7 @@ def ause(doubt: FloatMap, error: FloatMap) -> float:
     """
     # NaN counts as the largest uncertainty
     curve = sparsification(-np.nan_to_num(doubt, nan=np.inf, posinf=np.inf, neginf=-np.inf), error)
-    if curve[0] == 0:
-        return 0.0
-    return float(np.mean(curve - oracle(error)) / curve[0])
+    return 0.0 if curve[0] == 0 else float(np.mean(curve - oracle(error)) / curve[0])
 
 
 def reliability(confidence: FloatMap, error: FloatMap, close: float) -> Reliability:

@@ -147,7 +147,9 @@ def score(
     if region is not None:
         _require_shape("region", region, estimate)
         chosen = chosen & region
-    chosen = chosen & _within(border, chosen.shape)
+    inside = np.zeros(chosen.shape, bool)
+    inside[border : -border or None, border : -border or None] = True
+    chosen = chosen & inside
     error = np.abs(estimate[chosen].astype(np.float64) - ground_truth[chosen])
     finite = np.isfinite(error)
     quarter = float(np.sort(100 * error)[error.size // 4]) if error.size else float("nan")
@@ -269,13 +271,6 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
     edges = edges_of(light_field.ground_truth).region
     found = {name: masks[name] for name in ("occluded", "textureless")} | {DISCONTINUITIES: edges}
     return found | {name: masks[name] for name in sorted(masks) if name not in (WHOLE_MAP, *found)}
-
-
-def _within(border: int, shape: tuple[int, ...]) -> BoolMap:
-    """All pixels except a border."""
-    inside = np.zeros(shape, bool)
-    inside[border : -border or None, border : -border or None] = True
-    return inside
 
 
 def _require_shape(what: str, values: FloatMap | BoolMap, estimate: FloatMap) -> None:

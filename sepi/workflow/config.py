@@ -40,9 +40,7 @@ _WORDS = {"true": True, "false": False, "null": None}
 class Builtin(CheckedModel):
     """Keys of ``builtin``."""
 
-    scenes: list[str] = Field(
-        list(SCENES), description="built-in scenes to use, in the order of the tables; [] for none"
-    )
+    scenes: list[str] = Field(list(SCENES), description="built-in scenes, in the order of the tables; [] for none")
     size: int = Field(192, ge=64, le=1024, description="height and width of a view in pixels")
 
 

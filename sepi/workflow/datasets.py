@@ -112,8 +112,7 @@ class Scene:
     @property
     def truth(self) -> tuple[Path, ...]:
         """Files with ground truth and masks: a change in one of them makes new scores, but no new maps."""
-        own = () if self.own_truth is None else (self.own_truth.path,)
-        return own + self.brought_truth
+        return (*([] if self.own_truth is None else [self.own_truth.path]), *self.brought_truth)
 
     @property
     def brought_truth(self) -> tuple[Path, ...]:

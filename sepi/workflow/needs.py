@@ -21,9 +21,7 @@ USUAL = {
 """What any choice of a stage is given, with the usual number of candidates."""
 
 
-def stage_needs(
-    scene: Scene, light_field: Path, stage: str, parameters: Parameters, threads: int = 1
-) -> tuple[int, int]:
+def stage_needs(scene: Scene, light_field: Path, stage: str, parameters: Parameters, threads: int) -> tuple[int, int]:
     """Memory of a stage's job in MB, and its time in minutes.
 
     They are the stage's usual ones, or those of its choice if larger. More candidates than usual take more memory, for

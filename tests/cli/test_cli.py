@@ -458,13 +458,10 @@ def test_python_writes_what_the_command_writes(scene: Path, variant: str) -> Non
 
 def test_ingest_writes_the_scene_with_a_range(scene: Path) -> None:
     (scene / "parameters.cfg").unlink()
-    done(scene, "--threads", 2, "--output", "deep/lf.h5", "--timing", "time.json", of=ingest.main)
+    done(scene, "--threads", 2, "--output", "deep/lf.h5", of=ingest.main)
     light_field = read_light_field("deep/lf.h5")
     assert light_field.require_disparity_range().source == "estimated"
     np.testing.assert_array_equal(light_field.views, read_light_field(scene).views)
-    timing = json.loads(Path("time.json").read_text())
-    assert timing["seconds"] > 0
-    assert timing["peak_memory_mb"] > 10
 
 
 def test_ingest_renders_a_built_in_scene(tmp_path: Path) -> None:

@@ -39,9 +39,7 @@ _STYLES = (str.lower, str.upper, str.capitalize)
 _LISTED = 12
 
 
-def light_field_from_arrays(
-    path: Path, shapes: Shapes, options: ReadOptions, load: Callable[[str], Array]
-) -> LightField:
+def light_field_of(path: Path, shapes: Shapes, options: ReadOptions, load: Callable[[str], Array]) -> LightField:
     """Light field from one of a file's arrays, or from three that are its channels.
 
     Parameters
@@ -199,17 +197,12 @@ _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0
 
 def matches_numpy(path: Path) -> bool:
     """Whether ``path`` is a file or an archive of NumPy, by its content or its suffix ``.npy`` or ``.npz``."""
-    if not path.is_file():
-        return False
-    try:
-        return path.suffix.lower() in (".npy", ".npz") or bool(numpy_shapes(path))
-    except SepiError:
-        return False
+    return path.is_file() and (path.suffix.lower() in (".npy", ".npz") or bool(numpy_shapes(path)))
 
 
 def read_numpy(path: Path, options: ReadOptions) -> LightField:
     """Light field from the array of a NumPy file; of an archive, ``options.variable`` or the array that fits."""
-    return light_field_from_arrays(path, numpy_shapes(path), options, functools.partial(numpy_array, path))
+    return light_field_of(path, numpy_shapes(path), options, functools.partial(numpy_array, path))
 
 
 def read_array(path: Path) -> Array:
@@ -271,13 +264,10 @@ def _require_room(path: Path, info: zipfile.ZipInfo) -> None:
 
 def matches_hdf5(path: Path) -> bool:
     """Whether ``path`` is an HDF5 file of another program, with an array that may be a light field."""
-    try:
-        others = has_dataset(path, "/", lambda root: not is_own(root))
-        return others and any(is_likely(shape) for shape, _ in hdf5_shapes(path).values())
-    except SepiError:
-        return False
+    others = has_dataset(path, "/", lambda root: not is_own(root))
+    return others and any(is_likely(shape) for shape, _ in hdf5_shapes(path).values())
 
 
 def read_hdf5(path: Path, options: ReadOptions) -> LightField:
     """Light field from the array ``options.variable``; default: the array that can be a light field."""
-    return light_field_from_arrays(path, hdf5_shapes(path), options, functools.partial(hdf5_array, path))
+    return light_field_of(path, hdf5_shapes(path), options, functools.partial(hdf5_array, path))

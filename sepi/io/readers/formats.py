@@ -36,7 +36,7 @@ class Format(NamedTuple):
     name, description : str
         For messages.
     matches : callable
-        Whether a path looks like this format; quick, and never raises.
+        Whether a path looks like this format; quick. An error of reading counts as no.
     read : callable
         Light field of a path and :class:`ReadOptions`.
     options : tuple of str
@@ -84,7 +84,7 @@ _ARRAY_OPTIONS = ("grid", "axes", "variable")
 _SOME = ("grid", "pattern", "axes", "variable", "images", "reference", "follow_links")
 
 
-def _itself(path: Path) -> tuple[Path]:
+def _alone(path: Path) -> tuple[Path]:
     """The file itself, which may hold ground truth and masks."""
     return (path,)
 
@@ -121,9 +121,7 @@ _OWN = {
     # before other kinds of HDF5: MATLAB's has a header or suffix of its own
     "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS),
     "numpy": Format("NumPy file", ".npy or .npz", array_files.matches_numpy, array_files.read_numpy, _ARRAY_OPTIONS),
-    "hci-2013": Format(
-        "HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci.matches_2013, hci.read_2013, truth_files=_itself
-    ),
+    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci.matches_2013, hci.read_2013, truth_files=_alone),
     # after the kinds whose arrays have fixed names
     "hdf5": Format(
         "HDF5 file",
@@ -141,7 +139,7 @@ _OWN = {
         exported.read_own,
         scales=False,
         loose=True,
-        truth_files=_itself,
+        truth_files=_alone,
     ),
 }
 FORMATS: Known[Format] = Known("readers", _OWN, lambda name, module: import_module(module).FORMATS[name])
@@ -150,7 +148,13 @@ FORMATS: Known[Format] = Known("readers", _OWN, lambda name, module: import_modu
 
 def matching(path: Path) -> Format | None:
     """The format that a path looks like; those of extensions are asked only if no other but a loose one matches."""
-    return next((known for known in _as_asked() if known.matches(path)), None)
+    return next((known for known in _as_asked() if _matches(known, path)), None)
+
+
+def _matches(known: Format, path: Path) -> bool:
+    with suppress(SepiError, OSError):
+        return known.matches(path)
+    return False
 
 
 def _as_asked() -> Iterator[Format]:
@@ -358,9 +362,9 @@ def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
     """Shape and bytes of a value of each array in a file that may be a light field, and that the file can hold."""
     shapes: Shapes = {}
     with suppress(SepiError):
-        if array_files.matches_numpy(path):
+        if _matches(_OWN["numpy"], path):
             shapes = array_files.numpy_shapes(path)
-        elif matlab.matches(path):
+        elif _matches(_OWN["matlab"], path):
             shapes = matlab.array_shapes(path)
         else:
             # no digest check for many files: whoever reads the views checks the file

@@ -38,10 +38,7 @@ Numbers = dict[str, tuple[int, ...]]
 
 def matches(path: Path) -> bool:
     """Whether ``path`` is a folder with at least two images with numbers in their names, or a folder of rows."""
-    try:
-        return len(numbered(files_in(path))) >= 2 or has_rows(path, surely=True)
-    except OSError:
-        return False
+    return len(numbered(files_in(path))) >= 2 or has_rows(path, surely=True)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:

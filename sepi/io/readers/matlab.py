@@ -32,7 +32,7 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import DEFLATE_RATIO, reading
-from sepi.io.readers.array_files import MATLAB_HDF5, Shapes, hdf5_array, hdf5_shapes, light_field_from_arrays
+from sepi.io.readers.array_files import MATLAB_HDF5, Shapes, hdf5_array, hdf5_shapes, light_field_of
 from sepi.io.readers.arrays import Array, is_likely
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
@@ -206,10 +206,7 @@ def matches(path: Path) -> bool:
     """Whether ``path`` is a file with MATLAB's header or the suffix ``.mat``."""
     if path.suffix.lower() == ".mat" or not path.is_file():
         return path.is_file()
-    try:
-        head = _head(path)
-    except SepiError:
-        return False
+    head = _head(path)
     return head[-4:] in _ORDERS or head.startswith(MATLAB_HDF5)
 
 
@@ -224,7 +221,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
             array = array[..., None]
         return array
 
-    return light_field_from_arrays(path, array_shapes(path), options, load)
+    return light_field_of(path, array_shapes(path), options, load)
 
 
 def array_shapes(path: Path) -> Shapes:
