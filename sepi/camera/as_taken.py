@@ -50,8 +50,7 @@ def as_taken(
     sigma : ndarray, of the same shape, float32
         That of the nearest pixel of the rectified view, not interpolated.
     """
-    view, (height, width), (down, across) = rig.views[position], disparity.shape, from_centre
-    shot = view.shot
+    shot, (height, width), (down, across) = rig.views[position], disparity.shape, from_centre
     # rays of the picture's pixels, in the camera's own axes and in those of the rectified views
     pixels = np.stack(np.meshgrid(np.arange(shot.lens.width), np.arange(shot.lens.height)), axis=-1).reshape(-1, 2)
     own = shot.lens.rays(pixels.astype(np.float64))
@@ -60,7 +59,7 @@ def as_taken(
     y = (height - 1) / 2 + camera.down + down * camera.offset
     with np.errstate(divide="ignore", invalid="ignore"):
         flat = np.where(rays[:, 2:] > 0, rays[:, :2] / rays[:, 2:], np.nan)
-        at = np.array([x, y]) + camera.focal_px * view.zoom * flat
+        at = np.array([x, y]) + camera.focal_px * shot.zoom * flat
         # positions beyond the middle of a border pixel belong to it
         inside = np.asarray(((at > -0.5) & (at < np.array([width, height]) - 0.5)).all(axis=1))
     within = np.clip(np.where(inside[:, None], at, 0), 0, (width - 1, height - 1))

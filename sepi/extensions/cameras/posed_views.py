@@ -182,11 +182,7 @@ class PosedViews:
     def carried(self, view: int) -> FloatMap:
         """Disparity of a view, (H, W) float32; NaN at unknown and missing pixels."""
         missing = self.light_field.missing
-        found = self.disparity
-        if view != self.reference and self.surfaces is not None:
-            found = self.surfaces(self.positions[view])
-        elif view != self.reference:
-            found = carried_map(self.disparity, self._baseline(view), ~np.isnan(self.disparity))
+        found = self._seen(view, self.disparity, self.surfaces, lambda *where: carried_map(self.disparity, *where))
         return found if missing is None else np.where(missing[self.positions[view]], np.float32(np.nan), found)
 
     def depth(self, carried: FloatMap) -> FloatMap:
@@ -204,16 +200,17 @@ class PosedViews:
         depth. For views that are :attr:`sure`.
         """
         assert self.sigma is not None
-        sigma = self.sigma
-        if view != self.reference and self.sigmas is not None:
-            sigma = self.sigmas(self.positions[view])
-        elif view != self.reference:
-            sigma = carried_values(self.disparity, sigma, self._baseline(view), ~np.isnan(self.disparity))
+        own = self.sigma
+        sigma = self._seen(view, own, self.sigmas, lambda *where: carried_values(self.disparity, own, *where))
         return np.where(self.depth(carried) > 0, self.camera.depth_sigma(carried, sigma), np.float32(0))
 
-    def _baseline(self, view: int) -> tuple[float, float]:
-        down, across = self.baselines[view].tolist()
-        return down, across
+    def _seen(self, view: int, own: FloatMap, others: Surfaces | None, warped: Callable[..., FloatMap]) -> FloatMap:
+        """A map of a view: the reference view's own, that of ``others``, else the own one ``warped``."""
+        if view == self.reference:
+            return own
+        if others is not None:
+            return others(self.positions[view])
+        return warped(tuple(self.baselines[view].tolist()), ~np.isnan(self.disparity))
 
     def pixel_errors(self, sees: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
         """Expected reprojection error of the points, mean over views, (P,), pixels; 0 where unknown.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sepi.camera import Camera
-from sepi.camera.rig import Rectified, Rig
+from sepi.camera.rig import Rig
 from sepi.errors import SepiError
 from sepi.extensions.cameras.frame import Frame, Seeing, completed, frame_of, rectified_view
 from sepi.extensions.cameras.model import CameraModel
@@ -133,7 +133,7 @@ def light_field_of(found: Rectification) -> LightField:
         grid[t, s], missing[t, s] = completed(pictures[n], absent[n]), absent[n]
         # a mask may leave no pixels
         present[t, s], positions[t, s] = not absent[n].all(), plane.baselines[n]
-        views[t, s] = Rectified(model.shots[n], float(seeing.zoom[n]))
+        views[t, s] = replace(model.shots[n], zoom=float(seeing.zoom[n]))
     scale, view = plane.step * seeing.focal, (int(at[plane.reference, 0]), int(at[plane.reference, 1]))
     limits = None
     if depths is not None:
