@@ -26,7 +26,7 @@ import yaml
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
-from sepi.camera.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Lens, Shot
+from sepi.camera.rig import FISHEYE, METRES, PINHOLE, Floats, Lens, Shot
 from sepi.errors import SepiError
 from sepi.extensions.cameras.model import UNITS_OF_MODEL, CameraModel, Picture, Pictures, mask_of
 from sepi.io.files import naming, reading
@@ -41,7 +41,6 @@ _NEARLY = 1e-2
 
 # numbers may be text, since YAML reads 1e-4 as text
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
-_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=False)]
 _REQUIRED = ("file", "x", "y", "z", "fx")
 # key of a table, its columns in a CSV file, and how many of them must be given for the key to be given
 _PARTS = (
@@ -69,11 +68,11 @@ class _Camera(CheckedModel):
     file: str = Field(min_length=1)
     position: tuple[_Number, _Number, _Number]
     rotation: list[_Number] | list[list[_Number]] = Field([1.0, 0.0, 0.0, 0.0])
-    focal: _Positive | tuple[_Positive, _Positive]
+    focal: _Number | tuple[_Number, _Number]
     principal: tuple[_Number, _Number] | None = None
-    size: tuple[_Positive, _Positive] | None = None
-    lens: Literal["pinhole", "fisheye"] = "pinhole"
-    distortion: list[_Number] = Field([], max_length=MOST_COEFFICIENTS[PINHOLE])
+    size: tuple[_Number, _Number] | None = None
+    lens: str = PINHOLE
+    distortion: list[_Number] = Field([])
 
     def picture(self, pictures: Pictures) -> Picture:
         file = pictures.find(self.file)
