@@ -27,7 +27,6 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.camera.rig import Rig
-from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 from sepi.matching.carried_map import carried_map, carried_values
 
@@ -292,16 +291,7 @@ def posed_views(
         Standard deviation of the disparity, pixels per view step.
     sigmas : callable, optional
         Standard deviation of the other views; needed with ``surfaces`` for the error of their depth.
-
-    Raises
-    ------
-    SepiError
-        If a map has another shape than the views.
     """
-    given = {"disparity": disparity, "confidence": confidence, "unknown": unknown, "sigma": sigma}
-    for name, values in given.items():
-        if values is not None and values.shape != light_field.shape:
-            raise SepiError(f"{light_field.name}: {name} is {values.shape}, the views {light_field.shape}")
     known = np.isfinite(disparity)
     if unknown is not None:
         known &= ~unknown
