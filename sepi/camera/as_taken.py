@@ -49,28 +49,27 @@ def as_taken(
         pixels. The depth along the camera's optical axis, units of the world; infinite at and beyond infinity. The
         standard deviation at the nearest pixel of the rectified view, not interpolated.
     """
-    view, (height, width), (down, across) = rig.views[position], disparity.shape, from_centre
-    lens = view.shot.lens
-    pixels = np.stack(np.meshgrid(np.arange(lens.width), np.arange(lens.height)), axis=-1).reshape(-1, 2)
-    # rays in the camera's own axes, and in those of the rectified views
-    own = lens.rays(pixels.astype(np.float64))
-    rays = own @ (view.shot.rotation @ rig.rotation.T)
+    shot, (height, width), (down, across) = rig.views[position], disparity.shape, from_centre
+    # rays of the picture's pixels, in the camera's own axes and in those of the rectified views
+    pixels = np.stack(np.meshgrid(np.arange(shot.lens.width), np.arange(shot.lens.height)), axis=-1).reshape(-1, 2)
+    own = shot.lens.rays(pixels.astype(np.float64))
+    rays = own @ (shot.rotation @ rig.rotation.T)
     x = (width - 1) / 2 + camera.right + across * camera.offset
     y = (height - 1) / 2 + camera.down + down * camera.offset
     # NaN for rays backwards
     with np.errstate(divide="ignore", invalid="ignore"):
         flat = np.where(rays[:, 2:] > 0, rays[:, :2] / rays[:, 2:], np.nan)
-        at = np.array([x, y]) + camera.focal_px * view.zoom * flat
+        at = np.array([x, y]) + camera.focal_px * shot.zoom * flat
         # positions beyond the middle of a border pixel belong to it
         inside = np.asarray(((at > -0.5) & (at < np.array([width, height]) - 0.5)).all(axis=1))
     within = np.clip(np.where(inside[:, None], at, 0), 0, (width - 1, height - 1))
     nearest = tuple(np.rint(within).astype(int).T[::-1])
     found = np.where(inside, _sampled(disparity, within, nearest), np.float32(np.nan)).astype(np.float32)
     # depth from the camera itself: along the viewing direction of rectified views, then along its own
-    along = camera.depth(found).astype(np.float64) - float((view.shot.centre - rig.origin) @ rig.rotation[2])
+    along = camera.depth(found).astype(np.float64) - float((shot.centre - rig.origin) @ rig.rotation[2])
     depth = np.where(np.isfinite(found), along * own[:, 2] / rays[:, 2], np.nan)
     maps = [found, depth, *([] if sigma is None else [np.where(inside, sigma[nearest], np.float32(np.nan))])]
-    return [values.astype(np.float32).reshape(lens.height, lens.width) for values in maps]
+    return [values.astype(np.float32).reshape(shot.lens.height, shot.lens.width) for values in maps]
 
 
 def _sampled(values: FloatMap, within: Floats, nearest: tuple[npt.NDArray[np.int64], ...]) -> Floats:

@@ -227,7 +227,7 @@ class Lens:
 
 @dataclass(frozen=True)
 class Shot:
-    """A calibrated camera: a picture's name, its lens, and its pose.
+    """A calibrated camera: a picture's name, its lens, and its pose; in a rig the camera of a rectified view.
 
     Attributes
     ----------
@@ -238,6 +238,9 @@ class Shot:
         From the world's axes to the camera's.
     centre : ndarray, shape (3,), float64
         Position in the world.
+    zoom : float
+        Focal length of the rectified view as a multiple of the light field's, for a camera in front of or behind the
+        plane.
 
     Examples
     --------
@@ -254,20 +257,6 @@ class Shot:
     lens: Lens
     rotation: Floats
     centre: Floats
-
-
-@dataclass(frozen=True)
-class Rectified:
-    """A view of a rectified light field: its camera, and its zoom.
-
-    Attributes
-    ----------
-    shot : Shot
-    zoom : float
-        Focal length of the view as a multiple of the light field's, for a camera in front of or behind the plane.
-    """
-
-    shot: Shot
     zoom: float = 1.0
 
 
@@ -285,8 +274,8 @@ class Rig:
         Length of a view step in units of the world.
     units : str
         ``"metres"``, or ``"units of the model"``.
-    views : mapping of (int, int) to Rectified
-        Grid position to the view.
+    views : mapping of (int, int) to Shot
+        Grid position to the view's camera.
 
     Examples
     --------
@@ -303,7 +292,7 @@ class Rig:
     origin: Floats
     step: float
     units: str
-    views: Mapping[tuple[int, int], Rectified]
+    views: Mapping[tuple[int, int], Shot]
 
     def centre(self, position: npt.ArrayLike) -> Floats:
         """World points of view positions.
@@ -356,7 +345,7 @@ class Rig:
         -------
         str
         """
-        views = [[*at, {**asdict(view.shot), "zoom": view.zoom}] for at, view in self.views.items()]
+        views = [[*at, asdict(shot)] for at, shot in self.views.items()]
         return json.dumps({**vars(self), "views": views}, default=np.ndarray.tolist)
 
     @staticmethod
@@ -378,7 +367,7 @@ class Rig:
         """
         try:
             told = json.loads(text)
-            views = {(int(t), int(s)): _rectified(view) for t, s, view in told["views"]}
+            views = {(int(t), int(s)): _shot(shot) for t, s, shot in told["views"]}
             step = float(told["step"])
             if not 0 < step < np.inf:
                 raise ValueError("no length")
@@ -394,8 +383,8 @@ def _pose(told: Mapping[str, Any], place: str) -> tuple[Floats, Floats]:
     return rotation.reshape(3, 3), at.reshape(3)
 
 
-def _rectified(told: Mapping[str, Any]) -> Rectified:
+def _shot(told: Mapping[str, Any]) -> Shot:
     lens = told["lens"]
     pairs = {key: tuple(map(float, lens[key])) for key in ("focal", "principal", "distortion")}
     known = Lens(int(lens["width"]), int(lens["height"]), kind=str(lens["kind"]), **pairs)  # type: ignore[arg-type]
-    return Rectified(Shot(str(told["name"]), known, *_pose(told, "centre")), float(told["zoom"]))
+    return Shot(str(told["name"]), known, *_pose(told, "centre"), float(told["zoom"]))

@@ -272,8 +272,7 @@ def _mapped(
 def _with_free_lens(pycolmap: Any, model: Any) -> Any:
     """The model with focal length and distortion refined by its points; itself if they are not clearly better."""
     freed = pycolmap.Reconstruction(model)
-    options = pycolmap.BundleAdjustmentOptions()
-    options.print_summary = False
+    options = pycolmap.BundleAdjustmentOptions(print_summary=False)
     options.ceres.solver_options.num_threads = 1
     config = pycolmap.BundleAdjustmentConfig()
     for image in freed.reg_image_ids():

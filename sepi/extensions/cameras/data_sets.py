@@ -87,20 +87,14 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
     SepiError
         If the folder exists and is not empty, or cannot be written.
     """
-    missing = posed.light_field.missing
     with atomic_folder(Path(folder)) as temporary:
         sees = np.zeros((len(posed.positions), int(posed.chosen.sum())), bool)
-        for view, name in enumerate(posed.names):
-            carried = posed.carried(view)
+        # the names that ``--ImageReader.mask_path`` and ``--StereoFusion.mask_path`` look for
+        for view, name, carried in _with_pictures(temporary, posed, ".png.png", progress):
             sees[view] = posed.sees(view, carried)
-            write_png(temporary / "images" / f"{name}.png", posed.picture(view))
-            if missing is not None:
-                # the names that ``--ImageReader.mask_path`` and ``--StereoFusion.mask_path`` look for
-                write_png(temporary / "masks" / f"{name}.png.png", ~missing[posed.positions[view]])
             stereo = f"{name}.png.geometric.bin"
             _write_maps(temporary / "stereo/depth_maps" / stereo, posed.depth(carried)[None])
             _write_maps(temporary / "stereo/normal_maps" / stereo, posed.normals(view, carried))
-            progress((view + 1) / len(posed.positions))
         for name, lines in {
             "sparse/0/cameras.txt": _cameras(posed),
             "sparse/0/images.txt": _images(posed, sees),
@@ -111,6 +105,19 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
                 file.writelines(f"{line}\n" for line in lines)
         for path in (temporary / "sparse/0").iterdir():
             shutil.copyfile(path, temporary / "sparse" / path.name)
+
+
+def _with_pictures(
+    folder: Path, posed: PosedViews, mask: str, progress: Progress
+) -> Iterator[tuple[int, str, FloatMap]]:
+    """Number, name and disparity of each view, whose picture and mask are written."""
+    missing = posed.light_field.missing
+    for view, name in enumerate(posed.names):
+        write_png(folder / "images" / f"{name}.png", posed.picture(view))
+        if missing is not None:
+            write_png(folder / "masks" / f"{name}{mask}", ~missing[posed.positions[view]])
+        yield view, name, posed.carried(view)
+        progress((view + 1) / len(posed.positions))
 
 
 def _write_maps(path: Path, maps: FloatMap) -> None:
@@ -179,17 +186,11 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
     SepiError
         If the folder exists and is not empty, or cannot be written.
     """
-    missing = posed.light_field.missing
     with atomic_folder(Path(folder)) as temporary:
-        for view, name in enumerate(posed.names):
-            carried = posed.carried(view)
+        for view, name, carried in _with_pictures(temporary, posed, ".png", progress):
             _write_millimetres(temporary / "depths" / f"{name}.npy", posed.depth(carried))
             if posed.sure:
                 _write_millimetres(temporary / "depth_sigmas" / f"{name}.npy", posed.depth_sigma(view, carried))
-            write_png(temporary / "images" / f"{name}.png", posed.picture(view))
-            if missing is not None:
-                write_png(temporary / "masks" / f"{name}.png", ~missing[posed.positions[view]])
-            progress((view + 1) / len(posed.positions))
         # without calibrated cameras, the world's axes are right, forward, up
         rig = posed.rig or Rig(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.zeros(3), 1.0, posed.units, {})
         if posed.chosen.any():

@@ -26,7 +26,7 @@ import yaml
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
-from sepi.camera.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Shot
+from sepi.camera.rig import FISHEYE, METRES, PINHOLE, Floats, Lens, Shot
 from sepi.errors import SepiError
 from sepi.extensions.cameras.model import UNITS_OF_MODEL, CameraModel, Picture, Pictures, mask_of
 from sepi.io.files import naming, reading
@@ -41,7 +41,6 @@ _NEARLY = 1e-2
 
 # numbers may be text, since YAML reads 1e-4 as text
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
-_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=False)]
 _REQUIRED = ("file", "x", "y", "z", "fx")
 # key of a table, its columns in a CSV file, and how many of them must be given for the key to be given
 _PARTS = (
@@ -69,16 +68,19 @@ class _Camera(CheckedModel):
     file: str = Field(min_length=1)
     position: tuple[_Number, _Number, _Number]
     rotation: list[_Number] | list[list[_Number]] = Field([1.0, 0.0, 0.0, 0.0])
-    focal: _Positive | tuple[_Positive, _Positive]
+    focal: _Number | tuple[_Number, _Number]
     principal: tuple[_Number, _Number] | None = None
-    size: tuple[_Positive, _Positive] | None = None
-    lens: Literal["pinhole", "fisheye"] = "pinhole"
-    distortion: list[_Number] = Field([], max_length=MOST_COEFFICIENTS[PINHOLE])
+    size: tuple[_Number, _Number] | None = None
+    lens: str = PINHOLE
+    distortion: list[_Number] = Field([])
 
     def picture(self, pictures: Pictures) -> Picture:
         file = pictures.find(self.file)
         focal = self.focal if isinstance(self.focal, tuple) else (self.focal, self.focal)
-        lens = pictures.lens(file, self.size, focal, self.principal, self.lens, self.distortion)
+        width, height = map(int, self.size or pictures.size(file))
+        principal = self.principal or ((width - 1) / 2, (height - 1) / 2)
+        lens = Lens(width, height, focal, principal, self.lens, tuple(self.distortion))
+        lens = pictures.fitted(file, lens, self.size is not None)
         return Picture(Shot(self.file, lens, rotation_of(self.rotation), np.array(self.position)), file)
 
 
@@ -203,18 +205,18 @@ def _picture_of_frame(name: str, entry: Mapping[str, Any], pictures: Pictures) -
 
     file, mask = file_of(name), entry.get("mask_path")
     kind = _lens_kind(str(entry.get("camera_model", "OPENCV")))
-    size = (number("w"), number("h")) if {"w", "h"} <= entry.keys() else None
-    width, height = size or pictures.size(file)
+    sized = {"w", "h"} <= entry.keys()
+    width, height = (number("w"), number("h")) if sized else pictures.size(file)
     if "fl_x" not in entry and "camera_angle_x" in entry:
         focal_x = width / 2 / math.tan(min(3.0, max(1e-3, number("camera_angle_x"))) / 2)
     else:
         focal_x = number("fl_x")
     # counted from the picture's corner, not from the middle of the first pixel
     principal = number("cx", width / 2) - 0.5, number("cy", height / 2) - 0.5
-    distortion = [number(key, 0.0) for key in _DISTORTION[kind][:6]]
-    lens = pictures.lens(file, size, (focal_x, number("fl_y", focal_x)), principal, kind, distortion)
+    distortion = tuple(number(key, 0.0) for key in _DISTORTION[kind][:6])
+    lens = Lens(int(width), int(height), (focal_x, number("fl_y", focal_x)), principal, kind, distortion)
     matrix = np.array(number("transform_matrix", shapes=((4, 4), (3, 4))))
-    shot = Shot(name, lens, rotation_of((matrix[:3, :3] @ _TURN).T), matrix[:3, 3].copy())
+    shot = Shot(name, pictures.fitted(file, lens, sized), rotation_of((matrix[:3, :3] @ _TURN).T), matrix[:3, 3].copy())
     return Picture(shot, file, file_of(mask) if isinstance(mask, str) and mask else None)
 
 
@@ -255,8 +257,8 @@ def _picture_of_image(image: Any, camera: Any, pictures: Pictures) -> Picture:
     focal = camera.focal_length_x, camera.focal_length_y
     # COLMAP counts from the picture's corner, a lens from the middle of the first pixel
     principal = camera.principal_point_x - 0.5, camera.principal_point_y - 0.5
-    distortion = [float(camera.params[place]) for place in camera.extra_params_idxs()]
-    lens = pictures.lens(file, (camera.width, camera.height), focal, principal, kind, distortion)
+    distortion = tuple(float(camera.params[place]) for place in camera.extra_params_idxs())
+    lens = pictures.fitted(file, Lens(camera.width, camera.height, focal, principal, kind, distortion), sized=True)
     rotation = np.array(pose.rotation.matrix(), np.float64)
     shot = Shot(image.name, lens, rotation, -rotation.T @ np.array(pose.translation, np.float64))
     return Picture(shot, file, mask_of(file, image.name))

@@ -2,6 +2,10 @@
 
 One pinhole, and the rectangle of pixels that the reference view fills. Pixels of the frame that another camera does not
 show are marked as missing.
+
+A camera at ``dz`` in front of the reference camera, with the focal length ``f (1 - dz / Z0)``, sees a point at depth
+``Z`` at ``k = (1 - dz / Z0) / (1 - dz / Z)`` times the distance from the principal point that a camera in the plane
+sees. This factor is 1 at the depth ``Z0`` in the middle of the scene, and close to 1 near it.
 """
 
 from __future__ import annotations
@@ -46,12 +50,6 @@ class Frame(NamedTuple):
     principal: tuple[float, float]
     shape: tuple[int, int]
 
-    @property
-    def corners(self) -> Floats:
-        """Corners ``(y, x)`` from the principal point, (4, 2)."""
-        (height, width), (x, y) = self.shape, self.principal
-        return np.array([(v - y, u - x) for v in (0, height - 1) for u in (0, width - 1)], np.float64)
-
 
 class Seeing:
     """Positions of rectified views' pixels in the original pictures.
@@ -60,6 +58,8 @@ class Seeing:
     ----------
     model : CameraModel
     plane : Plane
+    inverse_depths : (float, float) or None
+        Of the farthest and the nearest surface, if known.
     zoom : ndarray, shape (N,), float64
         Focal length of each view as a multiple of ``focal``.
     focal : float
@@ -71,12 +71,13 @@ class Seeing:
         the middles of the pictures, by least squares.
     """
 
-    def __init__(self, model: CameraModel, plane: Plane, zoom: Floats) -> None:
-        self.model, self.plane, self.zoom = model, plane, zoom
+    def __init__(self, model: CameraModel, plane: Plane, inverse_depths: tuple[float, float] | None) -> None:
+        self.model, self.plane, self.inverse_depths = model, plane, inverse_depths
+        self.zoom = 1 - plane.places[:, 2] * sum(inverse_depths or (0.0, 0.0)) / 2
         self.focal = float(np.median([sum(shot.lens.focal) / 2 for shot in model.shots]))
         self.principal = model.shots[plane.reference].lens.principal
         middles = [
-            self._from_picture(n, np.array([[(shot.lens.width - 1) / 2, (shot.lens.height - 1) / 2]]))[0]
+            self.from_picture(n, np.array([[(shot.lens.width - 1) / 2, (shot.lens.height - 1) / 2]]))[0]
             for n, shot in enumerate(model.shots)
         ]
         at = plane.baselines[:, ::-1]
@@ -100,17 +101,25 @@ class Seeing:
         """Mask of the pixels that a view shows."""
         return np.isfinite(self.pixels(view, pixels)[:, 0])
 
-    def _from_picture(self, view: int, pixels: Floats) -> Floats:
+    def from_picture(self, view: int, pixels: Floats) -> Floats:
         """Pixels ``(x, y)`` from the principal point, without shear, of pixels in the view's original picture."""
         shot = self.model.shots[view]
         rays = shot.lens.rays(pixels) @ (shot.rotation @ self.plane.rotation.T)
         return self.focal * rays[:, :2] / np.maximum(rays[:, 2:], 1e-3)
 
-    def bounds(self) -> tuple[Floats, Floats]:
-        """Least and largest pixel ``(x, y)`` of the reference's original picture."""
-        reached = self._from_picture(self.plane.reference, self.model.shots[self.plane.reference].lens.border())
-        reached = reached + self.principal
-        return np.ceil(reached.min(axis=0) - _OUTSIDE), np.floor(reached.max(axis=0) + _OUTSIDE)
+    def errors(self, frame: Frame) -> Floats:
+        """Greatest disparity error from a camera's distance to the reference camera's plane, (N,), pixels per view
+        step; 0 for unknown depths.
+        """
+        plane, (height, width), (x, y) = self.plane, frame.shape, frame.principal
+        corners = np.array([(v - y, u - x) for v in (0, height - 1) for u in (0, width - 1)], np.float64)
+        worst = np.zeros(len(plane.places))
+        for inverse in self.inverse_depths or ():
+            scaled = self.zoom / np.maximum(1 - plane.places[:, 2] * inverse, 1e-9)
+            moved = self.focal * plane.step * inverse * plane.baselines
+            off = np.abs(scaled - 1) * np.linalg.norm(corners[:, None] - moved, axis=2).max(axis=0)
+            worst = np.maximum(worst, off)
+        return np.asarray(worst / np.maximum(1, np.abs(plane.baselines).max(axis=1)), np.float64)
 
 
 def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
@@ -121,9 +130,11 @@ def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
     SepiError
         If hardly anything of the frame is left.
     """
-    low, high = seeing.bounds()
     number, own = len(seeing.model.shots), seeing.plane.reference
     reference = seeing.model.shots[own]
+    # least and largest pixel (x, y) of the reference's picture, once rectified
+    border = seeing.from_picture(own, reference.lens.border()) + seeing.principal
+    low, high = np.ceil(border.min(axis=0) - _OUTSIDE), np.floor(border.max(axis=0) + _OUTSIDE)
     larger = float((high - low).max()) / max(reference.lens.width, reference.lens.height)
     if not larger <= _MOST_LARGER:
         large = f"{larger:.3g} times as large" if np.isfinite(larger) else "without bounds"

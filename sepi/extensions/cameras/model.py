@@ -193,41 +193,31 @@ class Pictures:
         header = picture_header(file)
         return (header.width, header.height) if self._crop is None else self._crop[:2]
 
-    def lens(
-        self,
-        file: Path,
-        size: tuple[float, float] | None,
-        focal: tuple[float, float],
-        principal: tuple[float, float] | None,
-        kind: str,
-        distortion: Sequence[float],
-    ) -> Lens:
+    def fitted(self, file: Path, lens: Lens, sized: bool) -> Lens:
         """The lens for a picture file, which may be a scaled or cropped version of the calibrated picture.
 
         Parameters
         ----------
         file : Path
-        size : (float, float) or None
-            Width and height of the calibrated picture, if the model has them.
-        focal, principal, kind, distortion
-            Those of :class:`sepi.camera.rig.Lens` in the model; the default of ``principal`` is the middle.
+        lens : Lens
+            Lens in the model.
+        sized : bool
+            Whether the model has the size of the calibrated picture.
 
         Raises
         ------
         SepiError
-            If the sizes do not fit, or a number is not possible.
+            If the sizes do not fit.
         """
-        header, whole = picture_header(file), self.size(file)
-        width, height = map(int, size or whole)
-        told = Lens(width, height, focal, principal or ((width - 1) / 2, (height - 1) / 2), kind, tuple(distortion))
-        if size is None:
-            self._middles.append([(2 * told.principal[0] + 1) / width, (2 * told.principal[1] + 1) / height])
-        elif (width, height) != whole:
-            self._scaled = f"lenses of {width}x{height} pixels scaled to pictures of {whole[0]}x{whole[1]}"
-        lens, part = told.scaled(*whole), self._crop or (*whole, 0, 0)
+        header, whole, (x, y) = picture_header(file), self.size(file), lens.principal
+        if not sized:
+            self._middles.append([(2 * x + 1) / lens.width, (2 * y + 1) / lens.height])
+        elif (lens.width, lens.height) != whole:
+            self._scaled = f"lenses of {lens.width}x{lens.height} pixels scaled to pictures of {whole[0]}x{whole[1]}"
+        lens, part = lens.scaled(*whole), self._crop or (*whole, 0, 0)
         require_part(part, (header.height, header.width))
-        middle = lens.principal[0] - part[2], lens.principal[1] - part[3]
-        return replace(lens, width=header.width, height=header.height, principal=middle)
+        principal = lens.principal[0] - part[2], lens.principal[1] - part[3]
+        return replace(lens, width=header.width, height=header.height, principal=principal)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -89,8 +89,7 @@ def write_features(
     SepiError
         If a picture cannot be read, or is of another size than the others and shares their camera.
     """
-    wanted = pycolmap.FeatureExtractionOptions()
-    wanted.num_threads = 1
+    wanted = pycolmap.FeatureExtractionOptions(num_threads=1)
 
     def found(path: Path) -> tuple[tuple[int, ...], Any, Any]:
         grey: FloatMap = np.ascontiguousarray(as_unit_float(read_picture(path)).mean(axis=2), np.float32)
@@ -120,8 +119,7 @@ def write_features(
                 camera, rig = _write_camera(pycolmap, file, path, finding.lens)
             image = pycolmap.Image(name=path.name, camera_id=camera)
             image.image_id = file.write_image(image)
-            frame = pycolmap.Frame()
-            frame.rig_id = rig
+            frame = pycolmap.Frame(rig_id=rig)
             frame.add_data_id(image.data_id)
             file.write_frame(frame)
             file.write_keypoints(image.image_id, places)
@@ -132,8 +130,7 @@ def write_features(
 
 
 def _write_camera(pycolmap: Any, file: Any, path: Path, lens: str) -> tuple[int, int]:
-    options = pycolmap.ImageReaderOptions()
-    options.camera_model = lens
+    options = pycolmap.ImageReaderOptions(camera_model=lens)
     with reading(path, "picture that COLMAP can read"):
         # its focal length is from EXIF if there is one
         known = pycolmap.infer_camera_from_image(str(path), options)
@@ -158,11 +155,10 @@ def match(
     threads : int
     progress : callable
     """
-    matching, geometry = pycolmap.FeatureMatchingOptions(), pycolmap.TwoViewGeometryOptions()
-    matching.num_threads = threads
-    geometry.ransac.random_seed, geometry.ransac.max_error = SEED, size
-    listed, pairing = database.with_suffix(".pairs"), pycolmap.ImportedPairingOptions()
-    pairing.match_list_path = str(listed)
+    matching = pycolmap.FeatureMatchingOptions(num_threads=threads)
+    geometry = pycolmap.TwoViewGeometryOptions(ransac={"random_seed": SEED, "max_error": size})
+    listed = database.with_suffix(".pairs")
+    pairing = pycolmap.ImportedPairingOptions(match_list_path=str(listed))
     for begin in range(0, len(pairs), _AT_ONCE):
         listed.write_text("".join(f"{one} {other}\n" for one, other in pairs[begin : begin + _AT_ONCE]), "utf-8")
         pycolmap.match_image_pairs(str(database), matching, pairing, geometry, pycolmap.Device.cpu)
@@ -260,8 +256,8 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _steps(pycolmap: Any, file: Any, size: float) -> list[Step]:
-    options = pycolmap.TwoViewGeometryOptions()
-    options.ransac.random_seed, options.ransac.max_error, options.compute_relative_pose = SEED, size, True
+    ransac = {"random_seed": SEED, "max_error": size}
+    options = pycolmap.TwoViewGeometryOptions(compute_relative_pose=True, ransac=ransac)
     steps = []
     for one, other in combinations(sorted(file.read_all_images(), key=lambda image: image.image_id), 2):
         here, there = (np.asarray(file.read_keypoints(image.image_id)[:, :2], np.float64) for image in (one, other))

@@ -1,9 +1,4 @@
-"""The plane through the cameras: their common axes, positions in view steps and on a grid, and standing off it.
-
-A camera at ``dz`` in front of the reference camera, with the focal length ``f (1 - dz / Z0)``, sees a point at depth
-``Z`` at ``k = (1 - dz / Z0) / (1 - dz / Z)`` times the distance from the principal point that a camera in the plane
-sees. This factor is 1 at the depth ``Z0`` in the middle of the scene, and close to 1 near it.
-"""
+"""The plane through the cameras: their common axes, and their positions in view steps and on a grid."""
 
 from __future__ import annotations
 
@@ -99,42 +94,14 @@ def _median_step(places: Floats) -> float:
     for axis in (1, 0):
         ahead = at[None] - at[:, None]
         here, there = np.nonzero((ahead[..., axis] == 1) & (ahead[..., 1 - axis] == 0))
-        if len(here) and np.ptp(at[:, axis]):
-            along = places[there, 1 - axis] - places[here, 1 - axis]
-            if np.median(along) > 0:
-                return float(np.median(along))
+        along = places[there, 1 - axis] - places[here, 1 - axis]
+        if len(along) and np.median(along) > 0:
+            return float(np.median(along))
     return step
 
 
 def _unit(vector: Floats) -> Floats:
     return np.asarray(vector / np.linalg.norm(vector), np.float64)
-
-
-def zooms(plane: Plane, inverse_depths: tuple[float, float]) -> Floats:
-    """Focal length of each view as a multiple of the reference's, (N,)."""
-    return 1 - plane.places[:, 2] * sum(inverse_depths) / 2
-
-
-def disparity_errors(plane: Plane, inverse_depths: tuple[float, float], corners: Floats, focal: float) -> Floats:
-    """Greatest disparity error from a camera's distance to the reference camera's plane, (N,), pixels per view step.
-
-    Parameters
-    ----------
-    plane : Plane
-    inverse_depths : (float, float)
-        Of the farthest and the nearest surface.
-    corners : ndarray, shape (4, 2), float64
-        Corners ``(y, x)`` of the reference view from its principal point, pixels.
-    focal : float
-        Pixels.
-    """
-    zoom, worst = zooms(plane, inverse_depths), np.zeros(len(plane.places))
-    for inverse in inverse_depths:
-        scaled = zoom / np.maximum(1 - plane.places[:, 2] * inverse, 1e-9)
-        moved = focal * plane.step * inverse * plane.baselines
-        off = np.abs(scaled - 1) * np.linalg.norm(corners[:, None] - moved, axis=2).max(axis=0)
-        worst = np.maximum(worst, off)
-    return np.asarray(worst / np.maximum(1, np.abs(plane.baselines).max(axis=1)), np.float64)
 
 
 # least share of a grid's places with a camera

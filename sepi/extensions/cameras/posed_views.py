@@ -27,7 +27,6 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.camera.rig import Rig
-from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 from sepi.matching.carried_map import carried_map, carried_values
 
@@ -182,11 +181,7 @@ class PosedViews:
     def carried(self, view: int) -> FloatMap:
         """Disparity of a view, (H, W) float32; NaN at unknown and missing pixels."""
         missing = self.light_field.missing
-        found = self.disparity
-        if view != self.reference and self.surfaces is not None:
-            found = self.surfaces(self.positions[view])
-        elif view != self.reference:
-            found = carried_map(self.disparity, self._baseline(view), ~np.isnan(self.disparity))
+        found = self._seen(view, self.disparity, self.surfaces, lambda *where: carried_map(self.disparity, *where))
         return found if missing is None else np.where(missing[self.positions[view]], np.float32(np.nan), found)
 
     def depth(self, carried: FloatMap) -> FloatMap:
@@ -204,16 +199,17 @@ class PosedViews:
         depth. For views that are :attr:`sure`.
         """
         assert self.sigma is not None
-        sigma = self.sigma
-        if view != self.reference and self.sigmas is not None:
-            sigma = self.sigmas(self.positions[view])
-        elif view != self.reference:
-            sigma = carried_values(self.disparity, sigma, self._baseline(view), ~np.isnan(self.disparity))
+        own = self.sigma
+        sigma = self._seen(view, own, self.sigmas, lambda *where: carried_values(self.disparity, own, *where))
         return np.where(self.depth(carried) > 0, self.camera.depth_sigma(carried, sigma), np.float32(0))
 
-    def _baseline(self, view: int) -> tuple[float, float]:
-        down, across = self.baselines[view].tolist()
-        return down, across
+    def _seen(self, view: int, own: FloatMap, others: Surfaces | None, warped: Callable[..., FloatMap]) -> FloatMap:
+        """A map of a view: the reference view's own, that of ``others``, else the own one ``warped``."""
+        if view == self.reference:
+            return own
+        if others is not None:
+            return others(self.positions[view])
+        return warped(tuple(self.baselines[view].tolist()), ~np.isnan(self.disparity))
 
     def pixel_errors(self, sees: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
         """Expected reprojection error of the points, mean over views, (P,), pixels; 0 where unknown.
@@ -295,16 +291,7 @@ def posed_views(
         Standard deviation of the disparity, pixels per view step.
     sigmas : callable, optional
         Standard deviation of the other views; needed with ``surfaces`` for the error of their depth.
-
-    Raises
-    ------
-    SepiError
-        If a map has another shape than the views.
     """
-    given = {"disparity": disparity, "confidence": confidence, "unknown": unknown, "sigma": sigma}
-    for name, values in given.items():
-        if values is not None and values.shape != light_field.shape:
-            raise SepiError(f"{light_field.name}: {name} is {values.shape}, the views {light_field.shape}")
     known = np.isfinite(disparity)
     if unknown is not None:
         known &= ~unknown

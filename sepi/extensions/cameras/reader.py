@@ -55,12 +55,12 @@ def with_depths(path: Path, light_field: LightField, options: ReadOptions, given
     rig, camera = light_field.rig, light_field.camera
     assert rig is not None
     assert camera is not None
-    centres = np.array([view.shot.centre for view in rig.views.values()])
+    centres = np.array([shot.centre for shot in rig.views.values()])
     if np.abs((centres - rig.origin) @ rig.rotation[2]).max() < _FLAT * rig.step:
         return light_field
     known = given or estimate_range(light_field)
     low, high = ((bound + camera.offset) / camera.scale for bound in (known.minimum, known.maximum))
-    same = replace(options, reference=rig.views[light_field.reference_position].shot.name)
+    same = replace(options, reference=rig.views[light_field.reference_position].name)
     again = read(path, same, (max(low, 0.0), max(high, 1e-12)))
     return replace(again, disparity_range=None)
 
@@ -164,12 +164,11 @@ def cameras_in(path: Path) -> Path | None:
     """The file or folder of cameras at ``path``; None without one. Quick, and never raises."""
     try:
         if path.is_dir():
-            for name in (*TABLES, *TRANSFORMS):
-                if (path / name).is_file():
-                    return path / name
-            return model_in(path)
-        if path.is_file() and (path.suffix.lower() in TABLE_SUFFIXES or path.name.startswith("transforms")):
-            return path if path.suffix.lower() in (*TABLE_SUFFIXES, ".json") else None
+            inside = (path / name for name in (*TABLES, *TRANSFORMS))
+            return next(filter(Path.is_file, inside), None) or model_in(path)
+        named = path.name.startswith("transforms") and path.suffix.lower() == ".json"
+        if path.is_file() and (named or path.suffix.lower() in TABLE_SUFFIXES):
+            return path
         # a file of a COLMAP model
         return model_in(path.parent) if path.is_file() and path.stem in ("cameras", "images") else None
     except OSError:

@@ -1,8 +1,7 @@
 """Rectifies calibrated cameras to a light field: views of parallel cameras in one plane.
 
-The steps: the plane through the cameras (``plane``), the picture of the reference view
-(``frame``), the views themselves (``resampling``), and a grid for them
-(``grid``).
+The steps: the plane through the cameras and a grid for them (``plane``), the picture of the reference view, and the
+views themselves (``frame``).
 """
 
 from __future__ import annotations
@@ -13,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sepi.camera import Camera
-from sepi.camera.rig import Rectified, Rig
+from sepi.camera.rig import Rig
 from sepi.errors import SepiError
 from sepi.extensions.cameras.frame import Frame, Seeing, completed, frame_of, rectified_view
 from sepi.extensions.cameras.model import CameraModel
-from sepi.extensions.cameras.plane import Plane, disparity_errors, grid_of, plane_through, zooms
+from sepi.extensions.cameras.plane import Plane, grid_of, plane_through
 from sepi.io.files import name_of
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.exposure import equally_bright
@@ -65,10 +64,10 @@ def rectification_of(
         chosen = None if reference is None else model.named(reference)[0]
         plane = plane_through(model, chosen)
         known = inverse_depths or _of_points(model, plane)
-        seeing = Seeing(model, plane, zooms(plane, known or (0.0, 0.0)))
+        seeing = Seeing(model, plane, known)
         # the error of a camera off the plane depends on the frame, and the frame on the remaining cameras
         frame, kept = frame_of(seeing)
-        errors = disparity_errors(plane, known or (0.0, 0.0), frame.corners, seeing.focal)
+        errors = seeing.errors(frame)
         worst = int(errors.argmax())
         if len(kept) < len(model.shots):
             left = [shot.name for n, shot in enumerate(model.shots) if n not in kept]
@@ -133,7 +132,7 @@ def light_field_of(found: Rectification) -> LightField:
         grid[t, s], missing[t, s] = completed(pictures[n], absent[n]), absent[n]
         # a mask may leave no pixels
         present[t, s], positions[t, s] = not absent[n].all(), plane.baselines[n]
-        views[t, s] = Rectified(model.shots[n], float(seeing.zoom[n]))
+        views[t, s] = replace(model.shots[n], zoom=float(seeing.zoom[n]))
     scale, view = plane.step * seeing.focal, (int(at[plane.reference, 0]), int(at[plane.reference, 1]))
     limits = None
     if depths is not None:

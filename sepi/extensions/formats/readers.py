@@ -155,7 +155,6 @@ def _pages(pictures: Any, size: int) -> tuple[int, int, int, int]:
 
 GROUP = "LF"
 
-_GRID, _ROW, _COLUMN = 1, 2, 3
 _COLOURS, _GREY = ("r", "g", "b"), ("bw",)
 _COUNTS = ("LF_TYPE", "cams_h", "cams_v", "height", "width")
 
@@ -168,9 +167,8 @@ def matches_open_lf(path: Path) -> bool:
 
 def read_open_lf(path: Path, options: ReadOptions) -> LightField:
     """Light field of an OpenLF file; its baselines, of unknown unit, give the distance of rows in view steps."""
-    with _open_lf(path) as group:
-        (rows, columns, H, W), kind, names = _form(path, group)
-        mosaic = np.stack([_mosaic(path, group[name], (rows * H, columns * W), kind) for name in names], axis=2)
+    with _open_lf(path) as (group, (rows, columns, H, W), names):
+        mosaic = np.stack([_mosaic(path, group[name], (rows * H, columns * W), columns == 1) for name in names], axis=2)
         down, across = (number_of(group, key) for key in ("baseline_v", "baseline_h"))
     views = mosaic.reshape(rows, H, columns, W, -1).transpose(0, 2, 1, 3, 4)
     light_field = light_field_from_array(views, path, options, axes="TSHWC")
@@ -183,48 +181,44 @@ def read_open_lf(path: Path, options: ReadOptions) -> LightField:
 
 def size_of_open_lf(path: Path) -> tuple[int, int, int, int]:
     """Number of views, height, width and bytes of a pixel; no values are read."""
-    with _open_lf(path) as group:
-        (rows, columns, height, width), _, names = _form(path, group)
+    with _open_lf(path) as (group, (rows, columns, height, width), names):
         return rows * columns, height, width, len(names) * group[names[0]].dtype.itemsize
 
 
 @contextmanager
-def _open_lf(path: Path) -> Iterator[h5py.Group]:
-    with open_hdf5(path, "file of OpenLF") as file:
+def _open_lf(path: Path) -> Iterator[tuple[h5py.Group, tuple[int, int, int, int], tuple[str, ...]]]:
+    """The group, the shape (T, S, H, W) of its views, and the names of their channels."""
+    with open_hdf5(path, "file of OpenLF") as file, naming(path):
         group = file.get(GROUP)
         if not isinstance(group, h5py.Group):
-            raise SepiError(f"{path}: expected a group '{GROUP}' as OpenLF writes it")
+            raise SepiError(f"expected a group '{GROUP}' as OpenLF writes it")
         channels = [name for name in (*_COLOURS, *_GREY) if name in group]
         known = channels in (list(_COLOURS), list(_GREY), [*_COLOURS, *_GREY])
         if not known or any(key not in group.attrs for key in _COUNTS):
             held = printable(", ".join(list(group)[:6])) or "nothing"
-            raise SepiError(f"{path}: '{GROUP}' holds {held}; expected r, g and b, or bw, and {', '.join(_COUNTS)}")
-        yield group
+            raise SepiError(f"'{GROUP}' holds {held}; expected r, g and b, or bw, and {', '.join(_COUNTS)}")
+        counts = [number_of(group, key) for key in _COUNTS]
+        for key, count in zip(_COUNTS, counts, strict=True):
+            if not 0 <= count < 2**31 or count != int(count):
+                raise SepiError(f"expected the attribute '{key}' to be a whole number, got {count:g}")
+        kind, columns, rows, height, width = map(int, counts)
+        kinds = {1: rows * columns > 1, 2: rows == 1 < columns, 3: columns == 1 < rows}
+        if kind not in kinds:
+            raise SepiError(
+                f"LF_TYPE {kind}, a cross of views or unknown; expected 1 (grid), 2 (row) or 3 (column), or a folder "
+                "of the views"
+            )
+        if min(rows, columns) < 1 or not kinds[kind]:
+            raise SepiError(f"{rows}x{columns} views (cams_v x cams_h) do not fit LF_TYPE {kind}")
+        if height % rows or width % columns:
+            raise SepiError(f"{width}x{height} pixels hold no {rows}x{columns} views of one size")
+        yield group, (rows, columns, height // rows, width // columns), _COLOURS if "r" in group else _GREY
 
 
-def _form(path: Path, group: h5py.Group) -> tuple[tuple[int, int, int, int], int, tuple[str, ...]]:
-    """Shape (T, S, H, W) of the views, the kind of light field, and names of the channels."""
-    counts = [number_of(group, key) for key in _COUNTS]
-    for key, count in zip(_COUNTS, counts, strict=True):
-        if not 0 <= count < 2**31 or count != int(count):
-            raise SepiError(f"{path}: expected the attribute '{key}' to be a whole number, got {count:g}")
-    kind, columns, rows, height, width = map(int, counts)
-    expected = {_GRID: rows * columns > 1, _ROW: rows == 1 < columns, _COLUMN: columns == 1 < rows}
-    if kind not in expected:
-        raise SepiError(
-            f"{path}: LF_TYPE {kind}, a cross of views or unknown; expected 1 (grid), 2 (row) or 3 (column), or a "
-            "folder of the views"
-        )
-    if min(rows, columns) < 1 or not expected[kind]:
-        raise SepiError(f"{path}: {rows}x{columns} views (cams_v x cams_h) do not fit LF_TYPE {kind}")
-    if height % rows or width % columns:
-        raise SepiError(f"{path}: {width}x{height} pixels hold no {rows}x{columns} views of one size")
-    return (rows, columns, height // rows, width // columns), kind, _COLOURS if "r" in group else _GREY
-
-
-def _mosaic(path: Path, dataset: h5py.Dataset, shape: tuple[int, int], kind: int) -> Array:
+def _mosaic(path: Path, dataset: h5py.Dataset, shape: tuple[int, int], column: bool) -> Array:
     values = read_dataset(path, dataset)
-    if kind == _COLUMN and values.shape == shape[::-1] != shape:
+    # of a column of views, it may lie on its side
+    if column and values.shape == shape[::-1] != shape:
         values = values.T
     if values.shape != shape:
         raise SepiError(f"{path}: '{dataset.name}' has shape {values.shape}; expected (height, width) = {shape}")

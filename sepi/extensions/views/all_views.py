@@ -297,14 +297,11 @@ def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int
     told = len(sources.bars) > 0
     bars = np.empty((*shape, 3) if told else (len(places), 0, 0, 3), np.float32)
     kernels.maps_of_views(sources, baselines, disparity, confidence, bars, extended)
-    positions = [(int(t), int(s)) for t, s in places]
-    views = [ViewMaps(*of_view) for of_view in zip(positions, disparity, confidence, extended, strict=True)]
-    if not told:
-        return views
-    return [
-        view._replace(sigma=own[..., 0], low=view.disparity - own[..., 1], high=view.disparity + own[..., 2])
-        for view, own in zip(views, bars, strict=True)
-    ]
+    views = []
+    for (t, s), at, sure, beyond, own in zip(places.tolist(), disparity, confidence, extended, bars, strict=True):
+        of_view = (own[..., 0], at - own[..., 1], at + own[..., 2]) if told else ()
+        views.append(ViewMaps((t, s), at, sure, beyond, *of_view))
+    return views
 
 
 def _with_doubt(light_field: LightField, view: ViewMaps, decided: FloatMap) -> ViewMaps:

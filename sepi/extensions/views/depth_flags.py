@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from inspect import cleandoc
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,9 +14,8 @@ from sepi.process.command import SepiCommand, progress_bar
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from sepi.extensions.views.all_views import ViewMaps
     from sepi.lightfield import LightField
-    from sepi.stage import StageMaps
+    from sepi.stage import Progress, StageMaps
     from sepi.variants import Variant
 
 _TEXT = """
@@ -54,20 +53,15 @@ def _write_all_views(
     from sepi.io.all_views import write_all_views
     from sepi.io.provenance import result_attributes
     from sepi.io.result_files import ALL_VIEWS
+    from sepi.io.result_folder import write_as_taken
+
+    def of_views(progress: Progress) -> Iterator[tuple[tuple[int, int], Mapping[str, npt.NDArray[Any]]]]:
+        for view in maps_of_all_views(light_field, maps, variant, parameters, progress, memory):
+            # also for the picture that its calibrated camera took
+            if view.position != light_field.reference_position:
+                write_as_taken(folder, light_field, view.disparity, view.position, view.sigma)
+            yield view.position, view.maps
 
     made_by = result_attributes(light_field, maps)
     with progress_bar(f"{light_field.name}, all views") as progress:
-        views = maps_of_all_views(light_field, maps, variant, parameters, progress, memory)
-        write_all_views(folder / ALL_VIEWS, light_field, _also_as_taken(folder, light_field, views), made_by)
-
-
-def _also_as_taken(
-    folder: Path, light_field: LightField, views: Iterable[ViewMaps]
-) -> Iterator[tuple[tuple[int, int], Mapping[str, npt.NDArray[Any]]]]:
-    """The maps of each view, also written for the picture that its calibrated camera took."""
-    from sepi.io.result_folder import write_as_taken
-
-    for view in views:
-        if view.position != light_field.reference_position:
-            write_as_taken(folder, light_field, view.disparity, view.position, view.sigma)
-        yield view.position, view.maps
+        write_all_views(folder / ALL_VIEWS, light_field, of_views(progress), made_by)

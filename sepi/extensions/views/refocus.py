@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -45,21 +45,6 @@ _QUALITY = 85
 _MADE = re.compile(rf"focus_\d+\.png|{re.escape(ALL_IN_FOCUS)}|{re.escape(ANIMATION)}")
 
 
-class Focus(NamedTuple):
-    """Focus of an image.
-
-    Attributes
-    ----------
-    disparity : float
-        Pixels per view step.
-    at : (int, int) or None
-        Column and row ``(x, y)`` of the pixel whose surface is in focus, if the focus was chosen so.
-    """
-
-    disparity: float
-    at: tuple[int, int] | None = None
-
-
 def stack_names(count: int) -> list[str]:
     """Names of the images of a focal stack: ``focus_01.png`` and so on."""
     digits = max(2, len(str(count)))
@@ -67,7 +52,7 @@ def stack_names(count: int) -> list[str]:
 
 
 def write_refocused(
-    folder: Path, rows: Sequence[Sequence[str]], pictures: Iterable[FloatMap], dtype: npt.DTypeLike, *, animated: bool
+    folder: Path, rows: list[dict[str, str]], pictures: Iterable[FloatMap], dtype: npt.DTypeLike, *, animated: bool
 ) -> list[str]:
     """Write pictures and their index, and return the names of the files.
 
@@ -78,8 +63,8 @@ def write_refocused(
     ----------
     folder : Path
         Made if missing.
-    rows : sequence of sequence of str
-        Row of the index for each picture, which begins with the name of its file.
+    rows : list of dict
+        Row of the index for each picture, with the name of its file.
     pictures : iterable of ndarray, shape (H, W, C), float32
         Pictures in 0..1, consumed one by one.
     dtype : dtype
@@ -93,8 +78,9 @@ def write_refocused(
         If the folder is a file, cannot be written or holds other files of these names, or the installed Pillow cannot
         write animations.
     """
-    rows = [*rows, *[[ANIMATION, "", "", "", ""]] * animated]
-    made, before = [*(row[0] for row in rows), INDEX], _earlier_files(folder / INDEX)
+    if animated:
+        rows = [*rows, {"file": ANIMATION}]
+    made, before = [*(row["file"] for row in rows), INDEX], _earlier_files(folder / INDEX)
     others = [name for name in made if name not in before and os.path.lexists(folder / name)]
     if others:
         raise SepiError(f"{folder}: {others[0]} there was not written by 'sepi refocus'; choose another folder")
@@ -107,7 +93,9 @@ def write_refocused(
         if animated:
             _write_animation(temporary / ANIMATION, frames)
         with (temporary / INDEX).open("w", encoding="ascii", newline="") as file:
-            csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
+            index = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+            index.writeheader()
+            index.writerows(rows)
     remove_files(folder, set(before).difference(made))
     return made
 
@@ -237,19 +225,19 @@ def refocus(
     for value in disparities:
         if not math.isfinite(value):
             raise SepiError(f"--disparity {value}: expected a finite number of pixels per view step")
-    foci = [Focus(value) for value in disparities]
+    foci: list[tuple[float, tuple[int, ...]]] = [(value, ()) for value in disparities]
     if known is not None:
-        foci += [Focus(_disparity_at(result_path, known, x, y), (x, y)) for x, y in pixels]
+        foci += [(_disparity_at(result_path, known, *pixel), pixel) for pixel in pixels]
     if steps or not foci:
-        foci += [Focus(value) for value in _through(light_field, result_path, known, steps or _STEPS)]
+        foci += [(value, ()) for value in _through(light_field, result_path, known, steps or _STEPS)]
     # from near to far
-    foci.sort(key=lambda focus: -focus.disparity)
-    at = np.array([focus.disparity for focus in foci], np.float32)
-    depths = [] if camera is None else camera.depth(at).tolist()
-    rows = [[ALL_IN_FOCUS, "", "", "", ""]] * (surfaces is not None)
-    for name, (disparity, pixel), depth in zip(stack_names(len(foci)), foci, depths or [None] * len(foci), strict=True):
-        x, y = pixel or ("", "")
-        rows.append([name, f"{disparity:.6g}", "" if depth is None else f"{depth:.6g}", f"{x}", f"{y}"])
+    foci.sort(key=lambda focus: -focus[0])
+    depths = [] if camera is None else camera.depth(np.array([at for at, _ in foci], np.float32)).tolist()
+    rows = [{"file": ALL_IN_FOCUS}] if surfaces is not None else []
+    for name, (disparity, pixel) in zip(stack_names(len(foci)), foci, strict=True):
+        rows.append({"file": name, "disparity": f"{disparity:.6g}", **dict(zip("xy", map(str, pixel), strict=False))})
+    for row, depth in zip(rows[-len(foci) :], depths, strict=False):
+        row["depth_m"] = f"{depth:.6g}"
     # fails before a picture is computed
     refocusing.views_within(light_field, aperture)
     makers = [partial(refocusing.refocus, light_field, at, surfaces, aperture=aperture) for at, _ in foci]
@@ -262,7 +250,7 @@ def refocus(
 
         pictures = (make(progress=partial(part, number)) for number, make in enumerate(makers))
         files = write_refocused(folder, rows, pictures, light_field.views.dtype, animated=animation)
-    told = ", ".join(f"{focus.disparity:.3g}" for focus in foci)
+    told = ", ".join(f"{at:.3g}" for at, _ in foci)
     metres = f" ({', '.join(f'{depth:.3g}' for depth in depths)} m)" if depths else ""
     click.echo(f"focused at: {told} pixels per view step{metres}")
     if surfaces is None:

@@ -370,8 +370,8 @@ def test_the_reference_camera_is_chosen_by_its_picture(folder: Path) -> None:
     light_field = sepi.read_cameras(folder, reference="00.png", disparity_range=(-2, 2))
     rig = light_field.reference_rig
     (view,) = rig.views.values()
-    assert view.shot.name == "00.png"
-    np.testing.assert_allclose(rig.origin, view.shot.centre, atol=1e-9)
+    assert view.name == "00.png"
+    np.testing.assert_allclose(rig.origin, view.centre, atol=1e-9)
     with pytest.raises(SepiError, match=r"no picture 'gone\.png' \(found: 00\.png, "):
         sepi.read_cameras(folder, reference="gone.png")
     with pytest.raises(SepiError, match=r"--reference does not apply"):
@@ -542,16 +542,16 @@ def test_maps_are_told_in_the_pictures_as_they_were_taken(folder: Path, tmp_path
     for position in (reference, (0, 0)):
         view, seen_by = rig.views[position], replace(light_field, view=position)
         plain = _rectified_shot(seen_by)
-        centre = TURN.T @ (view.shot.centre - AWAY)
+        centre = TURN.T @ (view.centre - AWAY)
         lens = replace(plain.lens, focal=(plain.lens.focal[0] * view.zoom,) * 2)
         rectified = render_shot("pyramids", replace(plain, lens=lens, centre=centre), camera=CAMERA, size=SIZE)
-        ahead = (view.shot.centre - rig.origin) @ rig.rotation[2]
+        ahead = (view.centre - rig.origin) @ rig.rotation[2]
         assert (position == reference) == (abs(ahead) < 1e-9)
         truth = (camera.scale / (rectified.depth + ahead) - camera.offset).astype(np.float32)
         named = None if position == reference else position
         write_as_taken(tmp_path, light_field, truth, named)
         disparity, depth = (read_pfm(tmp_path / name) for name in names_as_taken(named))
-        taken = replace(view.shot, rotation=view.shot.rotation @ TURN, centre=centre)
+        taken = replace(view, rotation=view.rotation @ TURN, centre=centre)
         true = render_shot("pyramids", taken, camera=CAMERA, size=SIZE).depth
         shown = np.isfinite(depth)
         assert depth.shape == disparity.shape == true.shape
