@@ -35,14 +35,11 @@ LEARNED: dict[str, dict[str, Any]] = {"onnx": {"initial": "onnx", **_COSTS_ALONE
 
 _MODULES = {
     **{f"initial.{name}": name for name in METHODS},
+    **{f"{stage}.{name}": name for stage in ("occlusion", "optimize") for name in ("pobr", "occ")},
     "initial.onnx": "onnx_network",
-    "occlusion.pobr": "pobr",
-    "occlusion.occ": "occ",
     "optimize.guided_median": "costs",
-    "optimize.pobr": "pobr",
     "optimize.median_descent": "mishiba",
     "optimize.confident_labels": "acc",
-    "optimize.occ": "occ",
     "optimize.guided_costs": "costs",
     "optimize.markov_field": "markov_field",
 }

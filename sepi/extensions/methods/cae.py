@@ -44,17 +44,17 @@ References
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.costs import GuidedFilter, maps_of
+from sepi.extensions.methods.costs import GuidedFilter, filtered, maps_of
 from sepi.kernels import cae as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews, refocused
-from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps
+from sepi.stage import Choice, Needs, Progress, StageMaps
 
 CANDIDATES = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
 """The authors' number, for light fields like theirs."""
@@ -76,17 +76,14 @@ class ConstrainedEntropyParameters(CandidateParameters):
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     colour_sigma: float = Field(
-        0.1,
-        ge=1e-3,
-        le=10,
-        description="colour difference at which the weight of views and neighbours falls, colours in 0..1",
+        0.1, ge=1e-3, le=10, description="difference of colours, 0..1, at which weights of views and neighbours fall"
     )
     colour_constraint: float = Field(
         1.0, ge=0, description="defocus added for a sub-patch that has none of the pixel's colour, colours in 0..1"
     )
     filter_radius: int = Field(5, ge=1, le=50, description="window of 2 r + 1 pixels in which costs are filtered")
     filter_epsilon: float = Field(
-        1e-4, gt=0, description="variance of colour above which filtered costs keep edges, colours in 0..1"
+        1e-4, gt=0, description="variance of colours, 0..1, above which the filter keeps edges"
     )
 
 
@@ -105,9 +102,7 @@ def cae(
     defocus = constrained_defocus(responses, light_field.reference_view, parameters)
     costs = 0.25 * (_normalised(entropies) + _normalised(defocus))
     smooth = GuidedFilter(light_field.reference_view, parameters.filter_radius, parameters.filter_epsilon)
-    volume = CostVolume(disparities, np.stack([smooth(one).astype(np.float16) for one in costs]))
-    progress(1.0)
-    return maps_of(volume)
+    return maps_of(filtered(smooth, disparities, costs, lambda done: progress(0.9 + 0.1 * done)))
 
 
 def entropies_and_responses(
@@ -130,14 +125,13 @@ def entropies_and_responses(
     entropies, responses : ndarray, shape (K, H, W), float32
     """
     views, weights = ShearedViews(light_field), level_weights(sigma)
-    own = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
-    entropies, responses = (np.empty((len(disparities), *light_field.shape), np.float32) for _ in range(2))
-    channels = np.empty_like(own)
-    for k, sheared in views.over(disparities):
+    entropies, responses = np.empty((2, len(disparities), *light_field.shape), np.float32)
+    channels = np.empty((3, *light_field.shape), np.float32)
+    for k, sheared in views.over(disparities, lambda done: progress(0.9 * done)):
+        own = sheared[views.reference]
         kernels.constrained_entropies(sheared, own, weights, channels)
         entropies[k] = (channels.mean(axis=0) + channels.max(axis=0)) / 2
         responses[k] = np.abs(refocused(sheared) - own).mean(axis=0)
-        progress(0.9 * (k + 1) / len(disparities))
     return entropies, responses
 
 
@@ -165,8 +159,7 @@ def constrained_defocus(responses: FloatMap, guide: FloatMap, parameters: Constr
     """
     by_pixel = np.ascontiguousarray(responses.transpose(1, 2, 0))
     least = np.empty_like(by_pixel)
-    sigma, constraint = parameters.colour_sigma, parameters.colour_constraint
-    kernels.constrained_least_patch(by_pixel, np.ascontiguousarray(guide), sigma, constraint, least)
+    kernels.constrained_least_patch(by_pixel, guide, parameters.colour_sigma, parameters.colour_constraint, least)
     return least.transpose(2, 0, 1)
 
 
@@ -176,4 +169,4 @@ def _normalised(costs: FloatMap) -> FloatMap:
     return np.asarray(costs / np.maximum(mean, max(LEAST_MEAN * float(mean.mean()), 1e-6)), np.float32)
 
 
-CHOICES: dict[str, Any] = {"initial": {"cae": Choice(ConstrainedEntropyParameters, cae)}}
+CHOICES = {"initial": {"cae": Choice(ConstrainedEntropyParameters, cae)}}

@@ -79,10 +79,7 @@ class OavcParameters(CandidateParameters):
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     agreeing_share: float = Field(
-        0.5,
-        gt=0,
-        le=1,
-        description="share of the views that must vote for some candidate; it sets each pixel's threshold",
+        0.5, gt=0, le=1, description="share of the views that a pixel's threshold has vote for some candidate"
     )
     least_threshold: float = Field(
         0.004, ge=1e-6, le=1, description="least threshold of a vote: mean difference of the channels, colours in 0..1"
@@ -100,39 +97,12 @@ def oavc(
         With the cost volume.
     """
     views, disparities = ShearedViews(light_field), parameters.candidates(light_field)
-    thresholds = vote_thresholds(
-        views, light_field.shape, disparities, parameters, lambda fraction: progress(fraction / 2)
-    )
-    return maps_of(votes(views, disparities, thresholds, lambda fraction: progress((1 + fraction) / 2)))
-
-
-def vote_thresholds(
-    views: ShearedViews, shape: tuple[int, int], disparities: FloatMap, parameters: OavcParameters, progress: Progress
-) -> FloatMap:
-    """Minimum thresholds with which the required share of the views agree on a candidate.
-
-    Parameters
-    ----------
-    views : ShearedViews
-        The reference view among them.
-    shape : tuple of int
-        Height and width of a view, pixels.
-    disparities : ndarray, shape (K,), float32
-        Candidates, pixels per view step.
-    parameters : OavcParameters
-    progress : callable
-
-    Returns
-    -------
-    ndarray, shape (H, W), float32
-        Mean difference of the channels, colours in 0..1.
-    """
     needed = max(1, math.ceil(parameters.agreeing_share * (len(views.positions) - 1)))
-    thresholds = np.full(shape, np.inf, np.float32)
-    for k, sheared in views.over(disparities):
+    thresholds = np.full(light_field.shape, np.inf, np.float32)
+    for _, sheared in views.over(disparities, lambda done: progress(done / 2)):
         lower_thresholds(sheared, views.reference, needed, thresholds)
-        progress((k + 1) / len(disparities))
-    return np.maximum(thresholds, np.float32(parameters.least_threshold))
+    thresholds = np.maximum(thresholds, np.float32(parameters.least_threshold))
+    return maps_of(votes(views, disparities, thresholds, lambda done: progress((1 + done) / 2)))
 
 
 def lower_thresholds(sheared: FloatMap, reference: int, needed: int, thresholds: FloatMap) -> None:
@@ -177,9 +147,8 @@ def votes(views: ShearedViews, disparities: FloatMap, thresholds: FloatMap, prog
     CostVolume
     """
     costs = np.empty((len(disparities), *thresholds.shape), np.float16)
-    for k, sheared in views.over(disparities):
+    for k, sheared in views.over(disparities, progress):
         costs[k] = vote_costs(sheared, views.reference, thresholds)
-        progress((k + 1) / len(disparities))
     return CostVolume(disparities, costs)
 
 

@@ -73,12 +73,10 @@ class SpoParameters(CandidateParameters):
     )
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
-    scale: float = Field(
-        0.8, ge=0.35, le=10, description="sigma of the Gaussian whose derivative weights the sides of a line, pixels"
-    )
+    scale: float = Field(0.8, ge=0.35, le=10, description="sigma of a line's sides, derivatives of Gaussians; pixels")
     bins: int = Field(64, ge=2, le=256, description="bins of a histogram, for each channel")
     peak: float = Field(
-        0.26, ge=0.05, le=10, description="mean distance at which a direction's weight falls, as a share of the largest"
+        0.26, ge=0.05, le=10, description="mean by largest distance at which a direction's weight falls"
     )
 
 
@@ -112,13 +110,11 @@ def spo(
 
 def views_of_directions(light_field: LightField) -> list[tuple[BoolMap, bool]]:
     """Views ``(T, S)`` whose EPIs are used, and whether the EPIs are vertical, for each direction."""
-    t, s = light_field.reference_position
+    present, (t, s) = light_field.present, light_field.reference_position
     row, column = np.zeros((2, *light_field.grid), bool)
-    row[t], column[:, s] = True, True
-    found = [(views & light_field.present, down) for views, down in ((row, False), (column, True))]
-    return [(views, down) for views, down in found if views.sum() > 1] or [
-        (light_field.present, down) for down in (False, True)
-    ]
+    row[t], column[:, s] = present[t], present[:, s]
+    found = [(views, down) for views, down in ((row, False), (column, True)) if views.sum() > 1]
+    return found or [(present, False), (present, True)]
 
 
 def side_distances(
@@ -152,13 +148,12 @@ def side_distances(
     shares = column_weights(parameters.scale) / np.float32(len(sheared_views.positions))
     found = np.empty((len(disparities), *light_field.shape), np.float32)
     turned = np.empty(light_field.shape[::-1], np.float32)
-    for k, sheared in sheared_views.over(disparities):
+    for k, sheared in sheared_views.over(disparities, progress):
         if down:
             kernels.half_distances(np.ascontiguousarray(sheared.swapaxes(2, 3)), shares, parameters.bins, turned)
             found[k] = turned.T
         else:
             kernels.half_distances(sheared, shares, parameters.bins, found[k])
-        progress((k + 1) / len(disparities))
     return found
 
 
