@@ -12,11 +12,7 @@ from sepi.registry import Extension
 _COSTS_ALONE = {"occlusion": "none", "textureless": "none"}
 
 METHODS: dict[str, dict[str, Any]] = {
-    "oavc": {
-        "initial": "oavc",
-        **_COSTS_ALONE,
-        "optimize": {"choice": "guided_median", "radius": 7, "epsilon": 1e-5},
-    },
+    "oavc": {"initial": "oavc", **_COSTS_ALONE, "optimize": {"choice": "guided_median", "radius": 7, "epsilon": 1e-5}},
     "cae": {
         "initial": "cae",
         **_COSTS_ALONE,

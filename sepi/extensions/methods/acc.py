@@ -45,7 +45,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import ClassVar
 
 import cv2
 import numpy as np
@@ -63,8 +62,6 @@ from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMap
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-CANDIDATES = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
-
 _AT_ONCE = 8
 """Candidates that are transformed together."""
 
@@ -75,17 +72,13 @@ _FARTHEST = 2.0
 class AccParameters(CandidateParameters):
     """Parameters of the data cost."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=14, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=4
-    )
+    rule = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
+    needs = Needs(bytes_per_sample=14, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=4)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
     colour_share: float = Field(0.5, ge=0, le=1, description="share of colours in the cost; gradients have the rest")
     colour_truncation: float = Field(0.05, gt=0, description="largest difference of colours, 0..1, that counts")
-    gradient_truncation: float = Field(
-        0.02, gt=0, description="largest difference of gradients, per pixel, that counts"
-    )
+    gradient_truncation: float = Field(0.02, gt=0, description="largest difference of gradients, 1/px, that counts")
     window_radius: int = Field(1, ge=0, le=10, description="cost window of 2 r + 1 pixels; 0: none")
     filter_radius: int = Field(5, ge=1, le=50, description="window of 2 r + 1 pixels that filters cost slices")
     filter_epsilon: float = Field(1e-4, gt=0, description="variance of colours, 0..1, above which filtered edges stay")
@@ -96,7 +89,7 @@ class AccParameters(CandidateParameters):
 class ConfidentLabelsParameters(Parameters):
     """Parameters of the multi-label optimisation and the refinement."""
 
-    needs: ClassVar[Needs] = Needs(bytes_per_sample=6, bytes_per_pixel=3000, seconds_per_megasample=1)
+    needs = Needs(bytes_per_sample=6, bytes_per_pixel=3000, seconds_per_megasample=1)
 
     reliable_deviation: float = Field(0.003, ge=0, description="standard deviation of the costs of reliable pixels")
     fidelity: float = Field(0.01, ge=0, description="cost of 1 % of the range off a reliable pixel's first depth")

@@ -44,8 +44,6 @@ References
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from pydantic import Field
 
@@ -55,9 +53,6 @@ from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews, refocused
 from sepi.stage import Choice, Needs, Progress, StageMaps
-
-CANDIDATES = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
-"""The authors' number, for light fields like theirs."""
 
 LEAST_MEAN = 0.1
 """Lower bound of a pixel's normalisation, as a fraction of the cost's mean over all pixels."""
@@ -69,18 +64,13 @@ LEAST_WEIGHT = 1e-3
 class ConstrainedEntropyParameters(CandidateParameters):
     """Parameters of the constrained angular entropy and defocus."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=2.5
-    )
+    # the authors' number, for light fields like theirs
+    rule = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
+    needs = Needs(bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=2.5)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
-    colour_sigma: float = Field(
-        0.1, ge=1e-3, le=10, description="difference of colours, 0..1, at which weights of views and neighbours fall"
-    )
-    colour_constraint: float = Field(
-        1.0, ge=0, description="defocus added for a sub-patch that has none of the pixel's colour, colours in 0..1"
-    )
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
+    colour_sigma: float = Field(0.1, ge=1e-3, le=10, description="difference of colours, 0..1, at which weights fall")
+    colour_constraint: float = Field(1.0, ge=0, description="defocus added for a sub-patch without the pixel's colour")
     filter_radius: int = Field(5, ge=1, le=50, description="window of 2 r + 1 pixels in which costs are filtered")
     filter_epsilon: float = Field(
         1e-4, gt=0, description="variance of colours, 0..1, above which the filter keeps edges"
@@ -99,9 +89,12 @@ def cae(
     """
     disparities = parameters.candidates(light_field)
     entropies, responses = entropies_and_responses(light_field, disparities, parameters.colour_sigma, progress)
-    defocus = constrained_defocus(responses, light_field.reference_view, parameters)
-    costs = 0.25 * (_normalised(entropies) + _normalised(defocus))
-    smooth = GuidedFilter(light_field.reference_view, parameters.filter_radius, parameters.filter_epsilon)
+    # least weighted responses over the sub-patches around each pixel
+    guide, by_pixel = light_field.reference_view, np.ascontiguousarray(responses.transpose(1, 2, 0))
+    defocus = np.empty_like(by_pixel)
+    kernels.constrained_least_patch(by_pixel, guide, parameters.colour_sigma, parameters.colour_constraint, defocus)
+    costs = 0.25 * (_normalised(entropies) + _normalised(defocus.transpose(2, 0, 1)))
+    smooth = GuidedFilter(guide, parameters.filter_radius, parameters.filter_epsilon)
     return maps_of(filtered(smooth, disparities, costs, lambda done: progress(0.9 + 0.1 * done)))
 
 
@@ -140,27 +133,6 @@ def level_weights(sigma: float) -> FloatMap:
     difference = np.arange(kernels.LEVELS) / (kernels.LEVELS - 1)
     weights = np.exp(-((difference / sigma) ** 2) / 2)
     return weights[weights >= LEAST_WEIGHT].astype(np.float32)
-
-
-def constrained_defocus(responses: FloatMap, guide: FloatMap, parameters: ConstrainedEntropyParameters) -> FloatMap:
-    """Minimum weighted response over the sub-patches around each pixel.
-
-    Parameters
-    ----------
-    responses : ndarray, shape (K, H, W), float32
-        Responses of single pixels.
-    guide : ndarray, shape (H, W, 3), float32
-        The reference view, colours in 0..1.
-    parameters : ConstrainedEntropyParameters
-
-    Returns
-    -------
-    ndarray, shape (K, H, W), float32
-    """
-    by_pixel = np.ascontiguousarray(responses.transpose(1, 2, 0))
-    least = np.empty_like(by_pixel)
-    kernels.constrained_least_patch(by_pixel, guide, parameters.colour_sigma, parameters.colour_constraint, least)
-    return least.transpose(2, 0, 1)
 
 
 def _normalised(costs: FloatMap) -> FloatMap:

@@ -207,7 +207,7 @@ class GuidedFilter:
         return np.asarray((slopes * self.guide).sum(axis=2) + offsets, np.float32)
 
     def lines(self, values: FloatMap) -> tuple[FloatMap, FloatMap]:
-        """The linear functions of :attr:`guide` that filter a map (H, W).
+        """The linear functions of ``guide`` that filter a map (H, W).
 
         Returns
         -------

@@ -18,8 +18,6 @@ References
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
@@ -74,7 +72,7 @@ def labels_of_least_energy(
 class MarkovFieldParameters(Parameters):
     """Parameters of the multi-label optimisation."""
 
-    needs: ClassVar[Needs] = Needs(bytes_per_sample=6, bytes_per_pixel=4000, seconds_per_megasample=0.6)
+    needs = Needs(bytes_per_sample=6, bytes_per_pixel=4000, seconds_per_megasample=0.6)
 
     smoothness: float = Field(0.02, ge=0, description="cost of a change by a hundredth of the disparity range")
     truncation: float = Field(0.1, gt=0, le=1, description="largest change that counts, share of the disparity range")

@@ -47,8 +47,6 @@ References
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -60,9 +58,6 @@ from sepi.kernels import mishiba as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, Parameters, Progress, StageMaps, require_previous
-
-CANDIDATES = CandidateRule(usual=64, finest=0.3, coarsest=0.3)
-"""Spacing of 0.3 pixels in the farthest view, where a minimum of the costs is about one pixel wide."""
 
 GREY = np.array([0.299, 0.587, 0.114], np.float32)
 """Weights of red, green and blue in the grey value."""
@@ -86,9 +81,10 @@ TABLE_ENTRIES = 512
 class MishibaParameters(CandidateParameters):
     """Parameters of the costs of one-bit features."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
+    # spacing of 0.3 pixels in the farthest view, where a minimum of the costs is about one pixel wide
+    rule = CandidateRule(usual=64, finest=0.3, coarsest=0.3)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
     feature_sigma: float = Field(1.0, gt=0, le=10, description="sigma of the mean that a pixel's bit exceeds, pixels")
     lattice_step: int = Field(2, ge=1, le=8, description="distance of pixels whose costs are not interpolated, pixels")
     radius: int = Field(3, ge=1, le=50, description="window in which colours fit the costs, 2 r + 1 of these pixels")
@@ -115,15 +111,17 @@ def mishiba(
     StageMaps
     """
     disparities, guide, step = parameters.candidates(light_field), light_field.reference_view, parameters.lattice_step
-    costs = lattice_costs(light_field, disparities, parameters)
+    lattice, views = np.ascontiguousarray(guide[::step, ::step]), selected_views(light_field)
+    offsets = -disparities[:, None, None].astype(np.float64) * light_field.baselines[views]
+    costs = np.empty((len(disparities), *lattice.shape[:2]), np.float32)
+    kernels.pair_costs(details(light_field, views, parameters.feature_sigma), offsets, step, costs)
     progress(0.4)
     labels, kept = np.zeros(light_field.shape, np.int64), np.zeros((*light_field.shape, 5), np.float32)
-    lattice = np.ascontiguousarray(guide[::step, ::step])
     fit = GuidedFilter(lattice, parameters.radius, parameters.epsilon)
     origin = lattice[0, 0] - fit.guide[0, 0]
     for k, cost in enumerate(costs):
-        slopes, offsets = fit.lines(cost)
-        kernels.keep_least(k, slopes, offsets - slopes @ origin, guide, step, labels, kept)
+        slopes, constants = fit.lines(cost)
+        kernels.keep_least(k, slopes, constants - slopes @ origin, guide, step, labels, kept)
         progress(0.4 + 0.6 * (k + 1) / len(costs))
     return StageMaps(*refined(disparities, labels, kept))
 
@@ -171,17 +169,6 @@ def details(light_field: LightField, views: BoolMap, sigma: float) -> FloatMap:
         grey = as_unit_float(light_field.rgb_views[t, s]) @ GREY
         result[n] = grey - cv2.GaussianBlur(grey, (0, 0), sigma) - np.float32(TIE)
     return result
-
-
-def lattice_costs(light_field: LightField, disparities: FloatMap, parameters: MishibaParameters) -> FloatMap:
-    """Costs of all candidates on the lattice; shape (K, ceil(H / step), ceil(W / step)), float32, 0..1."""
-    views = selected_views(light_field)
-    offsets = -disparities[:, None, None].astype(np.float64) * light_field.baselines[views]
-    step = parameters.lattice_step
-    height, width = light_field.shape
-    costs = np.empty((len(disparities), -(-height // step), -(-width // step)), np.float32)
-    kernels.pair_costs(details(light_field, views, parameters.feature_sigma), offsets, step, costs)
-    return costs
 
 
 def refined(disparities: FloatMap, labels: npt.NDArray[np.int64], kept: FloatMap) -> tuple[FloatMap, FloatMap]:

@@ -50,7 +50,6 @@ References
 from __future__ import annotations
 
 import math
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -61,10 +60,6 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps
 
-CANDIDATES = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=10**9)
-"""Limited to a cost volume of 1 GB, since it is kept."""
-
-
 _ROWS = 64
 """Image rows processed at once, which limits the memory for the differences of all views."""
 
@@ -72,18 +67,13 @@ _ROWS = 64
 class OavcParameters(CandidateParameters):
     """Parameters of the vote cost."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=31, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=3
-    )
+    # limited to a cost volume of 1 GB, since it is kept
+    rule = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=10**9)
+    needs = Needs(bytes_per_sample=31, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=3)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
-    agreeing_share: float = Field(
-        0.5, gt=0, le=1, description="share of the views that a pixel's threshold has vote for some candidate"
-    )
-    least_threshold: float = Field(
-        0.004, ge=1e-6, le=1, description="least threshold of a vote: mean difference of the channels, colours in 0..1"
-    )
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
+    agreeing_share: float = Field(0.5, gt=0, le=1, description="share of the views that must vote for some candidate")
+    least_threshold: float = Field(0.004, ge=1e-6, le=1, description="least threshold of a vote, difference of colours")
 
 
 def oavc(

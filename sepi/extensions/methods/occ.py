@@ -53,8 +53,6 @@ References
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
-
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -69,11 +67,7 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, require_previous
 
-CANDIDATES = CandidateRule(usual=101, finest=0.05, coarsest=0.5, volume_bytes=2**30)
-"""About an eighth of a pixel in the outermost view of typical light fields."""
-
-LABELS = CandidateRule(usual=151, finest=0.02, coarsest=0.5, volume_bytes=2**28)
-"""Labels of the optimisation, which stores five numbers per label and pixel."""
+IntArray = npt.NDArray[np.int64]
 
 SATURATION = 95
 """Percentile at which a cue saturates."""
@@ -85,35 +79,28 @@ _LEAST_VARIANCE = np.float32(1e-5)
 class OccParameters(CandidateParameters):
     """Parameters of the costs of whole angular patches."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=31, bytes_per_pixel=2400, bytes_per_candidate=16, seconds_per_megasample=2
-    )
+    # about an eighth of a pixel in the outermost view of typical light fields
+    rule = CandidateRule(usual=101, finest=0.05, coarsest=0.5, volume_bytes=2**30)
+    needs = Needs(bytes_per_sample=31, bytes_per_pixel=2400, bytes_per_candidate=16, seconds_per_megasample=2)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
 
 
 class OccSplitParameters(OccParameters, CannyParameters):
     """Parameters of the split patches."""
 
-    edge_reach: float = Field(
-        1.0,
-        ge=0,
-        le=1,
-        description="reach of edges, where patches are split, as a part of the farthest movement",
-    )
+    edge_reach: float = Field(1.0, ge=0, le=1, description="share of the farthest movement where edges split patches")
     colour_tolerance: float = Field(0.02, ge=0, le=1, description="how far colours of halves, 0..1, may look reversed")
 
 
 class OccFieldParameters(CandidateParameters):
     """Parameters of the optimisation."""
 
-    rule: ClassVar[CandidateRule] = LABELS
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=6, bytes_per_pixel=5000, bytes_per_candidate=32, seconds_per_megasample=0.6
-    )
+    # labels of the optimisation, which stores five numbers per label and pixel
+    rule = CandidateRule(usual=151, finest=0.02, coarsest=0.5, volume_bytes=2**28)
+    needs = Needs(bytes_per_sample=6, bytes_per_pixel=5000, bytes_per_candidate=32, seconds_per_megasample=0.6)
 
-    num_disparities: int | None = number_field(LABELS, "docs/reproduce/compared.md")
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
     smoothness: float = Field(1.0, ge=0, description="cost of a jump within one colour; a disparity costs at most 1")
     truncation: float = Field(0.03, gt=0, le=1, description="largest change that counts, share of the disparity range")
     contrast: float = Field(0.02, gt=0, description="difference of colours, 0..1, at which smoothness falls to a half")
@@ -154,18 +141,19 @@ def occ_split(
     view = light_field.reference_view
     disparities = parameters.candidates(light_field)
     width = float(disparities[-1] - disparities[0])
-    edges = edges_to_split(view, parameters, parameters.edge_reach * width * light_field.reach)
-    costs, cues = split_costs(light_field, disparities, edges, parameters.colour_tolerance, progress)
+    places = places_to_split(view, parameters, parameters.edge_reach * width * light_field.reach)
+    costs, cues = split_costs(light_field, disparities, places, parameters.colour_tolerance, progress)
+    near = tuple(places[:, :2].T)
     halves, certain = least_cost(disparities, costs)
     known = np.isfinite(costs).any(axis=0)
     disparity, confidence = before.disparity.copy(), before.confidence.copy()
-    disparity[edges.near] = np.where(known, halves, disparity[edges.near])
-    confidence[edges.near] = np.where(known, certain, confidence[edges.near])
+    disparity[near] = np.where(known, halves, disparity[near])
+    confidence[near] = np.where(known, certain, confidence[near])
     # without isolated outliers
     slope = np.hypot(*np.gradient(cv2.medianBlur(disparity, 3)))
-    predicted = np.zeros(light_field.shape, np.float32)
-    predicted[edges.near] = predicted_occlusion(slope[edges.near] / np.float32(width), cues)
-    return before.updated(disparity, confidence, occlusion_candidates=edges.near, predicted_occlusion=predicted)
+    split, predicted = np.zeros(light_field.shape, bool), np.zeros(light_field.shape, np.float32)
+    split[near], predicted[near] = True, predicted_occlusion(slope[near] / np.float32(width), cues)
+    return before.updated(disparity, confidence, occlusion_candidates=split, predicted_occlusion=predicted)
 
 
 def occ_field(
@@ -214,7 +202,7 @@ def least_cost(disparities: FloatMap, costs: FloatMap) -> tuple[FloatMap, FloatM
 
 
 def split_costs(
-    light_field: LightField, disparities: FloatMap, edges: Edges, tolerance: float, progress: Progress
+    light_field: LightField, disparities: FloatMap, places: IntArray, tolerance: float, progress: Progress
 ) -> tuple[FloatMap, FloatMap]:
     """Costs of the better halves of split angular patches.
 
@@ -222,8 +210,8 @@ def split_costs(
     ----------
     light_field : LightField
     disparities : ndarray, shape (K,), float32
-    edges : Edges
-        With P pixels.
+    places : ndarray, shape (P, 3), int64
+        Of :func:`places_to_split`.
     tolerance : float
         Tolerance of the test for swapped colours of the halves.
     progress : callable
@@ -236,12 +224,12 @@ def split_costs(
         At the least cost: variances of the two halves, and the difference of their means; 0 where none is finite.
     """
     views = ShearedViews(light_field)
-    beside = colours_beside(light_field.reference_view, edges, max(1, round(light_field.reach)))
+    beside = colours_beside(light_field.reference_view, places, max(1, round(light_field.reach)))
     halves = halves_of_views(views.baselines)
-    costs = np.empty((len(disparities), len(edges.places)), np.float32)
-    cues, least = np.zeros((len(edges.places), 3), np.float32), np.full(len(edges.places), np.inf, np.float32)
+    costs = np.empty((len(disparities), len(places)), np.float32)
+    cues, least = np.zeros((len(places), 3), np.float32), np.full(len(places), np.inf, np.float32)
     for k, sheared in views.over(disparities, progress):
-        costs[k], found = split_patch_costs(sheared, sheared[views.reference], edges, halves, beside, tolerance)
+        costs[k], found = split_patch_costs(sheared, sheared[views.reference], places, halves, beside, tolerance)
         better = costs[k] < least
         least[better], cues[better] = costs[k][better], found[better]
     return costs, cues
@@ -261,13 +249,13 @@ def whole_patch_costs(sheared: FloatMap, reference: FloatMap) -> FloatMap:
 
 
 def split_patch_costs(
-    sheared: FloatMap, reference: FloatMap, edges: Edges, halves: BoolMap, beside: FloatMap, tolerance: float
+    sheared: FloatMap, reference: FloatMap, places: IntArray, halves: BoolMap, beside: FloatMap, tolerance: float
 ) -> tuple[FloatMap, FloatMap]:
     """Costs (P,) and cues (P, 3) as of :func:`split_costs`, for one candidate's sheared views (N, 3, H, W)."""
-    count = len(edges.places)
+    count = len(places)
     means, variances = np.empty((count, 2, 3), np.float32), np.empty((count, 2), np.float32)
-    kernels.moments_of_halves(sheared, reference, edges.places, halves, means, variances)
-    colours = means + reference[:, edges.places[:, 0], edges.places[:, 1]].T[:, None]
+    kernels.moments_of_halves(sheared, reference, places, halves, means, variances)
+    colours = means + reference[:, places[:, 0], places[:, 1]].T[:, None]
     as_they_are, changed = (np.abs(sides - beside).mean(axis=2).sum(axis=1) for sides in (colours, colours[:, ::-1]))
     costs = np.where(variances[:, 0] <= variances[:, 1], *(variances + np.square(means).mean(axis=2)).T)
     apart = np.abs(means[:, 0] - means[:, 1]).mean(axis=1)
@@ -330,34 +318,26 @@ ON_THE_LINE = 1 / 8
 """Distance within which a view counts as on the dividing line, as a fraction of the farthest view's distance."""
 
 
-class Edges(NamedTuple):
-    """Pixels whose angular patches are split.
+def places_to_split(reference_view: FloatMap, parameters: CannyParameters, reach: float) -> IntArray:
+    """Pixels within ``reach`` pixels of a Canny edge, whose angular patches are split along the nearest one.
 
-    Attributes
-    ----------
-    near : ndarray, shape (H, W), bool
-    places : ndarray, shape (P, 3), int64
+    Returns
+    -------
+    ndarray, shape (P, 3), int64
         Row, column and index of the orientation; the edge's normal has the angle ``index pi / ORIENTATIONS`` from
         ``+x`` towards ``+y``.
     """
-
-    near: BoolMap
-    places: npt.NDArray[np.int64]
-
-
-def edges_to_split(reference_view: FloatMap, parameters: CannyParameters, reach: float) -> Edges:
-    """Pixels within ``reach`` pixels of a Canny edge, each with the orientation of the nearest one."""
     lines = canny_edges(reference_view, parameters)
     turns = np.round(edge_angle(reference_view, parameters) * (ORIENTATIONS / np.pi)).astype(np.int64) % ORIENTATIONS
     if not lines.any():
-        return Edges(lines, np.empty((0, 3), np.int64))
+        return np.empty((0, 3), np.int64)
     distance, nearest = cv2.distanceTransformWithLabels(
         (~lines).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
     turn_of = np.zeros(int(nearest.max()) + 1, np.int64)
     turn_of[nearest[lines]] = turns[lines]
     near = np.asarray(distance <= reach)
-    return Edges(near, np.column_stack([np.argwhere(near), turn_of[nearest[near]]]))
+    return np.column_stack([np.argwhere(near), turn_of[nearest[near]]])
 
 
 def halves_of_views(baselines: npt.NDArray[np.float64]) -> BoolMap:
@@ -381,20 +361,20 @@ def halves_of_views(baselines: npt.NDArray[np.float64]) -> BoolMap:
     return halves
 
 
-def colours_beside(reference_view: FloatMap, edges: Edges, radius: int) -> FloatMap:
+def colours_beside(reference_view: FloatMap, places: IntArray, radius: int) -> FloatMap:
     """Mean colours of the two sides of the edge in a window around each pixel; shape (P, 2, 3), float32.
 
     The edge's normal points to the second side.
     """
     y, x = np.mgrid[-radius : radius + 1, -radius : radius + 1]
-    colours = np.zeros((len(edges.places), 2, 3), np.float32)
+    colours = np.zeros((len(places), 2, 3), np.float32)
     for number, (down, across) in enumerate(_normals()):
-        chosen = edges.places[:, 2] == number
+        chosen = places[:, 2] == number
         along = y * down + x * across
         for side, window in enumerate((along < -0.5, along > 0.5)):
             weights = window.astype(np.float32) / np.float32(window.sum())
             means = cv2.filter2D(reference_view, cv2.CV_32F, weights, borderType=cv2.BORDER_REPLICATE)
-            colours[chosen, side] = means[tuple(edges.places[chosen, :2].T)]
+            colours[chosen, side] = means[tuple(places[chosen, :2].T)]
     return colours
 
 

@@ -56,12 +56,8 @@ class OnnxParameters(Parameters):
     """The network's file, inputs and outputs."""
 
     model: str | None = Field(None, description="path of the ONNX file; it must be given")
-    inputs: tuple[str, ...] = Field(
-        ("all: 1 (t s c) y x",), min_length=1, description="'VIEWS: AXES' of each input (docs/reproduce/compared.md)"
-    )
-    grid: tuple[int, int] | None = Field(
-        None, description="rows and columns of views round the reference view that the network takes; null: all"
-    )
+    inputs: tuple[str, ...] = Field(("all: 1 (t s c) y x",), min_length=1, description="'VIEWS: AXES' of each input")
+    grid: tuple[int, int] | None = Field(None, description="rows, columns of views round the reference view; null: all")
     reversed: tuple[Literal["t", "s"], ...] = Field((), description="axes of views that the network takes reversed")
     grey: bool = Field(False, description="whether the network takes one channel, brightness")
     scale: float = Field(1.0, description="factor of the input colours, which are 0..1")

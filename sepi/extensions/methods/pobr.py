@@ -46,7 +46,6 @@ References
 from __future__ import annotations
 
 import math
-from typing import ClassVar
 
 import cv2
 import numpy as np
@@ -60,8 +59,6 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.matching.sheared_views import ShearedViews
 from sepi.regularization.wls import solve
 from sepi.stage import Choice, Needs, Parameters, Progress, StageMaps, relative_confidence, require_previous
-
-CANDIDATES = CandidateRule(usual=101, finest=0.02, coarsest=0.5)
 
 COMPACTNESS = 10.0
 """Compactness of the superpixels; the usual value for SLIC."""
@@ -85,12 +82,10 @@ RTOL = 1e-9
 class PobrCostParameters(CandidateParameters):
     """Parameters of the photo-consistency."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=1.5
-    )
+    rule = CandidateRule(usual=101, finest=0.02, coarsest=0.5)
+    needs = Needs(bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=1.5)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
     truncation: float = Field(0.1, gt=0, le=1, description="t, largest difference of colours, 0..1, that counts")
     radius: int = Field(2, ge=1, le=20, description="window of the guided filter of the costs, 2 r + 1 pixels")
     epsilon: float = Field(1e-4, gt=0, description="variance of colours, 0..1, above which filtered edges stay")
@@ -109,9 +104,7 @@ class PobrSmoothingParameters(Parameters):
     """Parameters of the weighted least squares."""
 
     alpha: float = Field(3e-6, ge=0, description="weight of smoothness against data, for gradients of 0..1 per px")
-    gradient_floor: float = Field(
-        0.002, gt=0, description="f, gradient below which smoothness no longer grows, 0..1 per px; noise adds to it"
-    )
+    gradient_floor: float = Field(0.002, gt=0, description="f, gradient below which smoothness no longer grows, per px")
     tau_2: float = Field(1.5, ge=0, description="how strongly label confidence weakens smoothness")
 
 

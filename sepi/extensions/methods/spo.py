@@ -43,8 +43,6 @@ References
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from pydantic import Field
 
@@ -54,8 +52,6 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, relative_confidence
-
-CANDIDATES = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=2**29)
 
 _HALF_WIDTH = 3.0
 """Half width of the parallelogram in scales."""
@@ -67,12 +63,10 @@ _ROUNDING = 1e-4
 class SpoParameters(CandidateParameters):
     """Parameters of the spinning parallelogram operator."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=9, bytes_per_pixel=2400, bytes_per_candidate=8, seconds_per_megasample=1.5
-    )
+    rule = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=2**29)
+    needs = Needs(bytes_per_sample=9, bytes_per_pixel=2400, bytes_per_candidate=8, seconds_per_megasample=1.5)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
     scale: float = Field(0.8, ge=0.35, le=10, description="sigma of a line's sides, derivatives of Gaussians; pixels")
     bins: int = Field(64, ge=2, le=256, description="bins of a histogram, for each channel")
     peak: float = Field(
@@ -104,7 +98,11 @@ def spo(
         distances *= weight
         merged += distances
         confidence = np.maximum(confidence, weight)
-    volume = _costs(disparities, merged)
+    # each pixel's best candidate costs 0, near which half precision is finest; the following filter is linear
+    best = merged.max(axis=0)
+    np.subtract(best, merged, out=merged)
+    merged /= max(float(best.max()), _ROUNDING)
+    volume = CostVolume(disparities, merged.astype(np.float16))
     return StageMaps(disparity_of(volume, least_costs(volume)), relative_confidence(confidence), cost_volume=volume)
 
 
@@ -170,18 +168,6 @@ def peak_weight(distances: FloatMap, peak: float) -> FloatMap:
     flat = largest <= _ROUNDING
     ratio = np.where(flat, 1, mean / np.where(flat, 1, largest))
     return np.asarray(np.exp(-ratio / (2 * peak**2)), np.float32)
-
-
-def _costs(disparities: FloatMap, merged: FloatMap) -> CostVolume:
-    """Convert distances ``(K, H, W)`` to costs, in place.
-
-    Each pixel's best candidate has the cost 0, near which half precision is finest. The offset is the same for all
-    candidates of a pixel and does not change the best one, since the following filter is linear.
-    """
-    best = merged.max(axis=0)
-    np.subtract(best, merged, out=merged)
-    merged /= max(float(best.max()), _ROUNDING)
-    return CostVolume(disparities, merged.astype(np.float16))
 
 
 CHOICES = {"initial": {"spo": Choice(SpoParameters, spo)}}

@@ -149,7 +149,7 @@ def viewer_json(
         "limits": list(limits),
         "error_limit": ERROR_LIMIT,
         "sigma_limits": list(SIGMA_LIMITS),
-        "camera": None if light_field is None else _camera(light_field),
+        "camera": light_field and _camera(light_field),
         "picture": "" if picture is None else picture_uri(picture, "webp", _WEBP),
         "panels": entries,
         "arrays": arrays.packed(max(_LEAST_PIXELS, height * width)),
@@ -194,12 +194,7 @@ def _bars(panel: Panel) -> dict[str, tuple[npt.NDArray[Any], int]]:
 
 
 def _camera(light_field: LightField) -> dict[str, Any] | None:
-    camera = light_field.camera
+    camera, centre = light_field.camera, list(light_field.from_centre)
     if camera is None:
         return None
-    return {
-        "scale": camera.scale,
-        "offset": camera.offset,
-        "focal": camera.focal_px,
-        "from_centre": list(light_field.from_centre),
-    }
+    return {"scale": camera.scale, "offset": camera.offset, "focal": camera.focal_px, "from_centre": centre}
