@@ -52,7 +52,7 @@ import numpy.typing as npt
 from pydantic import Field
 from scipy import fft
 
-from sepi.extensions.methods.costs import GuidedFilter, distinctness, filtered, maps_of, weighted_median
+from sepi.extensions.methods.costs import GuidedFilter, Previous, distinctness, filtered, maps_of, weighted_median
 from sepi.extensions.methods.markov_field import labels_of_least_energy
 from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap, LightField, as_unit_float
@@ -101,9 +101,7 @@ class ConfidentLabelsParameters(Parameters):
     filter_epsilon: float = Field(1e-4, gt=0, description="variance of colours, 0..1, above which filtered edges stay")
 
 
-def acc(
-    light_field: LightField, previous: StageMaps | None, parameters: AccParameters, progress: Progress
-) -> StageMaps:
+def acc(light_field: LightField, previous: Previous, parameters: AccParameters, progress: Progress) -> StageMaps:
     """Candidates of least filtered cost.
 
     Returns

@@ -47,7 +47,7 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.costs import GuidedFilter, filtered, maps_of
+from sepi.extensions.methods.costs import GuidedFilter, Previous, filtered, maps_of
 from sepi.kernels import cae as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
@@ -61,7 +61,7 @@ LEAST_WEIGHT = 1e-3
 """Weight of a view below which it is left out."""
 
 
-class ConstrainedEntropyParameters(CandidateParameters):
+class CaeParameters(CandidateParameters):
     """Parameters of the constrained angular entropy and defocus."""
 
     # the authors' number, for light fields like theirs
@@ -77,9 +77,7 @@ class ConstrainedEntropyParameters(CandidateParameters):
     )
 
 
-def cae(
-    light_field: LightField, previous: StageMaps | None, parameters: ConstrainedEntropyParameters, progress: Progress
-) -> StageMaps:
+def cae(light_field: LightField, previous: Previous, parameters: CaeParameters, progress: Progress) -> StageMaps:
     """Filtered costs of every candidate, and the candidate of least cost.
 
     Returns
@@ -141,4 +139,4 @@ def _normalised(costs: FloatMap) -> FloatMap:
     return np.asarray(costs / np.maximum(mean, max(LEAST_MEAN * float(mean.mean()), 1e-6)), np.float32)
 
 
-CHOICES = {"initial": {"cae": Choice(ConstrainedEntropyParameters, cae)}}
+CHOICES = {"initial": {"cae": Choice(CaeParameters, cae)}}

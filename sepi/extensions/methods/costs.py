@@ -27,6 +27,12 @@ from sepi.kernels import weighted_median as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.stage import Choice, CostVolume, Parameters, Progress, StageMaps, require_costs
 
+GREY = np.array([0.299, 0.587, 0.114], np.float32)
+"""Weights of red, green and blue in the grey value (ITU-R BT.601)."""
+
+Previous = StageMaps | None
+"""Maps of the stage before; None for the first stage."""
+
 
 def least_costs(volume: CostVolume) -> npt.NDArray[np.int64]:
     """Index of the candidate of least cost of each pixel.
@@ -207,7 +213,11 @@ class GuidedFilter:
         return np.asarray((slopes * self.guide).sum(axis=2) + offsets, np.float32)
 
     def lines(self, values: FloatMap) -> tuple[FloatMap, FloatMap]:
-        """The linear functions of ``guide`` that filter a map (H, W).
+        """The linear functions of ``guide`` that filter a map.
+
+        Parameters
+        ----------
+        values : ndarray, shape (H, W), float32
 
         Returns
         -------

@@ -52,15 +52,12 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.extensions.methods.costs import GuidedFilter
+from sepi.extensions.methods.costs import GREY, GuidedFilter
 from sepi.image.noise import residual_variance
 from sepi.kernels import mishiba as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, Parameters, Progress, StageMaps, require_previous
-
-GREY = np.array([0.299, 0.587, 0.114], np.float32)
-"""Weights of red, green and blue in the grey value."""
 
 TIE = 1e-5
 """Tolerance for rounding errors in the comparison with the mean, grey values 0..1."""

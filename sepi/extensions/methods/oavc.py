@@ -54,7 +54,7 @@ import math
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.costs import colour_differences, maps_of
+from sepi.extensions.methods.costs import Previous, colour_differences, maps_of
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
@@ -76,9 +76,7 @@ class OavcParameters(CandidateParameters):
     least_threshold: float = Field(0.004, ge=1e-6, le=1, description="least threshold of a vote, difference of colours")
 
 
-def oavc(
-    light_field: LightField, previous: StageMaps | None, parameters: OavcParameters, progress: Progress
-) -> StageMaps:
+def oavc(light_field: LightField, previous: Previous, parameters: OavcParameters, progress: Progress) -> StageMaps:
     """Candidates with the most votes.
 
     Returns

@@ -58,7 +58,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.extensions.methods.costs import between_candidates, disparity_of
+from sepi.extensions.methods.costs import Previous, between_candidates, disparity_of
 from sepi.extensions.methods.markov_field import changes, labels_of_least_energy
 from sepi.image.edges import CannyParameters, canny_edges, edge_angle
 from sepi.kernels import occ as kernels
@@ -108,9 +108,7 @@ class OccFieldParameters(CandidateParameters):
     iterations: int = Field(8, ge=1, le=100, description="passes of the messages, there and back")
 
 
-def occ(
-    light_field: LightField, previous: StageMaps | None, parameters: OccParameters, progress: Progress
-) -> StageMaps:
+def occ(light_field: LightField, previous: Previous, parameters: OccParameters, progress: Progress) -> StageMaps:
     """Depth from whole angular patches.
 
     Returns
@@ -152,7 +150,9 @@ def occ_split(
     # without isolated outliers
     slope = np.hypot(*np.gradient(cv2.medianBlur(disparity, 3)))
     split, predicted = np.zeros(light_field.shape, bool), np.zeros(light_field.shape, np.float32)
-    split[near], predicted[near] = True, predicted_occlusion(slope[near] / np.float32(width), cues)
+    split[near] = True
+    if len(places):
+        predicted[near] = predicted_occlusion(slope[near] / np.float32(width), cues)
     return before.updated(disparity, confidence, occlusion_candidates=split, predicted_occlusion=predicted)
 
 
@@ -294,8 +294,6 @@ def data_costs(before: StageMaps, labels: FloatMap) -> CostVolume:
 
 def _above_mean(cue: FloatMap) -> FloatMap:
     """Standard deviations by which a saturated cue exceeds its mean; not negative."""
-    if not cue.size:
-        return cue
     saturated = np.minimum(cue, np.percentile(cue, SATURATION))
     # equal cues do not exceed it
     return np.asarray(np.maximum(0, (saturated - saturated.mean()) / (float(saturated.std()) or np.inf)), np.float32)

@@ -36,6 +36,7 @@ import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from sepi.errors import SepiError
+from sepi.extensions.methods.costs import GREY, Previous
 from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.view_subsets import grid_steps
@@ -48,8 +49,6 @@ VIEWS = ("all", "row", "column", "diagonal", "antidiagonal", "each")
 """Words for the views of an input."""
 
 _AXES = "t s y x c"
-# of ITU-R BT.601
-_GREY = np.array([0.299, 0.587, 0.114], np.float32)
 
 
 class OnnxParameters(Parameters):
@@ -85,9 +84,7 @@ class OnnxParameters(Parameters):
         return () if self.model is None else (self.model,)
 
 
-def onnx(
-    light_field: LightField, previous: StageMaps | None, parameters: OnnxParameters, progress: Progress
-) -> StageMaps:
+def onnx(light_field: LightField, previous: Previous, parameters: OnnxParameters, progress: Progress) -> StageMaps:
     """Depth by a network.
 
     Returns
@@ -158,7 +155,7 @@ def _chosen_views(light_field: LightField, parameters: OnnxParameters) -> tuple[
         raise SepiError(f"{light_field.name}: the network needs all views of its grid, but some are missing")
     views = as_unit_float(light_field.rgb_views[part])
     if parameters.grey:
-        views = (views @ _GREY)[..., None]
+        views = (views @ GREY)[..., None]
     views = views * np.float32(parameters.scale) + np.float32(parameters.offset)
     t, s = t - top, s - left
     if "t" in parameters.reversed:

@@ -148,7 +148,9 @@ def pobr_regions(
     image = light_field.reference_view
     size = max(LEAST_SIZE, round(math.sqrt(image[..., 0].size / parameters.superpixels)))
     segments = superpixels(image, size, COMPACTNESS)
-    deviation = label_deviation(before.disparity, segments)
+    # standard deviation of the labels over each pixel's superpixel
+    residual = before.disparity - segments.means(before.disparity)[segments.labels]
+    deviation = np.sqrt(segments.means(residual**2))[segments.labels].astype(np.float32)
     regions = deviation > parameters.tau_1
     cut = np.exp(-np.minimum(parameters.tau_0 * np.maximum(deviation - parameters.tau_1, 0), 80))
     confidence = (relative_confidence(before.confidence) * np.maximum(cut, parameters.least_share)).astype(np.float32)
@@ -180,12 +182,6 @@ def pobr_smoothing(
     progress(0.1)
     disparity = solve(before.disparity, weight, smoothness, parameters.alpha, RTOL)
     return before.updated(disparity, confidence).without_costs()
-
-
-def label_deviation(disparity: FloatMap, segments: Superpixels) -> FloatMap:
-    """Standard deviation of the disparity over each pixel's superpixel; shape (H, W), float32, pixels per view step."""
-    residual = disparity - segments.means(disparity)[segments.labels]
-    return np.asarray(np.sqrt(segments.means(residual**2))[segments.labels], np.float32)
 
 
 def squared_gradient(image: FloatMap) -> FloatMap:

@@ -46,7 +46,7 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.costs import disparity_of, least_costs
+from sepi.extensions.methods.costs import Previous, disparity_of, least_costs
 from sepi.kernels import spo as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
@@ -74,9 +74,7 @@ class SpoParameters(CandidateParameters):
     )
 
 
-def spo(
-    light_field: LightField, previous: StageMaps | None, parameters: SpoParameters, progress: Progress
-) -> StageMaps:
+def spo(light_field: LightField, previous: Previous, parameters: SpoParameters, progress: Progress) -> StageMaps:
     """Candidates whose lines have the largest difference between their sides.
 
     Returns

@@ -133,8 +133,12 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     >>> round(disparity, 2), cost < 0.01
     (1.0, True)
     """
-    require_inside(light_field, y, x)
     (t0, s0), (H, W) = light_field.reference_position, light_field.shape
+    if not (0 <= y < H and 0 <= x < W):
+        raise SepiError(
+            f"{light_field.name}: pixel (y, x) = ({y}, {x}) lies outside the reference view; "
+            f"rows go from 0 to {H - 1}, columns from 0 to {W - 1}"
+        )
     disparities = parameters.candidates(light_field)
     noise = residual_variance(light_field.reference_view)
     r = parameters.window_radius
@@ -172,13 +176,3 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     expected = expected_costs(light_field, to_correct, sampled, views.groups, views.subsets, float(scale2), 1)
     costs = 1 - (1 - costs) / (1 - np.tensordot(expected.weights[:, y, x], expected.moments, 1))
     return Curves(disparities, views.names, costs)
-
-
-def require_inside(light_field: LightField, y: int, x: int) -> None:
-    """Raise :class:`sepi.errors.SepiError` unless the pixel lies in the reference view."""
-    H, W = light_field.shape
-    if not (0 <= y < H and 0 <= x < W):
-        raise SepiError(
-            f"{light_field.name}: pixel (y, x) = ({y}, {x}) lies outside the reference view; "
-            f"rows go from 0 to {H - 1}, columns from 0 to {W - 1}"
-        )

@@ -120,12 +120,6 @@ def parameter_rows(runs: Runs) -> list[tuple[str, list[tuple[str, Any]]]]:
     ]
 
 
-def first_scene(runs: Runs) -> str:
-    """The scene to show first: one of the paper's, else the last one, by the order of built-in scenes."""
-    known = [pair for pair in runs.plan.pairs if published.paper_scene(*pair) is not None]
-    return "/".join(known[0] if known else runs.plan.pairs[-1])
-
-
 def page_of(runs: Runs, scenes: Sequence[Mapping[str, Any]], parts: Runs | None = None) -> str:
     """The page of a report.
 
@@ -145,7 +139,9 @@ def page_of(runs: Runs, scenes: Sequence[Mapping[str, Any]], parts: Runs | None 
     """
     # averages over rendered scenes and levels of noise mean nothing, and no published figures exist
     averaged = runs.plan.report != DATASET
-    first_title = first_scene(runs)
+    # to show first: one of the paper's, else the last one, by the order of built-in scenes
+    papers = [pair for pair in runs.plan.pairs if published.paper_scene(*pair) is not None]
+    first_title = "/".join((papers or runs.plan.pairs[-1:])[0])
     shown = [scene for scene in scenes if f"{scene['dataset']}/{scene['scene']}" == first_title] or scenes
     tables = {name: table(name, found) for found in (runs, parts) if found is not None for name in found.plan.tables}
     template = environment().get_template("index.html.j2")

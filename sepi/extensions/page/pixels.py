@@ -78,8 +78,6 @@ def interesting_pixels(
     free = _inner(light_field.shape)
     found: list[InterestingPixel] = []
     for label, score in scores:
-        if not free.any():
-            break
         # a score of zero means that there is no such pixel
         values = np.where(free, np.nan_to_num(score), 0)
         y, x = (int(place) for place in np.unravel_index(values.argmax(), values.shape))

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.extensions.page.curves import Curves, cost_curves, require_inside
+from sepi.extensions.page.curves import Curves, cost_curves
 from sepi.extensions.page.pixels import InterestingPixel, kept_subsets
 from sepi.lightfield import BoolMap, LightField
 from sepi.matching.plane_sweep import SweepParameters
@@ -132,9 +132,8 @@ def sepi_picture(light_field: LightField, y: int, x: int, disparity: float) -> S
     Raises
     ------
     SepiError
-        If the pixel lies outside the reference view or the disparity is not finite.
+        If the disparity is not finite.
     """
-    require_inside(light_field, y, x)
     if not math.isfinite(disparity):
         raise SepiError(f"{light_field.name}: a SEPI needs a finite disparity, got {disparity:g}")
     sepi = stitched_epi(light_field, y, disparity)

@@ -158,9 +158,8 @@ def viewer_json(
 
 def _entry(panel: Panel, arrays: _Arrays) -> dict[str, Any]:
     """A panel with the numbers of its arrays, without empty fields."""
-    entry: dict[str, Any] = {"key": panel.key, "title": panel.title, "group": panel.group, "kind": panel.kind}
-    texts = {"note": panel.note, "ends": panel.ends, "no_interval": panel.no_interval}
-    entry |= {name: text for name, text in texts.items() if text}
+    entry: dict[str, Any] = {name: getattr(panel, name) for name in ("key", "title", "group", "kind")}
+    entry |= {name: text for name in ("note", "ends", "no_interval") if (text := getattr(panel, name))}
     role = {"mask": MASK, "outline": MASK, "confidence": CONFIDENCE, "sigma": LOGARITHM}.get(
         panel.kind, PRECISE if panel.precise else OTHER
     )
