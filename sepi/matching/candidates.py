@@ -83,8 +83,9 @@ def _intervals(moved: float, sampling: float) -> int:
 class CandidateParameters(Parameters):
     """Parameters of a sweep over candidate disparities, derived from the two that each sweep declares."""
 
+    rule: ClassVar[CandidateRule]
+
     if TYPE_CHECKING:
-        rule: ClassVar[CandidateRule]
         num_disparities: int | None
 
     def number(self, light_field: LightField) -> int:

@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from sepi.kernels import sheared_views as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
+from sepi.stage import Progress, no_progress
 
 
 class ShearedViews:
@@ -102,13 +103,15 @@ class ShearedViews:
         kernels.shear(self._colours, -disparity * self.baselines, self._cubic, self._sheared)
         return self._sheared
 
-    def over(self, disparities: FloatMap) -> Iterator[tuple[int, FloatMap]]:
+    def over(self, disparities: FloatMap, progress: Progress = no_progress) -> Iterator[tuple[int, FloatMap]]:
         """The views sheared by one disparity after the other.
 
         Parameters
         ----------
         disparities : ndarray, shape (K,), float32
             Pixels per view step.
+        progress : callable
+            Called with the fraction done, 0..1, after each.
 
         Yields
         ------
@@ -119,6 +122,7 @@ class ShearedViews:
         """
         for k, disparity in enumerate(disparities.tolist()):
             yield k, self.at(disparity)
+            progress((k + 1) / len(disparities))
 
 
 def refocused(sheared: FloatMap, weights: npt.NDArray[np.float32] | None = None) -> FloatMap:

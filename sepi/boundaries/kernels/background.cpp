@@ -38,8 +38,7 @@ float median(const float *values, Index n) {
 // Rows begin..end of the farther surfaces, of disparity layer (H, W), where wanted (H, W), also behind nearer ones:
 // medians over the views that see them. Into background (H, W, 4): colours, and variance of the views' colours, mean of
 // the channels, or UNSEEN.
-void background_of(const RimViews &views, Array<const float, 2> layer, Array<const bool, 2> wanted, Index begin, Index end,
-                   Array<float, 3> background) {
+void background_of(const RimViews &views, Array<const float, 2> layer, Array<const bool, 2> wanted, Index begin, Index end, Array<float, 3> background) {
     const Index W = layer.shape[1];
     const ViewSamples samples_of{views};
     parallel_for(begin, end, [&](Index y) {

@@ -12,11 +12,7 @@ from sepi.registry import Extension
 _COSTS_ALONE = {"occlusion": "none", "textureless": "none"}
 
 METHODS: dict[str, dict[str, Any]] = {
-    "oavc": {
-        "initial": "oavc",
-        **_COSTS_ALONE,
-        "optimize": {"choice": "guided_median", "radius": 7, "epsilon": 1e-5},
-    },
+    "oavc": {"initial": "oavc", **_COSTS_ALONE, "optimize": {"choice": "guided_median", "radius": 7, "epsilon": 1e-5}},
     "cae": {
         "initial": "cae",
         **_COSTS_ALONE,
@@ -35,14 +31,11 @@ LEARNED: dict[str, dict[str, Any]] = {"onnx": {"initial": "onnx", **_COSTS_ALONE
 
 _MODULES = {
     **{f"initial.{name}": name for name in METHODS},
+    **{f"{stage}.{name}": name for stage in ("occlusion", "optimize") for name in ("pobr", "occ")},
     "initial.onnx": "onnx_network",
-    "occlusion.pobr": "pobr",
-    "occlusion.occ": "occ",
     "optimize.guided_median": "costs",
-    "optimize.pobr": "pobr",
     "optimize.median_descent": "mishiba",
     "optimize.confident_labels": "acc",
-    "optimize.occ": "occ",
     "optimize.guided_costs": "costs",
     "optimize.markov_field": "markov_field",
 }

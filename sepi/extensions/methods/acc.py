@@ -43,8 +43,8 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import ClassVar, NamedTuple
 
 import cv2
 import numpy as np
@@ -52,14 +52,15 @@ import numpy.typing as npt
 from pydantic import Field
 from scipy import fft
 
-from sepi.extensions.methods.costs import GuidedFilter, distinctness, maps_of, weighted_median
+from sepi.extensions.methods.costs import GuidedFilter, Previous, distinctness, filtered, maps_of, weighted_median
 from sepi.extensions.methods.markov_field import labels_of_least_energy
 from sepi.kernels import thread_count
-from sepi.lightfield import FloatMap, LightField, as_unit_float, without_reference
+from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
-from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, require_costs
+from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, no_progress, require_costs
 
-CANDIDATES = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 _AT_ONCE = 8
 """Candidates that are transformed together."""
@@ -71,56 +72,36 @@ _FARTHEST = 2.0
 class AccParameters(CandidateParameters):
     """Parameters of the data cost."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=14, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=4
-    )
+    rule = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
+    needs = Needs(bytes_per_sample=14, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=4)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
     colour_share: float = Field(0.5, ge=0, le=1, description="share of colours in the cost; gradients have the rest")
-    colour_truncation: float = Field(
-        0.05, gt=0, description="difference beyond which the cost no longer grows, colours in 0..1"
-    )
-    gradient_truncation: float = Field(
-        0.02, gt=0, description="difference of gradients beyond which the cost no longer grows, colours per pixel"
-    )
+    colour_truncation: float = Field(0.05, gt=0, description="largest difference of colours, 0..1, that counts")
+    gradient_truncation: float = Field(0.02, gt=0, description="largest difference of gradients, 1/px, that counts")
     window_radius: int = Field(1, ge=0, le=10, description="cost window of 2 r + 1 pixels; 0: none")
     filter_radius: int = Field(5, ge=1, le=50, description="window of 2 r + 1 pixels that filters cost slices")
-    filter_epsilon: float = Field(
-        1e-4, gt=0, description="variance of colour above which the filter keeps edges, colours in 0..1"
-    )
+    filter_epsilon: float = Field(1e-4, gt=0, description="variance of colours, 0..1, above which filtered edges stay")
     median_radius: int = Field(3, ge=1, le=50, description="weighted median's window of 2 r + 1 pixels")
-    median_sigma: float = Field(
-        0.05, gt=0, description="colour distance at which a pixel's weight in the median falls; RGB, colours in 0..1"
-    )
+    median_sigma: float = Field(0.05, gt=0, description="RGB distance (0..1) at which weights in the median fall")
 
 
 class ConfidentLabelsParameters(Parameters):
     """Parameters of the multi-label optimisation and the refinement."""
 
-    needs: ClassVar[Needs] = Needs(bytes_per_sample=6, bytes_per_pixel=3000, seconds_per_megasample=1)
+    needs = Needs(bytes_per_sample=6, bytes_per_pixel=3000, seconds_per_megasample=1)
 
-    reliable_deviation: float = Field(
-        0.003, ge=0, description="standard deviation of the costs from which a pixel is reliable"
-    )
-    fidelity: float = Field(
-        0.01, ge=0, description="cost of a hundredth of the disparity range off a reliable pixel's first depth"
-    )
-    correspondence: float = Field(
-        0.2, ge=0, description="cost of a hundredth of the disparity range off the depth of matched features"
-    )
+    reliable_deviation: float = Field(0.003, ge=0, description="standard deviation of the costs of reliable pixels")
+    fidelity: float = Field(0.01, ge=0, description="cost of 1 % of the range off a reliable pixel's first depth")
+    correspondence: float = Field(0.2, ge=0, description="cost of 1 % of the range off matched features' depth")
     smoothness: float = Field(0.003, ge=0, description="cost of a change by a hundredth of the disparity range")
     iterations: int = Field(5, ge=1, le=100, description="passes of the messages, there and back")
     refinements: int = Field(4, ge=0, le=100, description="number of fits of the continuous depth")
     filter_radius: int = Field(3, ge=1, le=50, description="window of 2 r + 1 pixels that filters the refinement")
-    filter_epsilon: float = Field(
-        1e-4, gt=0, description="variance of colour above which the filter keeps edges, colours in 0..1"
-    )
+    filter_epsilon: float = Field(1e-4, gt=0, description="variance of colours, 0..1, above which filtered edges stay")
 
 
-def acc(
-    light_field: LightField, previous: StageMaps | None, parameters: AccParameters, progress: Progress
-) -> StageMaps:
+def acc(light_field: LightField, previous: Previous, parameters: AccParameters, progress: Progress) -> StageMaps:
     """Candidates of least filtered cost.
 
     Returns
@@ -129,15 +110,11 @@ def acc(
         With the cost volume.
     """
     disparities = parameters.candidates(light_field)
-    costs = phase_shift_costs(light_field, disparities, parameters, progress)
-    guide = light_field.reference_view
+    guide, window = light_field.reference_view, (2 * parameters.window_radius + 1,) * 2
     smooth = GuidedFilter(guide, parameters.filter_radius, parameters.filter_epsilon)
-    window = (2 * parameters.window_radius + 1, 2 * parameters.window_radius + 1)
-    volume = CostVolume(disparities, np.empty(costs.shape, np.float16))
-    for k, costs_of_candidate in enumerate(costs):
-        volume.costs[k] = smooth(cv2.blur(costs_of_candidate, window, borderType=cv2.BORDER_REFLECT))
-    progress(1.0)
-    found = maps_of(volume)
+    costs = phase_shift_costs(light_field, disparities, parameters, lambda done: progress(0.9 * done))
+    means = (cv2.blur(of_candidate, window, borderType=cv2.BORDER_REFLECT) for of_candidate in costs)
+    found = maps_of(filtered(smooth, disparities, means, lambda done: progress(0.9 + 0.1 * done)))
     median = weighted_median(found.disparity, guide, parameters.median_radius, parameters.median_sigma)
     return replace(found, disparity=median)
 
@@ -161,20 +138,25 @@ def phase_shift_costs(
         0..1.
     """
     reference = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
-    others = without_reference(light_field, light_field.present)
     farthest = light_field.reach * float(np.abs(disparities).max())
-    costs = np.zeros((len(disparities), *light_field.shape), np.float32)
-    for n, (t, s) in enumerate(np.argwhere(others)):
-        baseline = light_field.baselines[t, s]
-        view = PhaseShift(as_unit_float(light_field.rgb_views[t, s].transpose(2, 0, 1)), farthest)
-        for begin in range(0, len(disparities), _AT_ONCE):
-            part = slice(begin, begin + _AT_ONCE)
-            for cost, moved in zip(costs[part], view.by(-disparities[part, None] * baseline), strict=True):
-                cost += truncated_difference(moved, reference, across_share(baseline), parameters)
-        progress(0.9 * (n + 1) / others.sum())
+    costs, others = np.zeros((len(disparities), *light_field.shape), np.float32), _others(light_field)
+    for n, position in enumerate(others):
+        view, baseline = as_unit_float(light_field.rgb_views[position]), light_field.baselines[position]
+        # gradients along the baseline; none stands where the reference view does
+        share = float(np.abs(baseline[1]) / np.abs(baseline).sum()) if baseline.any() else 0.5
+        shifted = phase_shifted(view.transpose(2, 0, 1), -disparities[:, None] * baseline, farthest)
+        for cost, moved in zip(costs, shifted, strict=True):
+            cost += truncated_difference(moved, reference, share, parameters)
+        progress((n + 1) / len(others))
     share, truncation = parameters.colour_share, parameters.colour_truncation
-    costs /= np.float32(others.sum() * (share * truncation + (1 - share) * parameters.gradient_truncation))
+    costs /= np.float32(len(others) * (share * truncation + (1 - share) * parameters.gradient_truncation))
     return costs
+
+
+def _others(light_field: LightField) -> list[tuple[int, ...]]:
+    """Grid positions of the views other than the reference view."""
+    positions = map(tuple, np.argwhere(light_field.present).tolist())
+    return [position for position in positions if position != light_field.reference_position]
 
 
 def truncated_difference(
@@ -193,12 +175,6 @@ def truncated_difference(
     gradients += (1 - across_share) * np.minimum(down / 6, parameters.gradient_truncation)
     colours = np.minimum(colour / 3, parameters.colour_truncation)
     return np.asarray(parameters.colour_share * colours + (1 - parameters.colour_share) * gradients, np.float32)
-
-
-def across_share(baseline: npt.NDArray[np.float64]) -> float:
-    """Weight of horizontal gradients in the cost of a view with this baseline ``(down, across)``; 0..1."""
-    down, across = np.abs(baseline).tolist()
-    return float(across / (across + down)) if across + down else 0.5
 
 
 def confident_labels(
@@ -261,10 +237,8 @@ def refined(disparity: FloatMap, disparities: FloatMap, smooth: GuidedFilter) ->
     ndarray, shape (H, W), float32
     """
     step = disparities[1] - disparities[0]
-    distances = CostVolume(disparities, np.empty((len(disparities), *disparity.shape), np.float16))
-    for k, label in enumerate(disparities):
-        distances.costs[k] = smooth(np.square(np.minimum(np.abs(disparity - label) / step, np.float32(_FARTHEST))))
-    return maps_of(distances).disparity
+    off = (np.minimum(np.abs(disparity - label) / step, np.float32(_FARTHEST)) for label in disparities)
+    return maps_of(filtered(smooth, disparities, map(np.square, off), no_progress)).disparity
 
 
 CHOICES = {
@@ -277,40 +251,32 @@ _SEAM = 16
 """Pixels over which the two mirror images are blended."""
 
 
-class PhaseShift:
-    """Images to be shifted by fractions of a pixel in the Fourier domain.
+def phase_shifted(pictures: FloatMap, offsets: FloatArray, farthest: float | None) -> Iterator[FloatMap]:
+    """Pictures shifted by fractions of a pixel in the Fourier domain.
 
     Parameters
     ----------
     pictures : ndarray, shape (C, H, W), float32
+    offsets : ndarray, shape (M, 2), float64
+        Down and across, pixels.
     farthest : float or None
-        Largest offset in pixels along either axis. None: the images are periodic.
+        Largest offset in pixels along either axis. None: the pictures are periodic.
+
+    Yields
+    ------
+    ndarray, shape (C, H or more, W or more), float32
+        Samples at ``(y, x) + offset``; values beyond the pictures' height and width are meaningless.
     """
-
-    def __init__(self, pictures: FloatMap, farthest: float | None) -> None:
-        if farthest is not None:
-            margin = 2 * int(np.ceil(farthest)) + _SEAM
-            pictures = _seamless(_seamless(pictures, 1, margin), 2, margin)
-        self._size = pictures.shape[1:]
-        self._spectrum = fft.rfft2(pictures)
-
-    def by(self, offsets: npt.NDArray[np.float64]) -> FloatMap:
-        """Samples of the images at ``(y, x) + offset``.
-
-        Parameters
-        ----------
-        offsets : ndarray, shape (M, 2), float64
-            Down and across, pixels.
-
-        Returns
-        -------
-        ndarray, shape (M, C, H or more, W or more), float32
-            Values beyond the images' height and width are meaningless.
-        """
-        rows, columns = (_phases(length, offsets[:, axis]) for axis, length in enumerate(self._size))
-        turned = self._spectrum * (rows[:, None, :, None] * columns[:, None, None, : self._spectrum.shape[2]])
-        moved = fft.irfft2(turned, s=self._size, overwrite_x=True, workers=thread_count())
-        return np.asarray(moved, np.float32)
+    if farthest is not None:
+        margin = 2 * int(np.ceil(farthest)) + _SEAM
+        pictures = _seamless(_seamless(pictures, 1, margin), 2, margin)
+    size, spectrum = pictures.shape[1:], fft.rfft2(pictures)
+    rows, columns = (_phases(length, offsets[:, axis]) for axis, length in enumerate(size))
+    columns = columns[:, : spectrum.shape[2]]
+    for begin in range(0, len(offsets), _AT_ONCE):
+        part = slice(begin, begin + _AT_ONCE)
+        turned = spectrum * (rows[part, None, :, None] * columns[part, None, None])
+        yield from fft.irfft2(turned, s=size, overwrite_x=True, workers=thread_count())
 
 
 def _phases(length: int, offsets: npt.NDArray[np.float64]) -> npt.NDArray[np.complex64]:
@@ -336,9 +302,6 @@ def _seamless(pictures: FloatMap, axis: int, margin: int) -> FloatMap:
     return np.ascontiguousarray(np.moveaxis(joined, -1, axis))
 
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-
 _RATIO = 0.8
 """Ratio of distances to the nearest and second nearest descriptor above which a match is rejected [1]_."""
 
@@ -350,23 +313,6 @@ _LEAST_SUPPORT = 0.25
 
 _SMALLEST = 16
 """Minimum size of views in pixels for the detection of features."""
-
-
-class Features(NamedTuple):
-    """Features of one view.
-
-    Attributes
-    ----------
-    points : ndarray, shape (N, 2), float64
-        Row and column.
-    descriptors : ndarray, shape (N, 128), float32
-    """
-
-    points: FloatArray
-    descriptors: FloatMap
-
-
-_NO_FEATURES = Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
 
 
 def matched_disparities(light_field: LightField, low: float, high: float) -> tuple[IntArray, IntArray, FloatMap]:
@@ -385,40 +331,40 @@ def matched_disparities(light_field: LightField, low: float, high: float) -> tup
     disparity : ndarray, shape (M,), float32
         Pixels per view step.
     """
-    here = features_of(light_field.reference_view)
-    others = without_reference(light_field, light_field.present)
-    baselines = light_field.baselines[others]
-    found = np.full((len(baselines), len(here.points)), np.nan)
-    for n, position in enumerate(np.argwhere(others)):
-        there = features_of(as_unit_float(light_field.rgb_views[tuple(position)]))
-        first, second = mutual_matches(here.descriptors, there.descriptors)
-        along, aside = _along(there.points[second] - here.points[first], baselines[n])
+    points, descriptors = features_of(light_field.reference_view)
+    others = _others(light_field)
+    baselines = np.array([light_field.baselines[position] for position in others]).reshape(-1, 2)
+    found = np.full((len(others), len(points)), np.nan)
+    for n, position in enumerate(others):
+        there, of_view = features_of(as_unit_float(light_field.rgb_views[position]))
+        first, second = mutual_matches(descriptors, of_view)
+        moved = there[second] - points[first]
+        # NaN where a view stands where the reference view does
+        along = -(moved @ baselines[n]) / (baselines[n] @ baselines[n] or np.nan)
+        aside = np.hypot(*(moved + along[:, None] * baselines[n]).T)
         fits = (aside <= _OFF_LINE) & (along >= low) & (along <= high)
         found[n, first[fits]] = along[fits]
     disparity, support = agreed(found, np.hypot(*baselines.T))
-    kept = support >= max(1.0, _LEAST_SUPPORT * len(baselines))
-    pixels = np.floor(here.points[kept] + 0.5).astype(np.int64)
+    kept = support >= max(1.0, _LEAST_SUPPORT * len(others))
+    pixels = np.floor(points[kept] + 0.5).astype(np.int64)
     # a point with two orientations yields two features
     pixels, once = np.unique(pixels, axis=0, return_index=True)
     return pixels[:, 0], pixels[:, 1], disparity[kept][once].astype(np.float32)
 
 
-def features_of(view: FloatMap) -> Features:
-    """Features of a view ``(H, W, 3)``, colours in 0..1."""
+def features_of(view: FloatMap) -> tuple[FloatArray, FloatMap]:
+    """Features of a view ``(H, W, 3)``, colours in 0..1: rows and columns (N, 2), and descriptors (N, 128)."""
     grey = np.clip(np.rint(view.mean(axis=2) * 255), 0, 255).astype(np.uint8)
-    if min(grey.shape) < _SMALLEST:
-        return _NO_FEATURES
-    keypoints, descriptors = cv2.SIFT.create().detectAndCompute(grey, None)
-    if descriptors is None:
-        return _NO_FEATURES
-    return Features(np.array([keypoint.pt[::-1] for keypoint in keypoints]), np.asarray(descriptors, np.float32))
+    large = min(grey.shape) >= _SMALLEST
+    keypoints, descriptors = cv2.SIFT.create().detectAndCompute(grey, None) if large else ((), None)
+    points = np.array([keypoint.pt[::-1] for keypoint in keypoints]).reshape(-1, 2)
+    return points, np.zeros((0, 128), np.float32) if descriptors is None else descriptors
 
 
 def mutual_matches(first: FloatMap, second: FloatMap) -> tuple[IntArray, IntArray]:
     """Indices of the matching descriptors of ``(N, 128)`` and ``(M, 128)``; each shape (K,), int64."""
-    none = np.zeros(0, np.int64)
     if not (len(first) and len(second) > 1):
-        return none, none
+        return (np.zeros(0, np.int64),) * 2
     squared = (first**2).sum(axis=1)[:, None] + (second**2).sum(axis=1) - 2 * first @ second.T
     nearest, back = squared.argmin(axis=1), squared.argmin(axis=0)
     least, next_least = np.partition(np.maximum(squared, 0), 1, axis=1)[:, :2].T
@@ -454,10 +400,3 @@ def agreed(found: FloatArray, distances: FloatArray) -> tuple[FloatArray, IntArr
     disparity[seen] = (weight * np.nan_to_num(values)).sum(axis=0) / np.where(total > 0, total, 1)
     support[seen] = agrees.sum(axis=0)
     return disparity, support
-
-
-def _along(moved: FloatArray, baseline: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Disparity that fits a displacement ``(K, 2)`` best, and the remaining distance."""
-    squared = float(baseline @ baseline)
-    disparity = -(moved @ baseline) / squared if squared else np.full(len(moved), np.nan)
-    return disparity, np.hypot(*(moved + disparity[:, None] * baseline).T)

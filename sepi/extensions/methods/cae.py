@@ -44,20 +44,15 @@ References
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
-
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.costs import GuidedFilter, maps_of
+from sepi.extensions.methods.costs import GuidedFilter, Previous, filtered, maps_of
 from sepi.kernels import cae as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews, refocused
-from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps
-
-CANDIDATES = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
-"""The authors' number, for light fields like theirs."""
+from sepi.stage import Choice, Needs, Progress, StageMaps
 
 LEAST_MEAN = 0.1
 """Lower bound of a pixel's normalisation, as a fraction of the cost's mean over all pixels."""
@@ -66,33 +61,23 @@ LEAST_WEIGHT = 1e-3
 """Weight of a view below which it is left out."""
 
 
-class ConstrainedEntropyParameters(CandidateParameters):
+class CaeParameters(CandidateParameters):
     """Parameters of the constrained angular entropy and defocus."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=2.5
-    )
+    # the authors' number, for light fields like theirs
+    rule = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
+    needs = Needs(bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=2.5)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
-    colour_sigma: float = Field(
-        0.1,
-        ge=1e-3,
-        le=10,
-        description="colour difference at which the weight of views and neighbours falls, colours in 0..1",
-    )
-    colour_constraint: float = Field(
-        1.0, ge=0, description="defocus added for a sub-patch that has none of the pixel's colour, colours in 0..1"
-    )
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
+    colour_sigma: float = Field(0.1, ge=1e-3, le=10, description="difference of colours, 0..1, at which weights fall")
+    colour_constraint: float = Field(1.0, ge=0, description="defocus added for a sub-patch without the pixel's colour")
     filter_radius: int = Field(5, ge=1, le=50, description="window of 2 r + 1 pixels in which costs are filtered")
     filter_epsilon: float = Field(
-        1e-4, gt=0, description="variance of colour above which filtered costs keep edges, colours in 0..1"
+        1e-4, gt=0, description="variance of colours, 0..1, above which the filter keeps edges"
     )
 
 
-def cae(
-    light_field: LightField, previous: StageMaps | None, parameters: ConstrainedEntropyParameters, progress: Progress
-) -> StageMaps:
+def cae(light_field: LightField, previous: Previous, parameters: CaeParameters, progress: Progress) -> StageMaps:
     """Filtered costs of every candidate, and the candidate of least cost.
 
     Returns
@@ -102,12 +87,13 @@ def cae(
     """
     disparities = parameters.candidates(light_field)
     entropies, responses = entropies_and_responses(light_field, disparities, parameters.colour_sigma, progress)
-    defocus = constrained_defocus(responses, light_field.reference_view, parameters)
-    costs = 0.25 * (_normalised(entropies) + _normalised(defocus))
-    smooth = GuidedFilter(light_field.reference_view, parameters.filter_radius, parameters.filter_epsilon)
-    volume = CostVolume(disparities, np.stack([smooth(one).astype(np.float16) for one in costs]))
-    progress(1.0)
-    return maps_of(volume)
+    # least weighted responses over the sub-patches around each pixel
+    guide, by_pixel = light_field.reference_view, np.ascontiguousarray(responses.transpose(1, 2, 0))
+    defocus = np.empty_like(by_pixel)
+    kernels.constrained_least_patch(by_pixel, guide, parameters.colour_sigma, parameters.colour_constraint, defocus)
+    costs = 0.25 * (_normalised(entropies) + _normalised(defocus.transpose(2, 0, 1)))
+    smooth = GuidedFilter(guide, parameters.filter_radius, parameters.filter_epsilon)
+    return maps_of(filtered(smooth, disparities, costs, lambda done: progress(0.9 + 0.1 * done)))
 
 
 def entropies_and_responses(
@@ -130,14 +116,13 @@ def entropies_and_responses(
     entropies, responses : ndarray, shape (K, H, W), float32
     """
     views, weights = ShearedViews(light_field), level_weights(sigma)
-    own = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
-    entropies, responses = (np.empty((len(disparities), *light_field.shape), np.float32) for _ in range(2))
-    channels = np.empty_like(own)
-    for k, sheared in views.over(disparities):
+    entropies, responses = np.empty((2, len(disparities), *light_field.shape), np.float32)
+    channels = np.empty((3, *light_field.shape), np.float32)
+    for k, sheared in views.over(disparities, lambda done: progress(0.9 * done)):
+        own = sheared[views.reference]
         kernels.constrained_entropies(sheared, own, weights, channels)
         entropies[k] = (channels.mean(axis=0) + channels.max(axis=0)) / 2
         responses[k] = np.abs(refocused(sheared) - own).mean(axis=0)
-        progress(0.9 * (k + 1) / len(disparities))
     return entropies, responses
 
 
@@ -148,32 +133,10 @@ def level_weights(sigma: float) -> FloatMap:
     return weights[weights >= LEAST_WEIGHT].astype(np.float32)
 
 
-def constrained_defocus(responses: FloatMap, guide: FloatMap, parameters: ConstrainedEntropyParameters) -> FloatMap:
-    """Minimum weighted response over the sub-patches around each pixel.
-
-    Parameters
-    ----------
-    responses : ndarray, shape (K, H, W), float32
-        Responses of single pixels.
-    guide : ndarray, shape (H, W, 3), float32
-        The reference view, colours in 0..1.
-    parameters : ConstrainedEntropyParameters
-
-    Returns
-    -------
-    ndarray, shape (K, H, W), float32
-    """
-    by_pixel = np.ascontiguousarray(responses.transpose(1, 2, 0))
-    least = np.empty_like(by_pixel)
-    sigma, constraint = parameters.colour_sigma, parameters.colour_constraint
-    kernels.constrained_least_patch(by_pixel, np.ascontiguousarray(guide), sigma, constraint, least)
-    return least.transpose(2, 0, 1)
-
-
 def _normalised(costs: FloatMap) -> FloatMap:
     """Costs ``(K, H, W)`` divided by their mean over the candidates."""
     mean = costs.mean(axis=0)
     return np.asarray(costs / np.maximum(mean, max(LEAST_MEAN * float(mean.mean()), 1e-6)), np.float32)
 
 
-CHOICES: dict[str, Any] = {"initial": {"cae": Choice(ConstrainedEntropyParameters, cae)}}
+CHOICES = {"initial": {"cae": Choice(CaeParameters, cae)}}

@@ -16,7 +16,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import cv2
 import numpy as np
@@ -26,6 +26,12 @@ from pydantic import Field
 from sepi.kernels import weighted_median as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.stage import Choice, CostVolume, Parameters, Progress, StageMaps, require_costs
+
+GREY = np.array([0.299, 0.587, 0.114], np.float32)
+"""Weights of red, green and blue in the grey value (ITU-R BT.601)."""
+
+Previous = StageMaps | None
+"""Maps of the stage before; None for the first stage."""
 
 
 def least_costs(volume: CostVolume) -> npt.NDArray[np.int64]:
@@ -78,12 +84,25 @@ def disparity_of(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
     >>> disparity_of(volume, least_costs(volume)).tolist()
     [[1.25]]
     """
-    below, here, above = _costs_round(volume, labels)
-    curvature = below - 2 * here + above
-    offset = np.where(curvature > 0, (below - above) / (2 * np.where(curvature > 0, curvature, 1)), 0)
-    inner = (labels > 0) & (labels < len(volume.disparities) - 1) & (here <= below) & (here <= above)
-    step = volume.disparities[1] - volume.disparities[0]
-    return np.asarray(volume.disparities[labels] + step * np.where(inner, offset, 0), np.float32)
+    return between_candidates(volume.disparities, volume.costs, labels)
+
+
+def between_candidates(
+    disparities: FloatMap, costs: npt.NDArray[np.floating], labels: npt.NDArray[np.int64]
+) -> FloatMap:
+    """Disparity of the chosen candidates as of :func:`disparity_of`; costs (K, ...), infinite for rejected ones."""
+    last = len(disparities) - 1
+    below, here, above = (
+        np.take_along_axis(costs, np.clip(labels + step, 0, last)[None], axis=0)[0].astype(np.float64)
+        for step in (-1, 0, 1)
+    )
+    with np.errstate(invalid="ignore"):
+        curvature, slope = below - 2 * here + above, below - above
+    inner = (
+        (labels > 0) & (labels < last) & (here <= below) & (here <= above) & (curvature > 0) & np.isfinite(curvature)
+    )
+    offset = np.where(inner, slope, 0) / (2 * np.where(inner, curvature, 1))
+    return np.asarray(disparities[labels] + (disparities[1] - disparities[0]) * offset, np.float32)
 
 
 def distinctness(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
@@ -123,18 +142,6 @@ def maps_of(volume: CostVolume) -> StageMaps:
     return StageMaps(disparity_of(volume, labels), distinctness(volume, labels), cost_volume=volume)
 
 
-def _costs_round(
-    volume: CostVolume, labels: npt.NDArray[np.int64]
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Costs of the chosen candidate and of its neighbours, which repeat at the ends."""
-    last = len(volume.disparities) - 1
-    numbers = (np.clip(labels + step, 0, last) for step in (-1, 0, 1))
-    below, here, above = (
-        np.take_along_axis(volume.costs, number[None], axis=0)[0].astype(np.float64) for number in numbers
-    )
-    return below, here, above
-
-
 def colour_differences(sheared: FloatMap, reference: FloatMap) -> Iterator[FloatMap]:
     """Mean absolute channel difference of each view (N, 3, H, W) from one view (3, H, W); each (H, W)."""
     for view in sheared:
@@ -153,6 +160,13 @@ class GuidedFilter:
         The windows are ``2 radius + 1`` pixels wide.
     epsilon : float
         Colour variance within a window above which its edges are preserved.
+
+    Attributes
+    ----------
+    guide : ndarray, shape (H, W, 3), float32
+        Its colours less their mean.
+    shape : (int, int)
+        Height and width.
 
     References
     ----------
@@ -175,18 +189,13 @@ class GuidedFilter:
     """
 
     def __init__(self, guide: FloatMap, radius: int, epsilon: float) -> None:
+        self.shape = guide.shape[:2]
         self._size = (2 * radius + 1, 2 * radius + 1)
-        self._guide = guide.astype(np.float32)
-        self._mean = self._box(self._guide)
         # centred first: one-pass variances of nearly constant colours lose precision in float32
-        offset = self._guide.mean(axis=(0, 1), dtype=np.float64).astype(np.float32)
-        self._guide -= offset
-        self._mean -= offset
-        covariance = np.empty((*guide.shape[:2], 3, 3))
-        for i in range(3):
-            for j in range(i, 3):
-                product = self._box(self._guide[..., i] * self._guide[..., j])
-                covariance[..., i, j] = covariance[..., j, i] = product - self._mean[..., i] * self._mean[..., j]
+        offset = guide.mean(axis=(0, 1), dtype=np.float64).astype(np.float32)
+        self.guide, self._mean = guide - offset, self._box(guide) - offset
+        products, of_means = (one[..., None] * one[..., None, :] for one in (self.guide, self._mean))
+        covariance = self._box(products.reshape(*self.shape, 9)).reshape(products.shape) - of_means
         self._inverse = np.linalg.inv(covariance + epsilon * np.eye(3)).astype(np.float32)
 
     def __call__(self, values: FloatMap) -> FloatMap:
@@ -200,18 +209,37 @@ class GuidedFilter:
         -------
         ndarray, shape (H, W), float32
         """
-        slopes, offsets = self._lines(values)
-        return np.asarray((slopes * self._guide).sum(axis=2) + offsets, np.float32)
+        slopes, offsets = self.lines(values)
+        return np.asarray((slopes * self.guide).sum(axis=2) + offsets, np.float32)
 
-    def _lines(self, values: FloatMap) -> tuple[FloatMap, FloatMap]:
-        """The linear functions of the guide's centred colours: slopes (H, W, 3) and offsets (H, W)."""
+    def lines(self, values: FloatMap) -> tuple[FloatMap, FloatMap]:
+        """The linear functions of ``guide`` that filter a map.
+
+        Parameters
+        ----------
+        values : ndarray, shape (H, W), float32
+
+        Returns
+        -------
+        slopes : ndarray, shape (H, W, 3), float32
+        offsets : ndarray, shape (H, W), float32
+        """
         mean = self._box(values)
-        covariance = self._box(self._guide * values[..., None]) - self._mean * mean[..., None]
+        covariance = self._box(self.guide * values[..., None]) - self._mean * mean[..., None]
         slopes = np.einsum("hwij,hwj->hwi", self._inverse, covariance)
         return self._box(slopes), self._box(mean - (slopes * self._mean).sum(axis=2))
 
     def _box(self, values: FloatMap) -> FloatMap:
         return np.asarray(cv2.blur(values, self._size, borderType=cv2.BORDER_REFLECT))
+
+
+def filtered(smooth: GuidedFilter, disparities: FloatMap, costs: Iterable[FloatMap], progress: Progress) -> CostVolume:
+    """Filtered costs, from those of one candidate after the other (H, W)."""
+    volume = np.empty((len(disparities), *smooth.shape), np.float16)
+    for k, one in enumerate(costs):
+        volume[k] = smooth(one)
+        progress((k + 1) / len(disparities))
+    return CostVolume(disparities, volume)
 
 
 def weighted_median(
@@ -282,12 +310,8 @@ def guided_costs(
     """
     before, volume = require_costs(previous)
     smooth = GuidedFilter(light_field.reference_view, parameters.radius, parameters.epsilon)
-    filtered = np.empty_like(volume.costs)
-    for k, costs in enumerate(volume.costs):
-        filtered[k] = smooth(costs.astype(np.float32))
-        progress((k + 1) / len(filtered))
-    result = CostVolume(volume.disparities, filtered)
-    best = maps_of(result)
+    costs = (of_candidate.astype(np.float32) for of_candidate in volume.costs)
+    best = maps_of(filtered(smooth, volume.disparities, costs, progress))
     return before.updated(best.disparity, best.confidence).without_costs()
 
 
@@ -295,9 +319,7 @@ class GuidedMedianParameters(GuidedCostsParameters):
     """Parameters of the filtered costs and of the median of the map."""
 
     median_radius: int = Field(3, ge=0, le=50, description="median window of 2 r + 1 pixels; 0: no median")
-    median_sigma: float = Field(
-        0.05, gt=0, description="RGB distance at which a pixel's weight in the median falls, colours in 0..1"
-    )
+    median_sigma: float = Field(0.05, gt=0, description="RGB distance (0..1) at which weights in the median fall")
 
 
 def guided_median(

@@ -18,8 +18,6 @@ References
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
@@ -30,25 +28,15 @@ from sepi.lightfield import FloatMap, LightField
 from sepi.stage import Choice, Needs, Parameters, Progress, StageMaps, require_costs
 
 
-def contrast_weights(guide: FloatMap, scale: float) -> tuple[FloatMap, FloatMap]:
-    """Weights of the 4-connected edges, lower where the guide's colours change: ``exp(-|difference| / scale)``.
-
-    Parameters
-    ----------
-    guide : ndarray, shape (H, W, C), float32
-        Colours in 0..1.
-    scale : float
-        Mean absolute difference of the channels at which a weight is ``1/e``.
+def changes(picture: FloatMap) -> FloatMap:
+    """How much a picture (H, W, C) changes along the 4-connected edges.
 
     Returns
     -------
-    across, down : ndarray, shape (H, W), float32
-        Weights of the edges to the next pixel in the row and in the column; 0 at the last ones.
+    ndarray, shape (2, H, W), float32
+        Mean absolute difference of the channels from the next pixel in the row, and in the column; 0 at the last ones.
     """
-    across, down = (np.zeros(guide.shape[:2], np.float32) for _ in range(2))
-    across[:, :-1] = np.exp(-np.abs(np.diff(guide, axis=1)).mean(axis=2) / np.float32(scale))
-    down[:-1] = np.exp(-np.abs(np.diff(guide, axis=0)).mean(axis=2) / np.float32(scale))
-    return across, down
+    return np.stack([np.abs(np.diff(picture, axis=n, append=picture.take([-1], n))).mean(axis=2) for n in (1, 0)])
 
 
 def labels_of_least_energy(
@@ -61,7 +49,8 @@ def labels_of_least_energy(
     costs : ndarray, shape (K, H, W), float
         Data cost of each label.
     across, down : ndarray, shape (H, W), float32
-        Weights of the edges to the next pixel in the row and in the column, not negative.
+        Weights of the edges to the next pixel in the row and in the column, not negative; those of the last ones do
+        not count.
     truncation : float
         Label difference above which the cost is constant.
     iterations : int
@@ -83,15 +72,11 @@ def labels_of_least_energy(
 class MarkovFieldParameters(Parameters):
     """Parameters of the multi-label optimisation."""
 
-    needs: ClassVar[Needs] = Needs(bytes_per_sample=6, bytes_per_pixel=4000, seconds_per_megasample=0.6)
+    needs = Needs(bytes_per_sample=6, bytes_per_pixel=4000, seconds_per_megasample=0.6)
 
     smoothness: float = Field(0.02, ge=0, description="cost of a change by a hundredth of the disparity range")
-    truncation: float = Field(
-        0.1, gt=0, le=1, description="change beyond which the cost no longer grows, as a share of the disparity range"
-    )
-    contrast: float = Field(
-        0.05, gt=0, description="mean difference of colours at which smoothness falls to 1/e, colours in 0..1"
-    )
+    truncation: float = Field(0.1, gt=0, le=1, description="largest change that counts, share of the disparity range")
+    contrast: float = Field(0.05, gt=0, description="difference of colours, 0..1, at which smoothness falls to 1/e")
     iterations: int = Field(8, ge=1, le=100, description="passes of the messages, there and back")
 
 
@@ -108,15 +93,13 @@ def markov_field(
         Without the cost volume.
     """
     before, volume = require_costs(previous)
-    across, down = contrast_weights(light_field.reference_view, parameters.contrast)
     intervals = len(volume.disparities) - 1
     weight = np.float32(parameters.smoothness * 100 / intervals)
-    labels = labels_of_least_energy(
-        volume.costs, weight * across, weight * down, parameters.truncation * intervals, parameters.iterations
-    )
+    across, down = weight * np.exp(-changes(light_field.reference_view) / np.float32(parameters.contrast))
+    truncation = parameters.truncation * intervals
+    labels = labels_of_least_energy(volume.costs, across, down, truncation, parameters.iterations)
     progress(1.0)
-    maps = before.updated(disparity_of(volume, labels), distinctness(volume, labels))
-    return maps.without_costs()
+    return before.updated(disparity_of(volume, labels), distinctness(volume, labels)).without_costs()
 
 
 CHOICES = {"optimize": {"markov_field": Choice(MarkovFieldParameters, markov_field)}}

@@ -47,25 +47,17 @@ References
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.extensions.methods.costs import GuidedFilter
+from sepi.extensions.methods.costs import GREY, GuidedFilter
 from sepi.image.noise import residual_variance
 from sepi.kernels import mishiba as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, Parameters, Progress, StageMaps, require_previous
-
-CANDIDATES = CandidateRule(usual=64, finest=0.3, coarsest=0.3)
-"""Spacing of 0.3 pixels in the farthest view, where a minimum of the costs is about one pixel wide."""
-
-GREY = np.array([0.299, 0.587, 0.114], np.float32)
-"""Weights of red, green and blue in the grey value."""
 
 TIE = 1e-5
 """Tolerance for rounding errors in the comparison with the mean, grey values 0..1."""
@@ -86,15 +78,12 @@ TABLE_ENTRIES = 512
 class MishibaParameters(CandidateParameters):
     """Parameters of the costs of one-bit features."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
+    # spacing of 0.3 pixels in the farthest view, where a minimum of the costs is about one pixel wide
+    rule = CandidateRule(usual=64, finest=0.3, coarsest=0.3)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
-    feature_sigma: float = Field(
-        1.0, gt=0, le=10, description="sigma of the Gaussian mean with which a pixel is compared for its bit, in pixels"
-    )
-    lattice_step: int = Field(
-        2, ge=1, le=8, description="distance of the pixels whose costs are computed, in pixels; others are interpolated"
-    )
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
+    feature_sigma: float = Field(1.0, gt=0, le=10, description="sigma of the mean that a pixel's bit exceeds, pixels")
+    lattice_step: int = Field(2, ge=1, le=8, description="distance of pixels whose costs are not interpolated, pixels")
     radius: int = Field(3, ge=1, le=50, description="window in which colours fit the costs, 2 r + 1 of these pixels")
     epsilon: float = Field(1e-4, gt=0, description="variance of colour above which edges are kept, colours in 0..1")
 
@@ -102,9 +91,7 @@ class MishibaParameters(CandidateParameters):
 class MedianDescentParameters(Parameters):
     """Parameters of the refinement by weighted medians."""
 
-    smoothness: float = Field(
-        1.2, ge=0, le=100, description="weight of all neighbours of a pixel's colour together; data has 0..1"
-    )
+    smoothness: float = Field(1.2, ge=0, le=100, description="weight of all neighbours of one colour; data has 0..1")
     sigma: float = Field(0.03, ge=1e-4, le=2, description="RGB distance at which a neighbour's weight falls, 0..1")
     radius: int = Field(5, ge=1, le=15, description="neighbourhood of 2 r + 1 by 2 r + 1 pixels, with gaps between")
     gap: int = Field(2, ge=1, le=10, description="distance of these neighbours, in pixels")
@@ -120,10 +107,19 @@ def mishiba(
     -------
     StageMaps
     """
-    disparities = parameters.candidates(light_field)
-    costs = lattice_costs(light_field, disparities, parameters)
+    disparities, guide, step = parameters.candidates(light_field), light_field.reference_view, parameters.lattice_step
+    lattice, views = np.ascontiguousarray(guide[::step, ::step]), selected_views(light_field)
+    offsets = -disparities[:, None, None].astype(np.float64) * light_field.baselines[views]
+    costs = np.empty((len(disparities), *lattice.shape[:2]), np.float32)
+    kernels.pair_costs(details(light_field, views, parameters.feature_sigma), offsets, step, costs)
     progress(0.4)
-    labels, kept = least_interpolated(light_field.reference_view, costs, parameters, progress)
+    labels, kept = np.zeros(light_field.shape, np.int64), np.zeros((*light_field.shape, 5), np.float32)
+    fit = GuidedFilter(lattice, parameters.radius, parameters.epsilon)
+    origin = lattice[0, 0] - fit.guide[0, 0]
+    for k, cost in enumerate(costs):
+        slopes, constants = fit.lines(cost)
+        kernels.keep_least(k, slopes, constants - slopes @ origin, guide, step, labels, kept)
+        progress(0.4 + 0.6 * (k + 1) / len(costs))
     return StageMaps(*refined(disparities, labels, kept))
 
 
@@ -145,15 +141,13 @@ def median_descent(
     unit = max(high - low, 1e-6) / (LEVELS - 1)
     data = np.round((before.disparity.astype(np.float64) - low) / unit).astype(np.int32, order="C")
     weights = np.round(before.confidence * FULL_WEIGHT).astype(np.int32, order="C")
-    table, per_entry = neighbour_weights(parameters, residual_variance(guide))
-    radius, gap = parameters.radius, parameters.gap
+    table = neighbour_weights(parameters, residual_variance(guide))
     current, following = data.copy(), np.empty_like(data)
     for i in range(parameters.passes):
-        kernels.median_pass(current, data, weights, guide, radius, gap, table, per_entry, following)
+        kernels.median_pass(current, data, weights, guide, parameters.radius, parameters.gap, *table, following)
         current, following = following, current
         progress((i + 1) / parameters.passes)
-    disparity = (low + current * unit).astype(np.float32)
-    return before.updated(disparity, before.confidence).without_costs()
+    return before.updated((low + current * unit).astype(np.float32), before.confidence).without_costs()
 
 
 def selected_views(light_field: LightField) -> BoolMap:
@@ -174,54 +168,16 @@ def details(light_field: LightField, views: BoolMap, sigma: float) -> FloatMap:
     return result
 
 
-def lattice_costs(light_field: LightField, disparities: FloatMap, parameters: MishibaParameters) -> FloatMap:
-    """Costs of all candidates on the lattice; shape (K, ceil(H / step), ceil(W / step)), float32, 0..1."""
-    views = selected_views(light_field)
-    offsets = -disparities[:, None, None].astype(np.float64) * light_field.baselines[views]
-    step = parameters.lattice_step
-    height, width = light_field.shape
-    costs = np.empty((len(disparities), -(-height // step), -(-width // step)), np.float32)
-    kernels.pair_costs(details(light_field, views, parameters.feature_sigma), offsets, step, costs)
-    return costs
-
-
-def least_interpolated(
-    guide: FloatMap, costs: FloatMap, parameters: MishibaParameters, progress: Progress
-) -> tuple[npt.NDArray[np.int64], FloatMap]:
-    """Candidates of least interpolated cost, and the output of ``keep_least`` (``kernels/mishiba.cpp``).
-
-    Parameters
-    ----------
-    guide : ndarray, shape (H, W, 3), float32
-        Colours in 0..1.
-    costs : ndarray, shape (K, h, w), float32
-        Costs on the lattice.
-    parameters : MishibaParameters
-    progress : callable
-
-    Returns
-    -------
-    labels : ndarray, shape (H, W), int64
-    kept : ndarray, shape (H, W, 5), float32
-    """
-    step = parameters.lattice_step
-    fit = LatticeFit(np.ascontiguousarray(guide[::step, ::step]), parameters.radius, parameters.epsilon)
-    labels = np.zeros(guide.shape[:2], np.int64)
-    kept = np.zeros((*guide.shape[:2], 5), np.float32)
-    for k, cost in enumerate(costs):
-        kernels.keep_least(k, *fit.functions(cost), guide, step, labels, kept)
-        progress(0.4 + 0.6 * (k + 1) / len(costs))
-    return labels, kept
-
-
 def refined(disparities: FloatMap, labels: npt.NDArray[np.int64], kept: FloatMap) -> tuple[FloatMap, FloatMap]:
     """Disparity by the parabola around the least cost, and confidence; each (H, W), float32.
 
     Parameters
     ----------
     disparities : ndarray, shape (K,), float32
-    labels, kept : ndarray
-        Returned by :func:`least_interpolated`.
+    labels : ndarray, shape (H, W), int64
+        Candidates of least cost.
+    kept : ndarray, shape (H, W, 5), float32
+        Costs as ``keep_least`` (``kernels/mishiba.cpp``) keeps them.
     """
     least, below, above, _, total = np.moveaxis(kept, 2, 0)
     curvature = below - 2 * least + above
@@ -232,19 +188,6 @@ def refined(disparities: FloatMap, labels: npt.NDArray[np.int64], kept: FloatMap
     least, mean = np.maximum(least, 0) + NO_COST, np.maximum(total / len(disparities), 0) + NO_COST
     confidence = np.clip(1 - least / mean, 0, 1)
     return disparity.astype(np.float32), confidence.astype(np.float32)
-
-
-class LatticeFit(GuidedFilter):
-    """A guided filter that returns its linear functions of the guide's colours, for use between its pixels."""
-
-    def __init__(self, guide: FloatMap, radius: int, epsilon: float) -> None:
-        super().__init__(guide, radius, epsilon)
-        self._origin = guide[0, 0] - self._guide[0, 0]
-
-    def functions(self, values: FloatMap) -> tuple[FloatMap, FloatMap]:
-        """Slopes (H, W, 3) and constants (H, W), float32; filtered values are slopes times colours + constants."""
-        slopes, offsets = self._lines(values)
-        return slopes, offsets - slopes @ self._origin
 
 
 def neighbour_weights(parameters: MedianDescentParameters, noise: float) -> tuple[npt.NDArray[np.int32], float]:

@@ -50,20 +50,15 @@ References
 from __future__ import annotations
 
 import math
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.costs import colour_differences, maps_of
+from sepi.extensions.methods.costs import Previous, colour_differences, maps_of
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps
-
-CANDIDATES = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=10**9)
-"""Limited to a cost volume of 1 GB, since it is kept."""
-
 
 _ROWS = 64
 """Image rows processed at once, which limits the memory for the differences of all views."""
@@ -72,26 +67,16 @@ _ROWS = 64
 class OavcParameters(CandidateParameters):
     """Parameters of the vote cost."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=31, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=3
-    )
+    # limited to a cost volume of 1 GB, since it is kept
+    rule = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=10**9)
+    needs = Needs(bytes_per_sample=31, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=3)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
-    agreeing_share: float = Field(
-        0.5,
-        gt=0,
-        le=1,
-        description="share of the views that must vote for some candidate; it sets each pixel's threshold",
-    )
-    least_threshold: float = Field(
-        0.004, ge=1e-6, le=1, description="least threshold of a vote: mean difference of the channels, colours in 0..1"
-    )
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
+    agreeing_share: float = Field(0.5, gt=0, le=1, description="share of the views that must vote for some candidate")
+    least_threshold: float = Field(0.004, ge=1e-6, le=1, description="least threshold of a vote, difference of colours")
 
 
-def oavc(
-    light_field: LightField, previous: StageMaps | None, parameters: OavcParameters, progress: Progress
-) -> StageMaps:
+def oavc(light_field: LightField, previous: Previous, parameters: OavcParameters, progress: Progress) -> StageMaps:
     """Candidates with the most votes.
 
     Returns
@@ -100,39 +85,12 @@ def oavc(
         With the cost volume.
     """
     views, disparities = ShearedViews(light_field), parameters.candidates(light_field)
-    thresholds = vote_thresholds(
-        views, light_field.shape, disparities, parameters, lambda fraction: progress(fraction / 2)
-    )
-    return maps_of(votes(views, disparities, thresholds, lambda fraction: progress((1 + fraction) / 2)))
-
-
-def vote_thresholds(
-    views: ShearedViews, shape: tuple[int, int], disparities: FloatMap, parameters: OavcParameters, progress: Progress
-) -> FloatMap:
-    """Minimum thresholds with which the required share of the views agree on a candidate.
-
-    Parameters
-    ----------
-    views : ShearedViews
-        The reference view among them.
-    shape : tuple of int
-        Height and width of a view, pixels.
-    disparities : ndarray, shape (K,), float32
-        Candidates, pixels per view step.
-    parameters : OavcParameters
-    progress : callable
-
-    Returns
-    -------
-    ndarray, shape (H, W), float32
-        Mean difference of the channels, colours in 0..1.
-    """
     needed = max(1, math.ceil(parameters.agreeing_share * (len(views.positions) - 1)))
-    thresholds = np.full(shape, np.inf, np.float32)
-    for k, sheared in views.over(disparities):
+    thresholds = np.full(light_field.shape, np.inf, np.float32)
+    for _, sheared in views.over(disparities, lambda done: progress(done / 2)):
         lower_thresholds(sheared, views.reference, needed, thresholds)
-        progress((k + 1) / len(disparities))
-    return np.maximum(thresholds, np.float32(parameters.least_threshold))
+    thresholds = np.maximum(thresholds, np.float32(parameters.least_threshold))
+    return maps_of(votes(views, disparities, thresholds, lambda done: progress((1 + done) / 2)))
 
 
 def lower_thresholds(sheared: FloatMap, reference: int, needed: int, thresholds: FloatMap) -> None:
@@ -177,9 +135,8 @@ def votes(views: ShearedViews, disparities: FloatMap, thresholds: FloatMap, prog
     CostVolume
     """
     costs = np.empty((len(disparities), *thresholds.shape), np.float16)
-    for k, sheared in views.over(disparities):
+    for k, sheared in views.over(disparities, progress):
         costs[k] = vote_costs(sheared, views.reference, thresholds)
-        progress((k + 1) / len(disparities))
     return CostVolume(disparities, costs)
 
 

@@ -53,15 +53,13 @@ References
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
-
 import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.extensions.methods.costs import disparity_of
-from sepi.extensions.methods.markov_field import labels_of_least_energy
+from sepi.extensions.methods.costs import Previous, between_candidates, disparity_of
+from sepi.extensions.methods.markov_field import changes, labels_of_least_energy
 from sepi.image.edges import CannyParameters, canny_edges, edge_angle
 from sepi.kernels import occ as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
@@ -69,11 +67,7 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, require_previous
 
-CANDIDATES = CandidateRule(usual=101, finest=0.05, coarsest=0.5, volume_bytes=2**30)
-"""About an eighth of a pixel in the outermost view of typical light fields."""
-
-LABELS = CandidateRule(usual=151, finest=0.02, coarsest=0.5, volume_bytes=2**28)
-"""Labels of the optimisation, which stores five numbers per label and pixel."""
+IntArray = npt.NDArray[np.int64]
 
 SATURATION = 95
 """Percentile at which a cue saturates."""
@@ -85,68 +79,46 @@ _LEAST_VARIANCE = np.float32(1e-5)
 class OccParameters(CandidateParameters):
     """Parameters of the costs of whole angular patches."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=31, bytes_per_pixel=2400, bytes_per_candidate=16, seconds_per_megasample=2
-    )
+    # about an eighth of a pixel in the outermost view of typical light fields
+    rule = CandidateRule(usual=101, finest=0.05, coarsest=0.5, volume_bytes=2**30)
+    needs = Needs(bytes_per_sample=31, bytes_per_pixel=2400, bytes_per_candidate=16, seconds_per_megasample=2)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
 
 
 class OccSplitParameters(OccParameters, CannyParameters):
     """Parameters of the split patches."""
 
-    edge_reach: float = Field(
-        1.0,
-        ge=0,
-        le=1,
-        description="distance from an edge within which patches are split: part of the disparity range's width times "
-        "the distance of the farthest view",
-    )
-    colour_tolerance: float = Field(
-        0.02, ge=0, le=1, description="how far the halves' colours may look reversed, colours in 0..1"
-    )
+    edge_reach: float = Field(1.0, ge=0, le=1, description="share of the farthest movement where edges split patches")
+    colour_tolerance: float = Field(0.02, ge=0, le=1, description="how far colours of halves, 0..1, may look reversed")
 
 
 class OccFieldParameters(CandidateParameters):
     """Parameters of the optimisation."""
 
-    rule: ClassVar[CandidateRule] = LABELS
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=6, bytes_per_pixel=5000, bytes_per_candidate=32, seconds_per_megasample=0.6
-    )
+    # labels of the optimisation, which stores five numbers per label and pixel
+    rule = CandidateRule(usual=151, finest=0.02, coarsest=0.5, volume_bytes=2**28)
+    needs = Needs(bytes_per_sample=6, bytes_per_pixel=5000, bytes_per_candidate=32, seconds_per_megasample=0.6)
 
-    num_disparities: int | None = number_field(LABELS, "docs/reproduce/compared.md")
-    smoothness: float = Field(
-        1.0, ge=0, description="cost of a jump between neighbours of one colour; the cost of a disparity is at most 1"
-    )
-    truncation: float = Field(
-        0.03, gt=0, le=1, description="change beyond which the cost no longer grows, as a share of the disparity range"
-    )
-    contrast: float = Field(
-        0.02, gt=0, description="mean difference of colours at which smoothness falls to a half, colours in 0..1"
-    )
-    occlusion_weight: float = Field(
-        0.002, ge=0, description="difference of colours that equals a change of the predicted occlusion by 1"
-    )
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
+    smoothness: float = Field(1.0, ge=0, description="cost of a jump within one colour; a disparity costs at most 1")
+    truncation: float = Field(0.03, gt=0, le=1, description="largest change that counts, share of the disparity range")
+    contrast: float = Field(0.02, gt=0, description="difference of colours, 0..1, at which smoothness falls to a half")
+    occlusion_weight: float = Field(0.002, ge=0, description="difference of colours worth a predicted occlusion's by 1")
     iterations: int = Field(8, ge=1, le=100, description="passes of the messages, there and back")
 
 
-def occ(
-    light_field: LightField, previous: StageMaps | None, parameters: OccParameters, progress: Progress
-) -> StageMaps:
+def occ(light_field: LightField, previous: Previous, parameters: OccParameters, progress: Progress) -> StageMaps:
     """Depth from whole angular patches.
 
     Returns
     -------
     StageMaps
     """
-    disparities = parameters.candidates(light_field)
-    reference = _channels_first(light_field.reference_view)
+    views, disparities = ShearedViews(light_field), parameters.candidates(light_field)
     costs = np.empty((len(disparities), *light_field.shape), np.float32)
-    for k, sheared in ShearedViews(light_field).over(disparities):
-        costs[k] = whole_patch_costs(sheared, reference)
-        progress((k + 1) / len(disparities))
+    for k, sheared in views.over(disparities, progress):
+        costs[k] = whole_patch_costs(sheared, sheared[views.reference])
     return StageMaps(*least_cost(disparities, costs))
 
 
@@ -167,16 +139,21 @@ def occ_split(
     view = light_field.reference_view
     disparities = parameters.candidates(light_field)
     width = float(disparities[-1] - disparities[0])
-    edges = edges_to_split(view, parameters, parameters.edge_reach * width * light_field.reach)
-    costs, cues = split_costs(light_field, disparities, edges, parameters.colour_tolerance, progress)
+    places = places_to_split(view, parameters, parameters.edge_reach * width * light_field.reach)
+    costs, cues = split_costs(light_field, disparities, places, parameters.colour_tolerance, progress)
+    near = tuple(places[:, :2].T)
     halves, certain = least_cost(disparities, costs)
     known = np.isfinite(costs).any(axis=0)
     disparity, confidence = before.disparity.copy(), before.confidence.copy()
-    disparity[edges.near] = np.where(known, halves, disparity[edges.near])
-    confidence[edges.near] = np.where(known, certain, confidence[edges.near])
-    predicted = np.zeros(light_field.shape, np.float32)
-    predicted[edges.near] = predicted_occlusion(slope(disparity)[edges.near] / np.float32(width), cues)
-    return before.updated(disparity, confidence, occlusion_candidates=edges.near, predicted_occlusion=predicted)
+    disparity[near] = np.where(known, halves, disparity[near])
+    confidence[near] = np.where(known, certain, confidence[near])
+    # without isolated outliers
+    slope = np.hypot(*np.gradient(cv2.medianBlur(disparity, 3)))
+    split, predicted = np.zeros(light_field.shape, bool), np.zeros(light_field.shape, np.float32)
+    split[near] = True
+    if len(places):
+        predicted[near] = predicted_occlusion(slope[near] / np.float32(width), cues)
+    return before.updated(disparity, confidence, occlusion_candidates=split, predicted_occlusion=predicted)
 
 
 def occ_field(
@@ -192,13 +169,12 @@ def occ_field(
     """
     before = require_previous(previous)
     volume = data_costs(before, parameters.candidates(light_field))
-    predicted = before.extra.get("predicted_occlusion", np.zeros(light_field.shape, np.float32))
-    intervals = len(volume.disparities) - 1
-    truncation = max(1.0, parameters.truncation * intervals)
-    across, down = smoothness_weights(light_field.reference_view, predicted, parameters)
-    labels = labels_of_least_energy(
-        volume.costs, across / truncation, down / truncation, truncation, parameters.iterations
-    )
+    truncation = max(1.0, parameters.truncation * (len(volume.disparities) - 1))
+    difference = changes(light_field.reference_view)
+    if "predicted_occlusion" in before.extra:
+        difference += np.float32(parameters.occlusion_weight) * changes(before.extra["predicted_occlusion"][..., None])
+    across, down = parameters.smoothness * parameters.contrast / (difference + parameters.contrast) / truncation
+    labels = labels_of_least_energy(volume.costs, across, down, truncation, parameters.iterations)
     progress(1.0)
     return before.updated(disparity_of(volume, labels), before.confidence)
 
@@ -217,26 +193,16 @@ def least_cost(disparities: FloatMap, costs: FloatMap) -> tuple[FloatMap, FloatM
     disparity, confidence : ndarray, shape (...), float32
         The confidence is 0 where all candidates are rejected.
     """
-    last = len(disparities) - 1
-    label = np.argmin(costs, axis=0)
-    below, here, above = (
-        np.take_along_axis(costs, np.clip(label + step, 0, last)[None], axis=0)[0] for step in (-1, 0, 1)
-    )
-    inner = (label > 0) & (label < last) & np.isfinite(below) & np.isfinite(above)
-    below, nearest, above = (np.where(inner, values, 0).astype(np.float64) for values in (below, here, above))
-    curvature = below - 2 * nearest + above
-    offset = np.where(curvature > 0, (below - above) / (2 * np.where(curvature > 0, curvature, 1)), 0)
-    step = disparities[1] - disparities[0]
-    kept = np.isfinite(costs)
+    kept, least = np.isfinite(costs), costs.min(axis=0)
     mean = np.sum(costs, axis=0, where=kept) / np.maximum(1, np.sum(kept, axis=0))
-    certain = np.isfinite(here) & (mean > 0)
-    confidence = np.where(certain, 1 - np.where(certain, here, 0) / np.where(certain, mean, 1), 0)
-    disparity = np.asarray(disparities[label] + step * offset, np.float32)
+    certain = np.isfinite(least) & (mean > 0)
+    confidence = np.where(certain, 1 - np.where(certain, least, 0) / np.where(certain, mean, 1), 0)
+    disparity = between_candidates(disparities, costs, np.argmin(costs, axis=0))
     return disparity, np.clip(confidence, 0, 1).astype(np.float32)
 
 
 def split_costs(
-    light_field: LightField, disparities: FloatMap, edges: Edges, tolerance: float, progress: Progress
+    light_field: LightField, disparities: FloatMap, places: IntArray, tolerance: float, progress: Progress
 ) -> tuple[FloatMap, FloatMap]:
     """Costs of the better halves of split angular patches.
 
@@ -244,8 +210,8 @@ def split_costs(
     ----------
     light_field : LightField
     disparities : ndarray, shape (K,), float32
-    edges : Edges
-        With P pixels.
+    places : ndarray, shape (P, 3), int64
+        Of :func:`places_to_split`.
     tolerance : float
         Tolerance of the test for swapped colours of the halves.
     progress : callable
@@ -257,17 +223,15 @@ def split_costs(
     cues : ndarray, shape (P, 3), float32
         At the least cost: variances of the two halves, and the difference of their means; 0 where none is finite.
     """
-    views, reference = ShearedViews(light_field), _channels_first(light_field.reference_view)
-    beside = colours_beside(light_field.reference_view, edges, max(1, round(light_field.reach)))
+    views = ShearedViews(light_field)
+    beside = colours_beside(light_field.reference_view, places, max(1, round(light_field.reach)))
     halves = halves_of_views(views.baselines)
-    costs = np.empty((len(disparities), len(edges.places)), np.float32)
-    cues = np.zeros((len(edges.places), 3), np.float32)
-    least = np.full(len(edges.places), np.inf, np.float32)
-    for k, sheared in views.over(disparities):
-        costs[k], of_candidate = split_patch_costs(sheared, reference, edges, halves, beside, tolerance)
+    costs = np.empty((len(disparities), len(places)), np.float32)
+    cues, least = np.zeros((len(places), 3), np.float32), np.full(len(places), np.inf, np.float32)
+    for k, sheared in views.over(disparities, progress):
+        costs[k], found = split_patch_costs(sheared, sheared[views.reference], places, halves, beside, tolerance)
         better = costs[k] < least
-        least[better], cues[better] = costs[k][better], of_candidate[better]
-        progress((k + 1) / len(disparities))
+        least[better], cues[better] = costs[k][better], found[better]
     return costs, cues
 
 
@@ -285,23 +249,17 @@ def whole_patch_costs(sheared: FloatMap, reference: FloatMap) -> FloatMap:
 
 
 def split_patch_costs(
-    sheared: FloatMap, reference: FloatMap, edges: Edges, halves: BoolMap, beside: FloatMap, tolerance: float
+    sheared: FloatMap, reference: FloatMap, places: IntArray, halves: BoolMap, beside: FloatMap, tolerance: float
 ) -> tuple[FloatMap, FloatMap]:
     """Costs (P,) and cues (P, 3) as of :func:`split_costs`, for one candidate's sheared views (N, 3, H, W)."""
-    count = len(edges.places)
+    count = len(places)
     means, variances = np.empty((count, 2, 3), np.float32), np.empty((count, 2), np.float32)
-    kernels.moments_of_halves(sheared, reference, edges.places, halves, means, variances)
-    colours = means + reference[:, edges.places[:, 0], edges.places[:, 1]].T[:, None]
+    kernels.moments_of_halves(sheared, reference, places, halves, means, variances)
+    colours = means + reference[:, places[:, 0], places[:, 1]].T[:, None]
     as_they_are, changed = (np.abs(sides - beside).mean(axis=2).sum(axis=1) for sides in (colours, colours[:, ::-1]))
     costs = np.where(variances[:, 0] <= variances[:, 1], *(variances + np.square(means).mean(axis=2)).T)
     apart = np.abs(means[:, 0] - means[:, 1]).mean(axis=1)
     return np.where(as_they_are <= changed + tolerance, costs, np.inf), np.column_stack([variances, apart])
-
-
-def slope(disparity: FloatMap) -> FloatMap:
-    """Gradient magnitude of a disparity map without isolated outliers, per pixel; shape (H, W), float32."""
-    down, across = np.gradient(cv2.medianBlur(disparity, 3))
-    return np.asarray(np.hypot(down, across), np.float32)
 
 
 def predicted_occlusion(slopes: FloatMap, cues: FloatMap) -> FloatMap:
@@ -319,9 +277,8 @@ def predicted_occlusion(slopes: FloatMap, cues: FloatMap) -> FloatMap:
     ndarray, shape (P,), float32
         Not negative.
     """
-    one, other = cues[:, 0] + _LEAST_VARIANCE, cues[:, 1] + _LEAST_VARIANCE
-    ratio = np.maximum(one, other) / np.minimum(one, other)
-    return _above_mean(slopes) * _above_mean(ratio) * _above_mean(cues[:, 2])
+    variances = cues[:, :2] + _LEAST_VARIANCE
+    return _above_mean(slopes) * _above_mean(variances.max(axis=1) / variances.min(axis=1)) * _above_mean(cues[:, 2])
 
 
 def data_costs(before: StageMaps, labels: FloatMap) -> CostVolume:
@@ -335,32 +292,11 @@ def data_costs(before: StageMaps, labels: FloatMap) -> CostVolume:
     return CostVolume(labels, costs)
 
 
-def smoothness_weights(
-    view: FloatMap, predicted: FloatMap, parameters: OccFieldParameters
-) -> tuple[FloatMap, FloatMap]:
-    """Weights of jumps to the next pixel in the row and in the column; (H, W), float32, 0 at the last ones."""
-    across, down = (np.zeros(predicted.shape, np.float32) for _ in range(2))
-    for axis, weights in ((0, down[:-1]), (1, across[:, :-1])):
-        colours = np.abs(np.diff(view, axis=axis)).mean(axis=2)
-        occlusions = np.abs(np.diff(predicted, axis=axis))
-        difference = colours + np.float32(parameters.occlusion_weight) * occlusions
-        weights[:] = parameters.smoothness * parameters.contrast / (difference + parameters.contrast)
-    return across, down
-
-
 def _above_mean(cue: FloatMap) -> FloatMap:
     """Standard deviations by which a saturated cue exceeds its mean; not negative."""
-    if not cue.size:
-        return cue
     saturated = np.minimum(cue, np.percentile(cue, SATURATION))
-    deviation = float(saturated.std())
-    if deviation <= 0:
-        return np.zeros_like(cue)
-    return np.asarray(np.maximum(0, (saturated - saturated.mean()) / deviation), np.float32)
-
-
-def _channels_first(view: FloatMap) -> FloatMap:
-    return np.ascontiguousarray(view.transpose(2, 0, 1))
+    # equal cues do not exceed it
+    return np.asarray(np.maximum(0, (saturated - saturated.mean()) / (float(saturated.std()) or np.inf)), np.float32)
 
 
 CHOICES = {
@@ -380,34 +316,26 @@ ON_THE_LINE = 1 / 8
 """Distance within which a view counts as on the dividing line, as a fraction of the farthest view's distance."""
 
 
-class Edges(NamedTuple):
-    """Pixels whose angular patches are split.
+def places_to_split(reference_view: FloatMap, parameters: CannyParameters, reach: float) -> IntArray:
+    """Pixels within ``reach`` pixels of a Canny edge, whose angular patches are split along the nearest one.
 
-    Attributes
-    ----------
-    near : ndarray, shape (H, W), bool
-    places : ndarray, shape (P, 3), int64
+    Returns
+    -------
+    ndarray, shape (P, 3), int64
         Row, column and index of the orientation; the edge's normal has the angle ``index pi / ORIENTATIONS`` from
         ``+x`` towards ``+y``.
     """
-
-    near: BoolMap
-    places: npt.NDArray[np.int64]
-
-
-def edges_to_split(reference_view: FloatMap, parameters: CannyParameters, reach: float) -> Edges:
-    """Pixels within ``reach`` pixels of a Canny edge, each with the orientation of the nearest one."""
     lines = canny_edges(reference_view, parameters)
     turns = np.round(edge_angle(reference_view, parameters) * (ORIENTATIONS / np.pi)).astype(np.int64) % ORIENTATIONS
     if not lines.any():
-        return Edges(lines, np.empty((0, 3), np.int64))
+        return np.empty((0, 3), np.int64)
     distance, nearest = cv2.distanceTransformWithLabels(
         (~lines).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
     turn_of = np.zeros(int(nearest.max()) + 1, np.int64)
     turn_of[nearest[lines]] = turns[lines]
     near = np.asarray(distance <= reach)
-    return Edges(near, np.column_stack([np.argwhere(near), turn_of[nearest[near]]]))
+    return np.column_stack([np.argwhere(near), turn_of[nearest[near]]])
 
 
 def halves_of_views(baselines: npt.NDArray[np.float64]) -> BoolMap:
@@ -431,21 +359,20 @@ def halves_of_views(baselines: npt.NDArray[np.float64]) -> BoolMap:
     return halves
 
 
-def colours_beside(reference_view: FloatMap, edges: Edges, radius: int) -> FloatMap:
+def colours_beside(reference_view: FloatMap, places: IntArray, radius: int) -> FloatMap:
     """Mean colours of the two sides of the edge in a window around each pixel; shape (P, 2, 3), float32.
 
     The edge's normal points to the second side.
     """
     y, x = np.mgrid[-radius : radius + 1, -radius : radius + 1]
-    colours = np.zeros((len(edges.places), 2, 3), np.float32)
+    colours = np.zeros((len(places), 2, 3), np.float32)
     for number, (down, across) in enumerate(_normals()):
-        chosen = edges.places[:, 2] == number
-        rows, columns = edges.places[chosen, 0], edges.places[chosen, 1]
+        chosen = places[:, 2] == number
         along = y * down + x * across
         for side, window in enumerate((along < -0.5, along > 0.5)):
             weights = window.astype(np.float32) / np.float32(window.sum())
             means = cv2.filter2D(reference_view, cv2.CV_32F, weights, borderType=cv2.BORDER_REPLICATE)
-            colours[chosen, side] = means[rows, columns]
+            colours[chosen, side] = means[tuple(places[chosen, :2].T)]
     return colours
 
 

@@ -36,6 +36,7 @@ import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from sepi.errors import SepiError
+from sepi.extensions.methods.costs import GREY, Previous
 from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.view_subsets import grid_steps
@@ -48,20 +49,14 @@ VIEWS = ("all", "row", "column", "diagonal", "antidiagonal", "each")
 """Words for the views of an input."""
 
 _AXES = "t s y x c"
-# of ITU-R BT.601
-_GREY = np.array([0.299, 0.587, 0.114], np.float32)
 
 
 class OnnxParameters(Parameters):
     """The network's file, inputs and outputs."""
 
     model: str | None = Field(None, description="path of the ONNX file; it must be given")
-    inputs: tuple[str, ...] = Field(
-        ("all: 1 (t s c) y x",), min_length=1, description="'VIEWS: AXES' of each input (docs/reproduce/compared.md)"
-    )
-    grid: tuple[int, int] | None = Field(
-        None, description="rows and columns of views round the reference view that the network takes; null: all"
-    )
+    inputs: tuple[str, ...] = Field(("all: 1 (t s c) y x",), min_length=1, description="'VIEWS: AXES' of each input")
+    grid: tuple[int, int] | None = Field(None, description="rows, columns of views round the reference view; null: all")
     reversed: tuple[Literal["t", "s"], ...] = Field((), description="axes of views that the network takes reversed")
     grey: bool = Field(False, description="whether the network takes one channel, brightness")
     scale: float = Field(1.0, description="factor of the input colours, which are 0..1")
@@ -89,9 +84,7 @@ class OnnxParameters(Parameters):
         return () if self.model is None else (self.model,)
 
 
-def onnx(
-    light_field: LightField, previous: StageMaps | None, parameters: OnnxParameters, progress: Progress
-) -> StageMaps:
+def onnx(light_field: LightField, previous: Previous, parameters: OnnxParameters, progress: Progress) -> StageMaps:
     """Depth by a network.
 
     Returns
@@ -162,22 +155,19 @@ def _chosen_views(light_field: LightField, parameters: OnnxParameters) -> tuple[
         raise SepiError(f"{light_field.name}: the network needs all views of its grid, but some are missing")
     views = as_unit_float(light_field.rgb_views[part])
     if parameters.grey:
-        views = (views @ _GREY)[..., None]
+        views = (views @ GREY)[..., None]
     views = views * np.float32(parameters.scale) + np.float32(parameters.offset)
-    reference = [t - top, s - left]
-    for axis, (name, count) in enumerate((("t", rows), ("s", columns))):
-        if name in parameters.reversed:
-            views = np.flip(views, axis)
-            reference[axis] = count - 1 - reference[axis]
-    return views, (reference[0], reference[1])
+    t, s = t - top, s - left
+    if "t" in parameters.reversed:
+        views, t = views[::-1], rows - 1 - t
+    if "s" in parameters.reversed:
+        views, s = views[:, ::-1], columns - 1 - s
+    return views, (t, s)
 
 
 def _spans(length: int, parameters: OnnxParameters) -> Iterator[tuple[npt.NDArray[np.intp], slice, slice]]:
     """Tiles along one axis: indices of the views' pixels, the part of the output that is kept, and its position."""
-    margin, tile, overlap = parameters.margin, parameters.tile, parameters.overlap
-    if tile is None:
-        yield np.clip(np.arange(-margin, length + margin), 0, length - 1), np.s_[:length], np.s_[:length]
-        return
+    margin, tile, overlap = parameters.margin, parameters.tile or length, parameters.overlap if parameters.tile else 0
     core = tile - 2 * overlap
     for begin in range(0, length, core):
         end = min(begin + core, length)
@@ -230,8 +220,7 @@ def _arrays(views: FloatMap, reference: tuple[int, int], inputs: tuple[str, ...]
     found: list[FloatMap] = []
     for text in inputs:
         which, _, axes = text.partition(":")
-        named = set(re.findall("[tsyxc]", axes))
-        left = " ".join(axis if axis in named else "1" for axis in _AXES.split())
+        left = " ".join(axis if axis in axes else "1" for axis in _AXES.split())
         for selected in _selected(views, reference, which.strip()):
             try:
                 found.append(rearrange(selected, f"{left} -> {axes.strip()}"))
@@ -244,14 +233,13 @@ def _arrays(views: FloatMap, reference: tuple[int, int], inputs: tuple[str, ...]
 def _selected(views: FloatMap, reference: tuple[int, int], which: str) -> list[FloatMap]:
     """The views of an input, or of one input per view for ``each``; each (t, s, y, x, c)."""
     (rows, columns), (t, s) = views.shape[:2], reference
-    if which in ("diagonal", "antidiagonal"):
-        if rows != columns:
-            raise SepiError(f"initial.onnx.inputs: {rows}x{columns} views have no diagonal")
-        order = np.arange(rows)
-        return [views[order, order if which == "diagonal" else order[::-1]][:, None]]
     if which == "each":
         return [views[i : i + 1, k : k + 1] for i in range(rows) for k in range(columns)]
-    return [{"all": views, "row": views[t : t + 1], "column": views[:, s : s + 1]}[which]]
+    if "diagonal" not in which:
+        return [{"all": views, "row": views[t : t + 1], "column": views[:, s : s + 1]}[which]]
+    if rows != columns:
+        raise SepiError(f"initial.onnx.inputs: {rows}x{columns} views have no diagonal")
+    return [views[range(rows), range(rows)[:: 1 if which == "diagonal" else -1]][:, None]]
 
 
 CHOICES = {"initial": {"onnx": Choice(OnnxParameters, onnx)}}

@@ -46,22 +46,19 @@ References
 from __future__ import annotations
 
 import math
-from typing import ClassVar
 
 import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.costs import GuidedFilter, colour_differences, maps_of
+from sepi.extensions.methods.costs import GuidedFilter, colour_differences, filtered, maps_of
 from sepi.image.noise import noise_level
 from sepi.image.superpixels import Superpixels, superpixels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
 from sepi.regularization.wls import solve
-from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, relative_confidence, require_previous
-
-CANDIDATES = CandidateRule(usual=101, finest=0.02, coarsest=0.5)
+from sepi.stage import Choice, Needs, Parameters, Progress, StageMaps, relative_confidence, require_previous
 
 COMPACTNESS = 10.0
 """Compactness of the superpixels; the usual value for SLIC."""
@@ -85,19 +82,13 @@ RTOL = 1e-9
 class PobrCostParameters(CandidateParameters):
     """Parameters of the photo-consistency."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=1.5
-    )
+    rule = CandidateRule(usual=101, finest=0.02, coarsest=0.5)
+    needs = Needs(bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=1.5)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
-    truncation: float = Field(
-        0.1, gt=0, le=1, description="t, colour difference beyond which the cost no longer grows, colours in 0..1"
-    )
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
+    truncation: float = Field(0.1, gt=0, le=1, description="t, largest difference of colours, 0..1, that counts")
     radius: int = Field(2, ge=1, le=20, description="window of the guided filter of the costs, 2 r + 1 pixels")
-    epsilon: float = Field(
-        1e-4, gt=0, description="variance of colour above which the filter keeps edges, colours in 0..1"
-    )
+    epsilon: float = Field(1e-4, gt=0, description="variance of colours, 0..1, above which filtered edges stay")
 
 
 class PobrRegionParameters(Parameters):
@@ -105,21 +96,15 @@ class PobrRegionParameters(Parameters):
 
     superpixels: int = Field(2000, ge=1, description="number of superpixels")
     tau_0: float = Field(1000.0, ge=0, description="how sharply the label confidence falls beyond tau_1")
-    tau_1: float = Field(
-        0.2, ge=0, description="deviation of a superpixel's labels at which confidence falls, pixels per view step"
-    )
+    tau_1: float = Field(0.2, ge=0, description="deviation of a superpixel's labels at which confidence falls, px/step")
     least_share: float = Field(0.03, gt=0, le=1, description="q, least factor of the label confidence")
 
 
 class PobrSmoothingParameters(Parameters):
     """Parameters of the weighted least squares."""
 
-    alpha: float = Field(
-        3e-6, ge=0, description="weight of smoothness against data; for gradients of values 0..1 per px"
-    )
-    gradient_floor: float = Field(
-        0.002, gt=0, description="f, gradient below which smoothness no longer grows, 0..1 per px; noise adds to it"
-    )
+    alpha: float = Field(3e-6, ge=0, description="weight of smoothness against data, for gradients of 0..1 per px")
+    gradient_floor: float = Field(0.002, gt=0, description="f, gradient below which smoothness no longer grows, per px")
     tau_2: float = Field(1.5, ge=0, description="how strongly label confidence weakens smoothness")
 
 
@@ -136,11 +121,8 @@ def pobr_cost(
     disparities = parameters.candidates(light_field)
     views = ShearedViews(light_field)
     smooth = GuidedFilter(light_field.reference_view, parameters.radius, parameters.epsilon)
-    costs = np.empty((len(disparities), *light_field.shape), np.float16)
-    for k, sheared in views.over(disparities):
-        costs[k] = smooth(photo_consistency(sheared, views.reference, parameters.truncation))
-        progress((k + 1) / len(disparities))
-    return maps_of(CostVolume(disparities, costs)).without_costs()
+    costs = (photo_consistency(one, views.reference, parameters.truncation) for _, one in views.over(disparities))
+    return maps_of(filtered(smooth, disparities, costs, progress)).without_costs()
 
 
 def photo_consistency(sheared: FloatMap, reference: int, truncation: float) -> FloatMap:
@@ -164,22 +146,18 @@ def pobr_regions(
     """
     before = require_previous(previous)
     image = light_field.reference_view
-    segments = superpixels(
-        image, max(LEAST_SIZE, round(math.sqrt(image[..., 0].size / parameters.superpixels))), COMPACTNESS
-    )
-    deviation = label_deviation(before.disparity, segments)
+    size = max(LEAST_SIZE, round(math.sqrt(image[..., 0].size / parameters.superpixels)))
+    segments = superpixels(image, size, COMPACTNESS)
+    # standard deviation of the labels over each pixel's superpixel
+    residual = before.disparity - segments.means(before.disparity)[segments.labels]
+    deviation = np.sqrt(segments.means(residual**2))[segments.labels].astype(np.float32)
     regions = deviation > parameters.tau_1
     cut = np.exp(-np.minimum(parameters.tau_0 * np.maximum(deviation - parameters.tau_1, 0), 80))
-    confidence = relative_confidence(before.confidence) * np.maximum(cut, parameters.least_share)
+    confidence = (relative_confidence(before.confidence) * np.maximum(cut, parameters.least_share)).astype(np.float32)
     texture = squared_gradient(image)
-    edges = np.where(regions, squared_steps(image, segments) + TEXTURE_SHARE * texture, texture)
+    edges = np.where(regions, squared_steps(image, segments) + TEXTURE_SHARE * texture, texture).astype(np.float32)
     progress(1.0)
-    return before.updated(
-        before.disparity,
-        confidence.astype(np.float32),
-        occluded=regions,
-        edge_strength=edges.astype(np.float32),
-    )
+    return before.updated(before.disparity, confidence, occluded=regions, edge_strength=edges)
 
 
 def pobr_smoothing(
@@ -195,21 +173,15 @@ def pobr_smoothing(
     """
     before = require_previous(previous)
     image = light_field.reference_view
-    known = "edge_strength" in before.extra
-    edges = before.extra["edge_strength"] if known else squared_gradient(image)
-    confidence = before.confidence if known else relative_confidence(before.confidence)
+    edges, confidence = before.extra.get("edge_strength"), before.confidence
+    if edges is None:
+        edges, confidence = squared_gradient(image), relative_confidence(confidence)
     floor = parameters.gradient_floor**2 + NOISE_GAIN * noise_level(image) ** 2
     smoothness = (np.exp(-parameters.tau_2 * confidence) / (edges + floor)).astype(np.float32)
     weight = np.maximum(confidence, np.float32(LEAST_CONFIDENCE)) ** 2
     progress(0.1)
     disparity = solve(before.disparity, weight, smoothness, parameters.alpha, RTOL)
     return before.updated(disparity, confidence).without_costs()
-
-
-def label_deviation(disparity: FloatMap, segments: Superpixels) -> FloatMap:
-    """Standard deviation of the disparity over each pixel's superpixel; shape (H, W), float32, pixels per view step."""
-    residual = disparity - segments.means(disparity)[segments.labels]
-    return np.asarray(np.sqrt(segments.means(residual**2))[segments.labels], np.float32)
 
 
 def squared_gradient(image: FloatMap) -> FloatMap:

@@ -43,19 +43,15 @@ References
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from pydantic import Field
 
-from sepi.extensions.methods.costs import disparity_of, least_costs
+from sepi.extensions.methods.costs import Previous, disparity_of, least_costs
 from sepi.kernels import spo as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, relative_confidence
-
-CANDIDATES = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=2**29)
 
 _HALF_WIDTH = 3.0
 """Half width of the parallelogram in scales."""
@@ -67,24 +63,18 @@ _ROUNDING = 1e-4
 class SpoParameters(CandidateParameters):
     """Parameters of the spinning parallelogram operator."""
 
-    rule: ClassVar[CandidateRule] = CANDIDATES
-    needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=9, bytes_per_pixel=2400, bytes_per_candidate=8, seconds_per_megasample=1.5
-    )
+    rule = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=2**29)
+    needs = Needs(bytes_per_sample=9, bytes_per_pixel=2400, bytes_per_candidate=8, seconds_per_megasample=1.5)
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
-    scale: float = Field(
-        0.8, ge=0.35, le=10, description="sigma of the Gaussian whose derivative weights the sides of a line, pixels"
-    )
+    num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
+    scale: float = Field(0.8, ge=0.35, le=10, description="sigma of a line's sides, derivatives of Gaussians; pixels")
     bins: int = Field(64, ge=2, le=256, description="bins of a histogram, for each channel")
     peak: float = Field(
-        0.26, ge=0.05, le=10, description="mean distance at which a direction's weight falls, as a share of the largest"
+        0.26, ge=0.05, le=10, description="mean by largest distance at which a direction's weight falls"
     )
 
 
-def spo(
-    light_field: LightField, previous: StageMaps | None, parameters: SpoParameters, progress: Progress
-) -> StageMaps:
+def spo(light_field: LightField, previous: Previous, parameters: SpoParameters, progress: Progress) -> StageMaps:
     """Candidates whose lines have the largest difference between their sides.
 
     Returns
@@ -106,19 +96,21 @@ def spo(
         distances *= weight
         merged += distances
         confidence = np.maximum(confidence, weight)
-    volume = _costs(disparities, merged)
+    # each pixel's best candidate costs 0, near which half precision is finest; the following filter is linear
+    best = merged.max(axis=0)
+    np.subtract(best, merged, out=merged)
+    merged /= max(float(best.max()), _ROUNDING)
+    volume = CostVolume(disparities, merged.astype(np.float16))
     return StageMaps(disparity_of(volume, least_costs(volume)), relative_confidence(confidence), cost_volume=volume)
 
 
 def views_of_directions(light_field: LightField) -> list[tuple[BoolMap, bool]]:
     """Views ``(T, S)`` whose EPIs are used, and whether the EPIs are vertical, for each direction."""
-    t, s = light_field.reference_position
+    present, (t, s) = light_field.present, light_field.reference_position
     row, column = np.zeros((2, *light_field.grid), bool)
-    row[t], column[:, s] = True, True
-    found = [(views & light_field.present, down) for views, down in ((row, False), (column, True))]
-    return [(views, down) for views, down in found if views.sum() > 1] or [
-        (light_field.present, down) for down in (False, True)
-    ]
+    row[t], column[:, s] = present[t], present[:, s]
+    found = [(views, down) for views, down in ((row, False), (column, True)) if views.sum() > 1]
+    return found or [(present, False), (present, True)]
 
 
 def side_distances(
@@ -152,13 +144,12 @@ def side_distances(
     shares = column_weights(parameters.scale) / np.float32(len(sheared_views.positions))
     found = np.empty((len(disparities), *light_field.shape), np.float32)
     turned = np.empty(light_field.shape[::-1], np.float32)
-    for k, sheared in sheared_views.over(disparities):
+    for k, sheared in sheared_views.over(disparities, progress):
         if down:
             kernels.half_distances(np.ascontiguousarray(sheared.swapaxes(2, 3)), shares, parameters.bins, turned)
             found[k] = turned.T
         else:
             kernels.half_distances(sheared, shares, parameters.bins, found[k])
-        progress((k + 1) / len(disparities))
     return found
 
 
@@ -175,18 +166,6 @@ def peak_weight(distances: FloatMap, peak: float) -> FloatMap:
     flat = largest <= _ROUNDING
     ratio = np.where(flat, 1, mean / np.where(flat, 1, largest))
     return np.asarray(np.exp(-ratio / (2 * peak**2)), np.float32)
-
-
-def _costs(disparities: FloatMap, merged: FloatMap) -> CostVolume:
-    """Convert distances ``(K, H, W)`` to costs, in place.
-
-    Each pixel's best candidate has the cost 0, near which half precision is finest. The offset is the same for all
-    candidates of a pixel and does not change the best one, since the following filter is linear.
-    """
-    best = merged.max(axis=0)
-    np.subtract(best, merged, out=merged)
-    merged /= max(float(best.max()), _ROUNDING)
-    return CostVolume(disparities, merged.astype(np.float16))
 
 
 CHOICES = {"initial": {"spo": Choice(SpoParameters, spo)}}

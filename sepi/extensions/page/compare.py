@@ -69,18 +69,13 @@ class Comparison:
         """Scores of each map by its name; empty without ground truth."""
         if self.ground_truth is None:
             return {}
-        masks = None if self.light_field is None else region_masks(self.light_field)
-        reach = None if self.light_field is None else self.light_field.reach
-        scores = [
-            score_regions(
-                values,
-                self.ground_truth,
-                masks,
-                bars=None if bars is None else ErrorBars.of(bars, reach, self.truth_step),
-            )
-            for values, bars in zip(self.maps, self.bars, strict=True)
-        ]
-        return dict(zip(self.names, scores, strict=True))
+        field = self.light_field
+        masks, reach = (None, None) if field is None else (region_masks(field), field.reach)
+        scores = {}
+        for name, values, maps in zip(self.names, self.maps, self.bars, strict=True):
+            bars = None if maps is None else ErrorBars.of(maps, reach, self.truth_step)
+            scores[name] = score_regions(values, self.ground_truth, masks, bars=bars)
+        return scores
 
 
 def comparison_page(found: Comparison) -> str:
@@ -93,18 +88,15 @@ def comparison_page(found: Comparison) -> str:
         **viewer_json(list(_panels(found)), _limits(found), found.light_field),
         "probes": [],
     }
-    return (
-        environment()
-        .get_template("compare.html.j2")
-        .render(
-            title=f"{found.names[0]} beside {found.names[1]}",
-            names=found.names,
-            section=_score_section(found),
-            scenes=embedded_scenes([scene]),
-            first=scene,
-            scales=colour_scales(),
-            scripts=[name for name in SCRIPTS if name != "pixel.js"],
-        )
+    template = environment().get_template("compare.html.j2")
+    return template.render(
+        title=f"{found.names[0]} beside {found.names[1]}",
+        names=found.names,
+        section=_score_section(found),
+        scenes=embedded_scenes([scene]),
+        first=scene,
+        scales=colour_scales(),
+        scripts=[name for name in SCRIPTS if name != "pixel.js"],
     )
 
 
@@ -124,17 +116,8 @@ def _panels(found: Comparison) -> Iterator[Panel]:
     if ground_truth is not None:
         for key, name, values in zip("ab", found.names, maps, strict=True):
             yield Panel(f"{key}/error", f"{name}: error", "Errors", "error", values, minus=ground_truth)
-        title = f"{a} beside {b}: which is more accurate"
-        yield Panel(
-            "change",
-            title,
-            "Errors",
-            "change",
-            maps[1],
-            minus=maps[0],
-            ground_truth=ground_truth,
-            ends=("less accurate", "more accurate"),
-        )
+        title, ends = f"{a} beside {b}: which is more accurate", ("less accurate", "more accurate")
+        yield Panel("change", title, "Errors", "change", maps[1], minus=maps[0], ground_truth=ground_truth, ends=ends)
 
 
 def _limits(found: Comparison) -> tuple[float, float]:

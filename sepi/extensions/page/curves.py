@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.image.noise import residual_variance
@@ -21,7 +20,7 @@ from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.expected_costs import expected_costs
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.softening import softened
-from sepi.matching.sweep_arrays import sample_offsets, sampled_candidates
+from sepi.matching.sweep_arrays import sampled_candidates
 from sepi.matching.view_subsets import halves_and_quarters
 
 
@@ -134,39 +133,42 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     >>> round(disparity, 2), cost < 0.01
     (1.0, True)
     """
-    require_inside(light_field, y, x)
     (t0, s0), (H, W) = light_field.reference_position, light_field.shape
+    if not (0 <= y < H and 0 <= x < W):
+        raise SepiError(
+            f"{light_field.name}: pixel (y, x) = ({y}, {x}) lies outside the reference view; "
+            f"rows go from 0 to {H - 1}, columns from 0 to {W - 1}"
+        )
     disparities = parameters.candidates(light_field)
     noise = residual_variance(light_field.reference_view)
     r = parameters.window_radius
     rows = np.arange(max(0, y - r), min(H, y + r + 1))
     columns = np.arange(max(0, x - r), min(W, x + r + 1))
-    reference_view = as_unit_float(light_field.rgb_views[t0, s0][np.ix_(rows, columns)]).transpose(2, 0, 1)
-    difference = reference_view - reference_view[:, y - rows[0], x - columns[0], None, None]
-    weights = np.exp(-0.5 * (difference**2).sum(axis=0) / (parameters.window_sigma**2 + noise))
+    reference_view = as_unit_float(light_field.rgb_views[t0, s0][np.ix_(rows, columns)])
+    difference = reference_view - reference_view[y - rows[0], x - columns[0]]
+    weights = np.exp(-0.5 * (difference**2).sum(axis=2) / (parameters.window_sigma**2 + noise))
     weights = (weights / weights.sum()).astype(np.float32)
     scale2 = np.float32(parameters.scale**2 + noise)
     compared = softened(light_field, parameters.softening).rgb_views
-    reference_view = as_unit_float(compared[t0, s0][np.ix_(rows, columns)]).transpose(2, 0, 1)
-    views = halves_and_quarters(light_field)
+    reference_view = as_unit_float(compared[t0, s0][np.ix_(rows, columns)])
+    views, baselines = halves_and_quarters(light_field), light_field.baselines
     sums, counts = np.zeros((2, views.subsets.shape[1], len(disparities)), np.float32)
-    baselines = light_field.baselines
-    down, fy = sample_offsets(disparities, baselines[..., 0])
-    across, fx = sample_offsets(disparities, baselines[..., 1])
     for t, s in np.argwhere(light_field.present):
         if (t, s) == (t0, s0):
             continue
-        top, left = rows + down[t, s][:, None], columns + across[t, s][:, None]
-        # as in the sweep, a sample on the last row or column needs no pixel beyond
-        inside_y = (top >= 0) & ((top < H - 1) | ((top == H - 1) & (fy[t, s] == 0)[:, None]))
-        inside_x = (left >= 0) & ((left < W - 1) | ((left == W - 1) & (fx[t, s] == 0)[:, None]))
-        squared = _squared_residuals(compared[t, s], reference_view, top, left, fy[t, s], fx[t, s])
-        residual = squared / (squared + scale2)
-        if not (inside_y.all() and inside_x.all()):
-            residual *= inside_y[:, :, None] & inside_x[:, None]
+        v, u = baselines[t, s]
+        down, across = rows - disparities[:, None] * v, columns - disparities[:, None] * u
+        inside = ((down >= 0) & (down <= H - 1))[:, :, None] & ((across >= 0) & (across <= W - 1))[:, None]
+        # samples outside have any value
+        top, left = (np.clip(at.astype(np.int64), 0, n - 2) for at, n in ((down, H), (across, W)))
+        fy, fx = (down - top)[:, :, None, None], (across - left)[:, None, :, None]
+        corners = (compared[t, s][(top + i)[:, :, None], (left + j)[:, None]] for i in (0, 1) for j in (0, 1))
+        a, b, c, d = (as_unit_float(colours) for colours in corners)
+        sample = (1 - fy) * ((1 - fx) * a + fx * b) + fy * ((1 - fx) * c + fx * d)
+        squared = ((sample - reference_view) ** 2).sum(axis=3)
         group = views.groups[t, s]
-        sums[group] += np.einsum("kyx,yx->k", residual, weights)
-        counts[group] += ((inside_y @ weights) * inside_x).sum(axis=1)
+        sums[group] += np.einsum("kyx,yx->k", squared / (squared + scale2) * inside, weights)
+        counts[group] += np.einsum("kyx,yx->k", inside, weights)
     total, number = views.subsets.astype(np.float32) @ sums, views.subsets.astype(np.float32) @ counts
     costs = np.divide(total, number, out=np.ones_like(total), where=number > 0)
     sampled = sampled_candidates(disparities, baselines)
@@ -174,41 +176,3 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     expected = expected_costs(light_field, to_correct, sampled, views.groups, views.subsets, float(scale2), 1)
     costs = 1 - (1 - costs) / (1 - np.tensordot(expected.weights[:, y, x], expected.moments, 1))
     return Curves(disparities, views.names, costs)
-
-
-def require_inside(light_field: LightField, y: int, x: int) -> None:
-    """Raise :class:`sepi.errors.SepiError` unless the pixel lies in the reference view."""
-    H, W = light_field.shape
-    if not (0 <= y < H and 0 <= x < W):
-        raise SepiError(
-            f"{light_field.name}: pixel (y, x) = ({y}, {x}) lies outside the reference view; "
-            f"rows go from 0 to {H - 1}, columns from 0 to {W - 1}"
-        )
-
-
-def _squared_residuals(
-    view: npt.NDArray[np.generic],
-    reference_view: FloatMap,
-    top: npt.NDArray[np.int64],
-    left: npt.NDArray[np.int64],
-    fy: FloatMap,
-    fx: FloatMap,
-) -> FloatMap:
-    """Squared colour differences (K, h, w) of the window (C, h, w) to its bilinear samples in a view (H, W, C).
-
-    ``top (K, h)`` and ``left (K, w)`` are the samples' whole pixels, ``fy`` and ``fx (K,)`` their fractions. Samples
-    outside the view are taken at its border.
-    """
-    H, W, _ = view.shape
-    rows = np.clip(np.arange(top.min(), top.max() + 2), 0, H - 1)
-    columns = np.clip(np.arange(left.min(), left.max() + 2), 0, W - 1)
-    crop = as_unit_float(view[rows[:, None], columns]).transpose(2, 0, 1)
-    size = (reference_view.shape[1] + 1, reference_view.shape[2] + 1)
-    windows = np.lib.stride_tricks.sliding_window_view(crop, size, axis=(1, 2))
-    block = windows[:, top[:, 0] - top.min(), left[:, 0] - left.min()]
-    fy, fx = fy[:, None, None], fx[:, None, None]
-    above, below = block[:, :, :-1], block[:, :, 1:]
-    level = above + fy * (below - above)
-    sample = level[..., :-1] + fx * (level[..., 1:] - level[..., :-1])
-    sample -= reference_view[:, None]
-    return np.asarray(np.einsum("ckyx,ckyx->kyx", sample, sample), np.float32)

@@ -29,16 +29,9 @@ SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "table
 
 def environment() -> Environment:
     """Jinja2's environment for the page's templates; an undefined name is an error."""
-    made = Environment(
-        loader=PackageLoader("sepi.extensions.page"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    made.filters["embedded"] = embedded
-    made.filters["prose"] = prose
-    made.filters["breakable"] = breakable
+    loader = PackageLoader("sepi.extensions.page")
+    made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    made.filters |= {"embedded": embedded, "prose": prose, "breakable": breakable}
     return made
 
 
@@ -100,11 +93,8 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
 
 def missing_scenes(runs: Runs) -> dict[str, list[str]]:
     """Scenes of the paper that are not available, by dataset."""
-    found = {}
-    for dataset in published.DATASETS:
-        here = {published.paper_scene(dataset, scene) for scene in runs.plan.scenes.get(dataset, ())}
-        found[dataset] = [scene for scene in published.scenes(dataset) if scene not in here]
-    return found
+    here = {(dataset, published.paper_scene(dataset, scene)) for dataset, scene in runs.plan.pairs}
+    return {name: [one for one in published.scenes(name) if (name, one) not in here] for name in published.DATASETS}
 
 
 def total_seconds(*reports: Runs) -> float:
@@ -122,7 +112,7 @@ def parameter_rows(runs: Runs) -> list[tuple[str, list[tuple[str, Any]]]]:
     return [
         (
             f"{stage}: {choice}",
-            [(name, "by range and grid" if value is None else value) for name, value in values.items()],
+            [(key, "by range and grid" if given is None else given) for key, given in values.items()],
         )
         for stage, choices in runs.facts["parameters"].items()
         for choice, found in choices.items()
@@ -130,17 +120,7 @@ def parameter_rows(runs: Runs) -> list[tuple[str, list[tuple[str, Any]]]]:
     ]
 
 
-def first_scene(runs: Runs) -> str:
-    """The scene to show first: one of the paper's, else the last one, by the order of built-in scenes."""
-    known = [pair for pair in runs.plan.pairs if published.paper_scene(*pair) is not None]
-    return "/".join(known[0] if known else runs.plan.pairs[-1])
-
-
-def page_of(
-    runs: Runs,
-    scenes: Sequence[Mapping[str, Any]],
-    parts: Runs | None = None,
-) -> str:
+def page_of(runs: Runs, scenes: Sequence[Mapping[str, Any]], parts: Runs | None = None) -> str:
     """The page of a report.
 
     Parameters
@@ -159,32 +139,31 @@ def page_of(
     """
     # averages over rendered scenes and levels of noise mean nothing, and no published figures exist
     averaged = runs.plan.report != DATASET
-    first_title = first_scene(runs)
+    # to show first: one of the paper's, else the last one, by the order of built-in scenes
+    papers = [pair for pair in runs.plan.pairs if published.paper_scene(*pair) is not None]
+    first_title = "/".join((papers or runs.plan.pairs[-1:])[0])
     shown = [scene for scene in scenes if f"{scene['dataset']}/{scene['scene']}" == first_title] or scenes
     tables = {name: table(name, found) for found in (runs, parts) if found is not None for name in found.plan.tables}
-    return (
-        environment()
-        .get_template("index.html.j2")
-        .render(
-            title="sepi: light field depth by stitched epipolar plane images",
-            numbers=runs.facts,
-            report=runs.plan.report,
-            variants={**runs.plan.variants, **({} if parts is None else parts.plan.variants)},
-            tables=tables,
-            headline=headline(runs) if averaged else [],
-            missing=missing_scenes(runs) if averaged else {},
-            dataset_titles=published.DATASETS,
-            bars=charts.ablation_bars(runs) if averaged else [],
-            part_bars=[] if parts is None else charts.part_bars(parts),
-            times=charts.stage_times(runs),
-            total_seconds=total_seconds(*filter(None, (runs, parts))),
-            parameters=parameter_rows(runs),
-            scenes=embedded_scenes(scenes),
-            first=shown[0] if shown else None,
-            first_title=first_title,
-            scales=colour_scales(),
-            scripts=SCRIPTS,
-        )
+    template = environment().get_template("index.html.j2")
+    return template.render(
+        title="sepi: light field depth by stitched epipolar plane images",
+        numbers=runs.facts,
+        report=runs.plan.report,
+        variants={**runs.plan.variants, **({} if parts is None else parts.plan.variants)},
+        tables=tables,
+        headline=headline(runs) if averaged else [],
+        missing=missing_scenes(runs) if averaged else {},
+        dataset_titles=published.DATASETS,
+        bars=charts.ablation_bars(runs) if averaged else [],
+        part_bars=[] if parts is None else charts.part_bars(parts),
+        times=charts.stage_times(runs),
+        total_seconds=total_seconds(*filter(None, (runs, parts))),
+        parameters=parameter_rows(runs),
+        scenes=embedded_scenes(scenes),
+        first=shown[0] if shown else None,
+        first_title=first_title,
+        scales=colour_scales(),
+        scripts=SCRIPTS,
     )
 
 

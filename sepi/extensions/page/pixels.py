@@ -78,8 +78,6 @@ def interesting_pixels(
     free = _inner(light_field.shape)
     found: list[InterestingPixel] = []
     for label, score in scores:
-        if not free.any():
-            break
         # a score of zero means that there is no such pixel
         values = np.where(free, np.nan_to_num(score), 0)
         y, x = (int(place) for place in np.unravel_index(values.argmax(), values.shape))
@@ -92,13 +90,9 @@ def interesting_pixels(
 
 def _texture(reference_view: FloatMap) -> FloatMap:
     """Strength of the gradient around each pixel, full range per pixel; shape (H, W)."""
-    energy = np.zeros(reference_view.shape[:2], np.float32)
-    for channel in range(reference_view.shape[2]):
-        plane = np.ascontiguousarray(reference_view[:, :, channel])
-        for dx, dy in ((1, 0), (0, 1)):
-            # Scharr's weights sum to 32 per pixel of distance
-            energy += np.square(cv2.Scharr(plane, cv2.CV_32F, dx, dy) / 32)
-    return np.sqrt(_blurred(energy / reference_view.shape[2]))
+    # Scharr's weights sum to 32 per pixel of distance
+    across, down = (cv2.Scharr(reference_view, cv2.CV_32F, *order) / 32 for order in ((1, 0), (0, 1)))
+    return np.sqrt(_blurred((across**2 + down**2).mean(axis=2)))
 
 
 def _sure(texture: FloatMap, maps: StageMaps) -> FloatMap:
@@ -169,7 +163,5 @@ def _blurred(values: FloatMap) -> FloatMap:
 
 def _inner(shape: tuple[int, int]) -> BoolMap:
     """Mask of pixels away from the border; of a small picture, of its middle."""
-    inner: npt.NDArray[np.bool_] = np.zeros(shape, bool)
     y, x = (min(BORDER, (size - 1) // 2) for size in shape)
-    inner[y : shape[0] - y, x : shape[1] - x] = True
-    return inner
+    return np.pad(np.ones((shape[0] - 2 * y, shape[1] - 2 * x), bool), ((y, y), (x, x)))

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.extensions.page.curves import Curves, cost_curves, require_inside
+from sepi.extensions.page.curves import Curves, cost_curves
 from sepi.extensions.page.pixels import InterestingPixel, kept_subsets
 from sepi.lightfield import BoolMap, LightField
 from sepi.matching.plane_sweep import SweepParameters
@@ -132,9 +132,8 @@ def sepi_picture(light_field: LightField, y: int, x: int, disparity: float) -> S
     Raises
     ------
     SepiError
-        If the pixel lies outside the reference view or the disparity is not finite.
+        If the disparity is not finite.
     """
-    require_inside(light_field, y, x)
     if not math.isfinite(disparity):
         raise SepiError(f"{light_field.name}: a SEPI needs a finite disparity, got {disparity:g}")
     sepi = stitched_epi(light_field, y, disparity)
@@ -154,10 +153,9 @@ def sepi_picture(light_field: LightField, y: int, x: int, disparity: float) -> S
 def probe(
     light_field: LightField,
     pixel: InterestingPixel,
-    *,
     maps: StageMaps,
     parameters: SweepParameters,
-    best: StageMaps | None = None,
+    best: StageMaps | None,
 ) -> Probe:
     """The probe of one pixel.
 
@@ -171,7 +169,7 @@ def probe(
         Final maps of a variant whose occlusion stage is ``half_sepi`` or ``none``.
     parameters : SweepParameters
         Parameters of its initial or occlusion stage.
-    best : StageMaps, optional
+    best : StageMaps or None
         Final maps of the most accurate variant.
 
     Returns
@@ -185,8 +183,7 @@ def probe(
         finite there, or the subsets of the views are not those of the half-SEPI.
     """
     y, x, _ = pixel
-    curves = cost_curves(light_field, y, x, parameters)
-    views = halves_and_quarters(light_field)
+    curves, views = cost_curves(light_field, y, x, parameters), halves_and_quarters(light_field)
     number = int(kept_subsets(maps)[y, x])
     if maps.subset_names and maps.subset_names != views.names:
         raise SepiError(
@@ -195,6 +192,9 @@ def probe(
         )
     chosen = float(maps.disparity[y, x])
     ground_truth = None if light_field.ground_truth is None else _finite(light_field.ground_truth[y, x])
+    interval = None
+    if best is not None and best.low is not None and best.high is not None:
+        interval = float(best.low[y, x]), float(best.high[y, x])
     shown = {
         "minimum": curves.minimum()[0],
         "chosen": chosen,
@@ -208,16 +208,12 @@ def probe(
         kept_subset=views.names[number],
         kept=views.subsets[number][views.groups] & light_field.present,
         best=None if best is None else _finite(best.disparity[y, x]),
-        interval=None if best is None else _interval(best, y, x),
+        interval=interval,
         ground_truth=ground_truth,
         confidence=float(maps.confidence[y, x]),
         occluded=bool(maps.mask("occluded")[y, x]),
         textureless=bool(maps.mask("textureless")[y, x]),
-        pictures={
-            name: sepi_picture(light_field, y, x, disparity)
-            for name, disparity in shown.items()
-            if disparity is not None
-        },
+        pictures={name: sepi_picture(light_field, y, x, at) for name, at in shown.items() if at is not None},
     )
 
 
@@ -235,35 +231,23 @@ def to_json(found: Probe) -> dict[str, Any]:
     """
     curves, sources = found.curves, found.stretched
     costs = np.rint(65535 * np.clip(curves.costs.astype(np.float64), 0, 1)).astype("<u2")
+    packed = (base64.b64encode(cost.tobytes()).decode() for cost in costs)
     return {
         **found.pixel._asdict(),
         "range": [_short(curves.disparities[0]), _short(curves.disparities[-1])],
-        "costs": {
-            name: base64.b64encode(cost.tobytes()).decode() for name, cost in zip(curves.names, costs, strict=True)
-        },
-        "chosen": _short(found.chosen),
+        "costs": dict(zip(curves.names, packed, strict=True)),
         "minimum": _short(curves.minimum()[0]),
         "best_subset": curves.best_subset(),
-        "kept_subset": found.kept_subset,
+        **{name: _short(getattr(found, name)) for name in ("chosen", "best", "ground_truth", "confidence")},
+        **{name: getattr(found, name) for name in ("kept_subset", "occluded", "textureless")},
         "kept": "".join("01"[int(view)] for view in found.kept.ravel()),
-        "best": _short(found.best),
-        "interval": None if found.interval is None else [_short(end) for end in found.interval],
-        "ground_truth": _short(found.ground_truth),
-        "confidence": _short(found.confidence),
-        "occluded": found.occluded,
-        "textureless": found.textureless,
+        "interval": found.interval and [_short(end) for end in found.interval],
         "sepi": {
             name: {"disparity": _short(picture.disparity), "src": picture_uri(sources[name], "webp", _WEBP)}
             for name, picture in found.pictures.items()
         },
         "patch": picture_uri(found.patch, "png", _PNG),
     }
-
-
-def _interval(maps: StageMaps, y: int, x: int) -> tuple[float, float] | None:
-    if maps.low is None or maps.high is None:
-        return None
-    return float(maps.low[y, x]), float(maps.high[y, x])
 
 
 def _finite(value: float) -> float | None:

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from sepi.errors import SepiError
 from sepi.extensions.page.probe import Probe
 from sepi.report.drawing import new_figure, save
 from sepi.report.pictures import Picture
@@ -63,10 +62,8 @@ def write_probes(path: Path, probes: Sequence[Probe], view: Picture) -> None:
     Raises
     ------
     SepiError
-        If there is no probe, or a file cannot be written.
+        If a file cannot be written.
     """
-    if not probes:
-        raise SepiError(f"{path}: a figure of probes needs at least one")
     height = _HEAD + _ROW * len(probes) + _FOOT
     figure = new_figure(_WIDTH, height, layout=None)
     # one frame for all pictures, in inches, since many frames are slow
@@ -108,13 +105,8 @@ def _draw_pictures(sheet: Axes, found: Probe, view: Picture, bottom: float) -> N
 
 def _place(sheet: Axes, picture: Picture, left: float, bottom: float, width: float, height: float) -> None:
     # pixels stay visible unless there are more of them than dots
-    few = picture.shape[0] <= height * _DPI
-    sheet.imshow(
-        picture,
-        extent=(left, left + width, bottom, bottom + height),
-        aspect="auto",
-        interpolation="nearest" if few else "antialiased",
-    )
+    between = "nearest" if picture.shape[0] <= height * _DPI else "antialiased"
+    sheet.imshow(picture, extent=(left, left + width, bottom, bottom + height), aspect="auto", interpolation=between)
 
 
 def _write_below(sheet: Axes, x: float, bottom: float, text: str) -> None:

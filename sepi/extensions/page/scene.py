@@ -42,24 +42,11 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
     # as in the stages
     light_field = comparable(results.light_field)
     pixels = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
-    parameters = sweep_parameters(final_file)
-    return [
-        probe(
-            light_field,
-            pixel,
-            maps=maps,
-            parameters=parameters,
-            best=results.final(BEST_VARIANT) if BEST_VARIANT in results.maps else None,
-        )
-        for pixel in pixels
-        if np.isfinite(maps.disparity[pixel.y, pixel.x])
-    ]
-
-
-def sweep_parameters(final_file: Path) -> SweepParameters:
-    """Parameters of the sweep from which a final map of the paper's method was made."""
+    best = results.final(BEST_VARIANT) if BEST_VARIANT in results.maps else None
     known = history_of(final_file)[0]["parameters"]
-    return SweepParameters(**{name: known[name] for name in SweepParameters.model_fields if name in known})
+    parameters = SweepParameters(**{name: known[name] for name in SweepParameters.model_fields if name in known})
+    known_there = (pixel for pixel in pixels if np.isfinite(maps.disparity[pixel.y, pixel.x]))
+    return [probe(light_field, pixel, maps, parameters, best) for pixel in known_there]
 
 
 def write_scene(

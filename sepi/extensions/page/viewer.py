@@ -149,7 +149,7 @@ def viewer_json(
         "limits": list(limits),
         "error_limit": ERROR_LIMIT,
         "sigma_limits": list(SIGMA_LIMITS),
-        "camera": None if light_field is None else _camera(light_field),
+        "camera": light_field and _camera(light_field),
         "picture": "" if picture is None else picture_uri(picture, "webp", _WEBP),
         "panels": entries,
         "arrays": arrays.packed(max(_LEAST_PIXELS, height * width)),
@@ -158,9 +158,8 @@ def viewer_json(
 
 def _entry(panel: Panel, arrays: _Arrays) -> dict[str, Any]:
     """A panel with the numbers of its arrays, without empty fields."""
-    entry: dict[str, Any] = {"key": panel.key, "title": panel.title, "group": panel.group, "kind": panel.kind}
-    texts = {"note": panel.note, "ends": panel.ends, "no_interval": panel.no_interval}
-    entry |= {name: text for name, text in texts.items() if text}
+    entry: dict[str, Any] = {name: getattr(panel, name) for name in ("key", "title", "group", "kind")}
+    entry |= {name: text for name in ("note", "ends", "no_interval") if (text := getattr(panel, name))}
     role = {"mask": MASK, "outline": MASK, "confidence": CONFIDENCE, "sigma": LOGARITHM}.get(
         panel.kind, PRECISE if panel.precise else OTHER
     )
@@ -194,12 +193,7 @@ def _bars(panel: Panel) -> dict[str, tuple[npt.NDArray[Any], int]]:
 
 
 def _camera(light_field: LightField) -> dict[str, Any] | None:
-    camera = light_field.camera
+    camera, centre = light_field.camera, list(light_field.from_centre)
     if camera is None:
         return None
-    return {
-        "scale": camera.scale,
-        "offset": camera.offset,
-        "focal": camera.focal_px,
-        "from_centre": list(light_field.from_centre),
-    }
+    return {"scale": camera.scale, "offset": camera.offset, "focal": camera.focal_px, "from_centre": centre}

@@ -58,8 +58,7 @@ inline void draw_triangle(Point a, Point b, Point c, std::int32_t pixel, Array<f
 
 // Surfaces of a map in a view at v down and u across from the map's view: nearest disparity (H, W), EMPTY where there is
 // none, and number of the map's pixel, or -1. Surfaces that are stretched too much are left out.
-inline void carry(Array<const float, 2> disparity, Array<const float, 3> corners, double v, double u, Array<float, 2> nearest,
-           Array<std::int32_t, 2> origin) {
+inline void carry(Array<const float, 2> disparity, Array<const float, 3> corners, double v, double u, Array<float, 2> nearest, Array<std::int32_t, 2> origin) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     for (Index y = 0; y < H; ++y) {
         std::fill_n(nearest.at(y), W, EMPTY);

@@ -148,8 +148,7 @@ Float8 dot(const Four &a, const Four &b) { return a[0] * b[0] + a[1] * b[1] + a[
 // For each eight pixels of the rows first..last: begin their sums, add the samples of each view that sees one of them, and
 // write the result, at their row, column and number.
 template <class Sums, class Begin, class Add, class Write>
-void over_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index first, Index last, Begin begin,
-                Add add, Write write) {
+void over_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index first, Index last, Begin begin, Add add, Write write) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for(first, last, [&](Index y) {
         std::array<Sums, AT_ONCE / LANES> all;
@@ -180,8 +179,7 @@ void over_views(const SplineViews &views, const Seeing &seeing, Array<const floa
 }
 
 // Mean of the views that see each pixel, with less weight for views unlike the reference view, into out (H, W, 4).
-void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index begin, Index end, Array<float,
-                   3> out) {
+void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index begin, Index end, Array<float, 3> out) {
     struct Mean : Pixels {
         Four channels;           // times their weights
         Float8 colours, detail;  // weights

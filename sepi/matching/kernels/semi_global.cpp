@@ -102,7 +102,7 @@ struct Smoothing {
 float margin_of(const std::uint16_t *costs, Index begin, Index end, const float *disparities, float found, Index best, float same, bool beyond_is_one) {
     constexpr float NONE = 2 * ONE;
     Float8 own = spread(NONE), other = spread(beyond_is_one ? ONE : NONE);
-    Int8 before_best = Int8{0, 1, 2, 3, 4, 5, 6, 7} + std::int32_t(begin - best);
+    Int8 before_best = RISING + std::int32_t(begin - best);
     for (Index k = begin; k < end; k += LANES, before_best += LANES) {
         const Float8 cost = first_lanes(load(costs + k), end - k, NONE), beyond = load(disparities + k) - found;
         const Int8 is_own = (larger(beyond, -beyond) <= same) | (before_best == 0);

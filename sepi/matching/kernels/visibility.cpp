@@ -72,7 +72,6 @@ struct NearestInView {
 
     // Add a row of the reference view, eight pixels at a time, which on a smooth surface stay adjacent in the view.
     void add_row(const float *row, Index y) {
-        constexpr Int8 RISING{0, 1, 2, 3, 4, 5, 6, 7};
         for (Index begin = 0; begin < W; begin += LANES) {
             bool exactly = begin + LANES > W;
             // whole pixels of the first one's shift, and whether any pixel falls exactly on a position
@@ -262,9 +261,7 @@ struct VisibleRow {
                     // pixels beyond the last add 0
                     if (rest < LANES) seen = first_lanes(seen, rest, 0);
                     const auto residual = [&](Index channel) {
-                        Int8 above, under;
-                        std::memcpy(&above, pairs + channel * pitch, sizeof above);
-                        std::memcpy(&under, pairs + (4 + channel) * pitch, sizeof under);
+                        const Int8 above = load_as<Int8>(pairs + channel * pitch), under = load_as<Int8>(pairs + (4 + channel) * pitch);
                         const Int8 sample = dot_of_pairs(above, upper) + dot_of_pairs(under, lower);
                         return __builtin_convertvector(sample, Float8) - load(reference + channel * pitch);
                     };
@@ -273,9 +270,7 @@ struct VisibleRow {
                     if (*is_bent) {
                         // no mismatch that interpolation explains
                         const auto unexplained = [&](Float8 off, Index channel) {
-                            Int8 both;
-                            std::memcpy(&both, bend + channel * pitch, sizeof both);
-                            const Float8 most = __builtin_convertvector(dot_of_pairs(both, bows), Float8);
+                            const Float8 most = __builtin_convertvector(dot_of_pairs(load_as<Int8>(bend + channel * pitch), bows), Float8);
                             return off - smaller(larger(off, smaller(most, Float8{})), larger(most, Float8{}));
                         };
                         red = unexplained(red, 0), green = unexplained(green, 1), blue = unexplained(blue, 2);
@@ -302,8 +297,7 @@ struct VisibleRow {
 
 // Disparity map of the reference view as each view sees it, rows low..high: the nearest of the pixels that touch a
 // position; out (T, S, high - low, W).
-void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, Strided<const double, 3> baselines, Index low, Index high,
-               Array<float, 4> out) {
+void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, Strided<const double, 3> baselines, Index low, Index high, Array<float, 4> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const auto [least, most] = std::minmax_element(disparity.data, disparity.data + H * W);
     over_stretches(present.shape, 1, 1, [&, least = double(*least), most = double(*most)](Index t, Index s, Index, Index) {

@@ -21,8 +21,7 @@ void add_normal_equations(Array<const std::int64_t, 1> labels, Array<const doubl
 }
 
 // Disparity of every pixel on its superpixel's plane, out (H W); planes (N, 3).
-void values_of_planes(Array<const std::int64_t, 1> labels, Array<const double, 2> design, Array<const double, 2> planes, Array<float,
-                      1> out) {
+void values_of_planes(Array<const std::int64_t, 1> labels, Array<const double, 2> design, Array<const double, 2> planes, Array<float, 1> out) {
     parallel_for_blocks(0, labels.shape[0], 4096, [&](Index i) {
         const double *own = design.at(i), *plane = planes.at(labels(i));
         out(i) = float(own[0] * plane[0] + own[1] * plane[1] + own[2] * plane[2]);

@@ -98,8 +98,7 @@ double bend(Array<const Number, 3> stencil, Array<const Number, 2> ahead, Number
 // Add a multiple of a direction to the solution, and subtract that of bent, the matrix times it, from the residual;
 // returns the squared norm of the residual.
 template <class Number>
-double step(Number length, Array<const Number, 2> direction, Array<const Number, 2> bent, Array<Number, 2> solution, Array<Number,
-            2> residual) {
+double step(Number length, Array<const Number, 2> direction, Array<const Number, 2> bent, Array<Number, 2> solution, Array<Number, 2> residual) {
     const Scratch<Number, 1> squares(solution.shape[0]);
     const Index n = solution.shape[1];
     parallel_for(0, solution.shape[0], [&](Index y) {
@@ -161,8 +160,7 @@ void onto_finer(Array<const Number, 2> coarse, Array<const Number, 2> inverse, A
 
 // Computes inverse * vector plus the finest hats, into out; returns the inner product of vector and out.
 template <class Number>
-double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2> vector, Array<const Number, 2> fine, Array<Number,
-                           2> out) {
+double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2> vector, Array<const Number, 2> fine, Array<Number, 2> out) {
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = fine.shape[1];
     const Nodes down(fine.shape[0], SPACING, H), across(w, SPACING, W);
     const Number h[] = {Number(across.height(0)), Number(across.height(1)), Number(across.height(2)), Number(across.height(3))};

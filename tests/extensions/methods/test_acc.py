@@ -8,11 +8,11 @@ from sepi.extensions.methods import acc
 from sepi.extensions.methods.acc import (
     AccParameters,
     ConfidentLabelsParameters,
-    PhaseShift,
     agreed,
     confident_labels,
     matched_disparities,
     phase_shift_costs,
+    phase_shifted,
     truncated_difference,
 )
 from sepi.extensions.methods.costs import GuidedFilter, disparity_of, least_costs
@@ -34,7 +34,7 @@ def waves(height: int, width: int, down: float, across: float) -> np.ndarray:
 def test_shift_of_a_band_limited_picture_is_exact(height: int, width: int) -> None:
     """The phase shift theorem: the method's whole claim is that sub-pixel shifts lose nothing."""
     offsets = np.array([[0, 0], [0.3, -1.7], [0.5, 0.5], [-3.25, 0.01], [40.1, -77.7]])
-    found = PhaseShift(waves(height, width, 0, 0).astype(np.float32), None).by(offsets)
+    found = phase_shifted(waves(height, width, 0, 0).astype(np.float32), offsets, None)
     for moved, (down, across) in zip(found, offsets, strict=True):
         np.testing.assert_allclose(moved, waves(height, width, down, across), atol=1e-5)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sepi.extensions.methods.cae import (
-    ConstrainedEntropyParameters,
+    CaeParameters,
     cae,
     entropies_and_responses,
     level_weights,
@@ -20,7 +20,7 @@ from sepi.stage import no_progress
 pytestmark = pytest.mark.slow
 
 PATCH = kernels.PATCH
-PARAMETERS = ConstrainedEntropyParameters(num_disparities=31)
+PARAMETERS = CaeParameters(num_disparities=31)
 
 
 @cache
@@ -57,7 +57,7 @@ def test_entropy_withstands_occluders_and_variance_does_not(name: str) -> None:
 def test_a_textured_plane_has_its_disparity(name: str, bound: float) -> None:
     """Half a candidate would be 0.05 pixels and more: the parabola between candidates must be right."""
     field = scene(name)
-    disparity = cae(field, None, ConstrainedEntropyParameters(num_disparities=20), no_progress).disparity
+    disparity = cae(field, None, CaeParameters(num_disparities=20), no_progress).disparity
     assert np.abs(disparity - field.ground_truth)[8:-8, 8:-8].mean() < bound
 
 

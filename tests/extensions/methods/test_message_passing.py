@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from sepi.extensions.methods.markov_field import contrast_weights, labels_of_least_energy
+from sepi.extensions.methods.markov_field import changes, labels_of_least_energy
 from sepi.kernels import message_passing as kernels
 
 
@@ -103,12 +103,10 @@ def test_a_pass_equals_a_plain_twin(truncation) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-5)
 
 
-def test_weights_fall_across_edges_of_the_guide_and_are_zero_at_the_last_pixels() -> None:
+def test_changes_are_those_across_edges_and_zero_at_the_last_pixels() -> None:
     """Depth may only step where the picture does."""
     guide = np.zeros((4, 6, 3), np.float32)
-    guide[:, 3:] = 0.1
-    across, down = contrast_weights(guide, 0.05)
-    expected = np.ones((4, 6))
-    expected[:, 2], expected[:, -1] = np.exp(-2), 0
-    np.testing.assert_allclose(across, expected, rtol=1e-5)
-    np.testing.assert_array_equal(down, np.repeat([[1], [1], [1], [0]], 6, axis=1))
+    guide[:, 3:] = [0.05, 0.1, 0.15]
+    across, down = changes(guide)
+    np.testing.assert_allclose(across, np.tile([0, 0, 0.1, 0, 0, 0], (4, 1)), rtol=1e-5)
+    np.testing.assert_array_equal(down, 0)

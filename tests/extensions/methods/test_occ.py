@@ -9,7 +9,6 @@ from geometries import GEOMETRIES, standing
 from sepi.extensions.methods.occ import (
     LEAST_SHARE,
     ORIENTATIONS,
-    Edges,
     OccFieldParameters,
     OccParameters,
     OccSplitParameters,
@@ -118,7 +117,7 @@ def test_split_patch_costs_equal_numpy() -> None:
     halves = rng.random((3, 2, 9)) < 0.6
     halves[:, :, :2] = True
     beside = rng.random((8, 2, 3), np.float32)
-    costs, cues = split_patch_costs(sheared, reference, Edges(halves, places), halves, beside, 0.02)
+    costs, cues = split_patch_costs(sheared, reference, places, halves, beside, 0.02)
     for p, (y, x, orientation) in enumerate(places):
         parts = [sheared[halves[orientation, j], :, y, x] for j in (0, 1)]
         means = [part.mean(axis=0) for part in parts]

@@ -141,7 +141,7 @@ def test_probe_tells_what_the_maps_say():
     best = StageMaps(np.full((60, 60), 0.625, np.float32), maps.confidence, bars)
     parameters = SweepParameters(num_disparities=41)
     pixel = InterestingPixel(20, 30, "here")
-    found = probe(light_field, pixel, maps=maps, best=best, parameters=parameters)
+    found = probe(light_field, pixel, maps, parameters, best)
     assert found.pixel == pixel
     assert (found.chosen, found.best, found.ground_truth, found.confidence) == (0.5, 0.625, 0.5, 0.75)
     assert (found.interval, to_json(found)["interval"]) == ((0.25, 1.0), [0.25, 1.0])
@@ -154,7 +154,7 @@ def test_probe_tells_what_the_maps_say():
     # every view sees the plane's point, so the patch has the pixel's colour
     colour = 255 * float(light_field.reference_view[20, 30, 0])
     np.testing.assert_allclose(found.pictures["chosen"].pixels[:, HALF_WIDTH], colour, atol=2)
-    other = probe(light_field, InterestingPixel(21, 30, ""), maps=maps, parameters=parameters)
+    other = probe(light_field, InterestingPixel(21, 30, ""), maps, parameters, None)
     assert (other.ground_truth, other.best, other.kept_subset, other.occluded) == (None, None, "full", False)
     assert other.kept.all()
     assert "ground_truth" not in other.pictures
