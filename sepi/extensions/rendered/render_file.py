@@ -14,15 +14,14 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.extensions.rendered.surfaces import FirstSurface
-from sepi.extensions.rendered.world import FloatArray, Pattern, Thing
+from sepi.extensions.rendered.surfaces import FirstSurface, raster_of
+from sepi.extensions.rendered.world import FloatArray, Thing
 from sepi.io.hdf5 import attribute, create_hdf5, fixed_text, open_hdf5, read_dataset
 from sepi.kernels import reprojection as kernels
 from sepi.lightfield import BoolMap, FloatMap
@@ -47,20 +46,13 @@ _SAME = 0.05
 
 def albedo_of(things: Sequence[Thing], seen: FirstSurface) -> FloatArray:
     """Colours of a view's surfaces without light, sRGB; shape (H, W, 3)."""
-    colours, uv = np.zeros((seen.thing.size, 3), np.float32), seen.uv.reshape(-1, 2)
-    # sorted by thing, instead of a pass over the picture for each
-    order = np.argsort(seen.thing.astype(np.int16), axis=None, kind="stable")
-    ends = np.searchsorted(seen.thing.ravel()[order], np.arange(-1, len(things)), side="right")
-    for thing, (first, last) in zip(things, pairwise(ends), strict=True):
-        pattern, here = thing.material.pattern, order[first:last]
-        if isinstance(pattern, Pattern):
-            height, width = pattern.raster.shape[:2]
-            across, down = (uv[here] % 1).T
-            row, column = (down * height).astype(np.int64) % height, (across * width).astype(np.int64) % width
-            colours[here] = pattern.raster[row, column]
-        else:
-            colours[here] = pattern
-    return colours.reshape(*seen.thing.shape, 3)
+    colours = np.zeros((*seen.thing.shape, 3), np.float32)
+    for number in np.unique(seen.thing[seen.thing >= 0]).tolist():
+        raster, here = raster_of(things[number].material.pattern), seen.thing == number
+        size = np.array(raster.shape[:2], np.int64)
+        row, column = ((seen.uv[here][:, ::-1] % 1 * size).astype(np.int64) % size).T
+        colours[here] = raster[row, column]
+    return colours
 
 
 def surface_bits(things: Sequence[Thing], seen: FirstSurface, disparity: FloatMap) -> Bits:
@@ -100,8 +92,7 @@ def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64]) -> Bi
 
 def mask(bits: Bits, name: str) -> BoolMap:
     """One of a view's masks."""
-    found: BoolMap = (bits & _BIT[name]) != 0
-    return found
+    return np.asarray(bits & _BIT[name], bool)
 
 
 _ARRAYS = ("views", "disparity", "normal", "masks", "positions", "turns")

@@ -9,8 +9,9 @@ import pickle
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 from zipfile import BadZipFile
 
 import numpy as np
@@ -18,8 +19,8 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.extensions.rendered.render_file import Render, seen_bits, surface_bits, write_render
-from sepi.extensions.rendered.sampling import Plan, pictured, planned, with_shared_light
-from sepi.extensions.rendered.tracing import Position, Tracer
+from sepi.extensions.rendered.sampling import pictured, planned, with_shared_light
+from sepi.extensions.rendered.tracing import Tracer
 from sepi.extensions.rendered.world import FloatArray, Rig, World, rig_of
 from sepi.io.files import atomic_path
 from sepi.io.provenance import package_version
@@ -99,7 +100,8 @@ def render_world(
     """
     rig = rig_of(world, options.size, options.grid, options.baseline)
     count = math.prod(options.grid)
-    parts = _parts(path)
+    # the folder of finished views
+    parts = path.with_name(f"{path.name}.parts")
     digest = hashlib.sha256(pickle.dumps(world)).hexdigest()
     _take_over(parts, json.dumps({**made_by(name, options), "world": digest}, sort_keys=True))
     files = [parts / f"view_{number:03d}.npz" for number in range(count)]
@@ -113,20 +115,6 @@ def render_world(
     progress(1.0)
 
 
-def _parts(path: Path) -> Path:
-    """The folder of finished views."""
-    return path.with_name(f"{path.name}.parts")
-
-
-class _View(NamedTuple):
-    """A view before its picture: ground truth by name, position, and plan of samples."""
-
-    truth: dict[str, npt.NDArray[Any]]
-    position: Position
-    seed: int
-    plan: Plan | None
-
-
 def _views(
     world: World, rig: Rig, options: RenderOptions, numbers: Sequence[int]
 ) -> Iterator[tuple[int, dict[str, npt.NDArray[np.generic]]]]:
@@ -138,45 +126,39 @@ def _views(
         return
     tracer = Tracer(world, rig, options.lens * rig.baseline)
     with ThreadPoolExecutor(1, initializer=use_threads, initargs=(threads_used(),)) as beside:
-        coming = beside.submit(_looked_at, world, tracer, rig, options, numbers[0])
+        coming = beside.submit(_looked_at, tracer, options, numbers[0])
         for number, following in zip(numbers, [*numbers[1:], None], strict=True):
-            view = coming.result()
+            truth, picture = coming.result()
             if following is not None:
-                coming = beside.submit(_looked_at, world, tracer, rig, options, following)
-            found = {**view.truth, "views": _picture(tracer, options, view)}
+                coming = beside.submit(_looked_at, tracer, options, following)
+            found = {**truth, "views": picture()}
             yield number, {part: values.astype(_TYPES[part]) for part, values in found.items()}
 
 
-def _looked_at(world: World, tracer: Tracer, rig: Rig, options: RenderOptions, number: int) -> _View:
-    """A view before its picture."""
-    positions, turns = _stand(rig, options)
-    (down, across), (x, y, z) = positions.reshape(-1, 2)[number].tolist(), turns.reshape(-1, 3)[number].tolist()
+def _looked_at(
+    tracer: Tracer, options: RenderOptions, number: int
+) -> tuple[dict[str, npt.NDArray[Any]], Callable[[], FloatArray]]:
+    """Ground truth of a view by name, and what makes its picture."""
+    positions, turns = _stand(tracer.rig, options)
+    (down, across), turn = positions.reshape(-1, 2)[number].tolist(), turns.reshape(-1, 3)[number].tolist()
     # one seed per view, far from others: a view's tiles use several in a row
     seed = int(np.random.SeedSequence([options.seed, number]).generate_state(1)[0])
-    at = tracer.position(down, across, (x, y, z))
-    seen = tracer.first_surface(at)
-    disparity = rig.disparity(seen.depth).astype(np.float32)
-    straight = tracer.first_surface(tracer.position(down, across)) if any((x, y, z)) else seen
-    count = math.prod(options.grid)
-    plan = None
-    if options.shares_light:
-        plan = planned(tracer, at, seen, disparity, options.samples, count, seed, world.paths.gloss)
+    at = tracer.position(down, across, turn)
+    seen = tracer.surfaces.first(at)
+    disparity = tracer.rig.disparity(seen.depth).astype(np.float32)
+    straight = tracer.surfaces.first(tracer.position(down, across)) if any(turn) else seen
+    plan = planned(tracer, at, seen, options.samples, seed) if options.shares_light else None
     truth = {
         "albedo": plan.albedo if plan else np.zeros((*disparity.shape, 3)),
         "whole": plan.whole if plan else np.zeros(disparity.shape),
         "things": seen.thing,
         "disparity": disparity,
         "normal": seen.normal,
-        "masks": surface_bits(world.things, seen, disparity),
+        "masks": surface_bits(tracer.world.things, seen, disparity),
         # occlusion masks need a view without a turn
-        "upright": rig.disparity(straight.depth),
+        "upright": tracer.rig.disparity(straight.depth),
     }
-    return _View(truth, at, seed, plan)
-
-
-def _picture(tracer: Tracer, options: RenderOptions, view: _View) -> FloatArray:
-    """Picture of a view, shape (H, W, 3)."""
-    return pictured(tracer, view.plan) if view.plan else tracer.picture(view.position, view.seed, options.samples)
+    return truth, partial(pictured, tracer, plan) if plan else partial(tracer.picture, at, seed, options.samples)
 
 
 def _stand(rig: Rig, options: RenderOptions) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

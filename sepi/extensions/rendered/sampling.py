@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.extensions.rendered.surfaces import FirstSurface
-from sepi.extensions.rendered.tracing import SPREAD, Position, Tiles, Tracer
-from sepi.extensions.rendered.world import FloatArray
+from sepi.extensions.rendered.tracing import SPREAD, Tiles, Tracer
+from sepi.extensions.rendered.world import FloatArray, Position
 from sepi.kernels import reprojection as kernels
 from sepi.lightfield import BoolMap, FloatMap
 
@@ -68,16 +68,7 @@ class Plan:
     whole: BoolMap
 
 
-def planned(
-    tracer: Tracer,
-    position: Position,
-    seen: FirstSurface,
-    disparity: FloatMap,
-    samples: int,
-    views: int,
-    seed: int,
-    gloss: float = 1.0,
-) -> Plan:
+def planned(tracer: Tracer, position: Position, seen: FirstSurface, samples: int, seed: int) -> Plan:
     """The plan of a view's samples.
 
     Parameters
@@ -87,31 +78,25 @@ def planned(
         Position of the view, without a turn.
     seen : FirstSurface
         Surfaces seen from there.
-    disparity : ndarray, shape (H, W), float32
-        Disparity of these, pixels per view step.
     samples : int
         Largest number of paths of a pixel.
-    views : int
-        Number of views that share light.
     seed : int
         First seed of the paths; some that follow are used, too.
-    gloss : float, optional
-        Share of ``samples`` that glossy pixels need (:class:`sepi.extensions.rendered.world.World`).
     """
     # things narrower than a pixel may lie between the rays through middles
-    beside = tracer.things(position, _FINE)
-    matte = _of_pixels(tracer.surfaces.matte(beside))
-    same = _of_pixels(beside == seen.thing[:, None, :, None])
-    whole = (matte == _FINE**2) & (same == _FINE**2) & _flat(disparity, seen.thing)
-    albedo = np.zeros((*whole.shape, 3), np.float32)
-    albedo[whole] = tracer.albedo(position, seen.face[whole], np.argwhere(whole))
+    beside = tracer.surfaces.things(position, _FINE)
+    matte = tracer.surfaces.matte[beside].sum(axis=(1, 3))
+    same = (beside == seen.thing[:, None, :, None]).all(axis=(1, 3))
+    disparity = tracer.rig.disparity(seen.depth).astype(np.float32)
+    whole = (matte == _FINE**2) & same & _flat(disparity, seen.thing)
+    albedo = tracer.surfaces.albedo(position, seen.face, whole)
     whole &= albedo.min(axis=-1) > _DARKEST
     albedo[~whole] = 0
-    few, differs = shared_samples(samples, views), 2 * matte < _FINE**2
+    few, differs = shared_samples(samples, math.prod(tracer.rig.grid)), 2 * matte < _FINE**2
     kinds = (
         (~differs, 0, few),
         (~differs & ~whole, few, mixed_samples(samples, few) - few),
-        (differs, 0, max(few, gloss_samples(samples, gloss))),
+        (differs, 0, max(few, gloss_samples(samples, tracer.world.paths.gloss))),
     )
     squares = [(tiles, taken, paths) for asked, taken, paths in kinds if paths > 0 for tiles in _tiles(asked, paths)]
     tiles = [
@@ -119,14 +104,6 @@ def planned(
         for number, (pixels, taken, paths) in enumerate(squares)
     ]
     return Plan(tiles, albedo, whole)
-
-
-def _of_pixels(rays: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
-    """Number of true values among each pixel's rays, ``(H, F, W, F)``; shape (H, W)."""
-    fine, found = rays.shape[1], np.zeros(rays.shape[::2], np.uint8)
-    for n in range(fine**2):
-        found += rays[:, n // fine, :, n % fine]
-    return found
 
 
 def pictured(tracer: Tracer, plan: Plan) -> FloatArray:

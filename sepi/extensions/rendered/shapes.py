@@ -10,12 +10,24 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from sepi.extensions.rendered.world import FloatArray, Mesh, Vector
+from sepi.extensions.rendered.world import FloatArray, Material, Mesh, Pattern, Thing, Vector
 
 Points = npt.NDArray[np.float64]
+Parts = Mesh | Sequence[Mesh]
 
 # angles round a body; the seam of its pattern lies behind
 _ROUND = (-np.pi / 2, 3 * np.pi / 2)
+
+
+def thing(parts: Parts, surface: Material | Pattern | Vector, *, thin: bool = False) -> Thing:
+    """A thing of one mesh or several, matte unless its surface is a material."""
+    material = surface if isinstance(surface, Material) else Material(surface)
+    return Thing(joined(parts), material, thin)
+
+
+def raster(*coordinates: npt.ArrayLike) -> Points:
+    """Points on the last axis from coordinates that are broadcast."""
+    return np.stack(np.broadcast_arrays(*coordinates), axis=-1)
 
 
 def sheet(points: Points, *, smooth: bool = True) -> Mesh:
@@ -32,7 +44,7 @@ def sheet(points: Points, *, smooth: bool = True) -> Mesh:
     across = np.linalg.norm(np.diff(points, axis=1), axis=2).mean(0)
     down = np.linalg.norm(np.diff(points, axis=0), axis=2).mean(1)
     u, v = (np.concatenate([[0.0], np.cumsum(steps)]) for steps in (across, down))
-    uv = np.stack(np.broadcast_arrays(u[None, :], v[:, None]), axis=-1).reshape(-1, 2)
+    uv = raster(u[None, :], v[:, None]).reshape(-1, 2)
     corner = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
     faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
@@ -42,6 +54,16 @@ def sheet(points: Points, *, smooth: bool = True) -> Mesh:
 def rectangle(corner: Vector, across: Vector, down: Vector) -> Mesh:
     """A flat rectangle, or parallelogram, from one corner along two edges."""
     return _rectangles(*(np.array([values], float) for values in (corner, across, down)))
+
+
+def wall(corner: Vector, width: float, height: float) -> Mesh:
+    """An upright rectangle that faces the camera, from its upper left corner."""
+    return rectangle(corner, (width, 0, 0), (0, height, 0))
+
+
+def ground(corner: Vector, width: float, depth: float) -> Mesh:
+    """A level rectangle, from its corner at the left that is near."""
+    return rectangle(corner, (width, 0, 0), (0, 0, depth))
 
 
 def _rectangles(corners: Points, across: Points, down: Points) -> Mesh:
@@ -88,13 +110,10 @@ def ball(
     """
     polar = np.linspace(0, np.pi, fineness)[:, None]
     turn = np.linspace(*_ROUND, 2 * fineness)[None, :]
-    direction = np.stack(
-        np.broadcast_arrays(np.sin(polar) * np.cos(turn), -np.cos(polar), -np.sin(polar) * np.sin(turn)), axis=-1
-    )
+    direction = raster(np.sin(polar) * np.cos(turn), -np.cos(polar), -np.sin(polar) * np.sin(turn))
     height = 1.0 if relief is None else 1 + relief(direction)[..., None]
     mesh = sheet(np.array(centre) + radius * height * direction)
-    uv = np.stack(np.broadcast_arrays(turn * radius, polar * radius), axis=-1).reshape(-1, 2)
-    return _mesh(mesh.vertices, mesh.faces, uv, True)
+    return _mesh(mesh.vertices, mesh.faces, raster(turn * radius, polar * radius).reshape(-1, 2), True)
 
 
 def tube(path: Points, radius: float | npt.NDArray[np.float64], sides: int = 12) -> Mesh:
@@ -156,9 +175,7 @@ def turned_body(profile: Points, centre: Vector, sides: int = 96) -> Mesh:
     """
     profile = np.asarray(profile, float)
     angle = np.linspace(*_ROUND, sides + 1)[None, :]
-    points = np.stack(
-        np.broadcast_arrays(profile[:, :1] * np.cos(angle), -profile[:, 1:], -profile[:, :1] * np.sin(angle)), axis=-1
-    )
+    points = raster(profile[:, :1] * np.cos(angle), -profile[:, 1:], -profile[:, :1] * np.sin(angle))
     return sheet(points + np.array(centre))
 
 
@@ -172,18 +189,13 @@ def plate(outline: Points, thickness: float) -> Mesh:
     thickness : float
     """
     outline = np.asarray(outline, float)
-    middle = outline.mean(0)
-    count = len(outline)
-    rim = np.concatenate([outline, middle[None]])
-    other = np.roll(np.arange(count), -1)
-    fan = np.stack([np.full(count, count), np.arange(count), other], axis=1)
+    count, rim = len(outline), np.concatenate([outline, outline.mean(0)[None]])
+    fan = np.stack([np.full(count, count), np.arange(count), np.roll(np.arange(count), -1)], axis=1)
+    faces = [np.c_[rim, np.full(count + 1, z)] for z in (0 - thickness / 2, thickness / 2)]
+    front, back = (_mesh(faces[n], fan[:, :: 1 - 2 * n], rim - outline.min(0), False) for n in (0, 1))
     if thickness == 0:
-        return _mesh(np.concatenate([rim, np.zeros((count + 1, 1))], 1), fan, rim - outline.min(0), False)
-    front, back = (np.concatenate([rim, np.full((count + 1, 1), z)], 1) for z in (-thickness / 2, thickness / 2))
-    closed = np.concatenate([outline, outline[:1]])
-    wall = np.stack([np.concatenate([closed, np.full((count + 1, 1), z)], 1) for z in (-thickness / 2, thickness / 2)])
-    uv = rim - outline.min(0)
-    return joined([_mesh(front, fan, uv, False), _mesh(back, fan[:, ::-1], uv, False), sheet(wall, smooth=False)])
+        return front
+    return joined([front, back, sheet(np.stack(faces)[:, [*range(count), 0]], smooth=False)])
 
 
 def leaf(length: float, width: float, bend: float, fold: float = 0.3, rows: int = 6) -> Mesh:
@@ -202,8 +214,8 @@ def leaf(length: float, width: float, bend: float, fold: float = 0.3, rows: int 
     part = np.linspace(0, 1, rows)
     angle = bend * part
     step = length / (rows - 1)
-    along = step * np.concatenate([[0], np.cumsum((np.cos(angle[1:]) + np.cos(angle[:-1])) / 2)])
-    down = step * np.concatenate([[0], np.cumsum((np.sin(angle[1:]) + np.sin(angle[:-1])) / 2)])
+    way = np.stack([np.cos(angle), np.sin(angle)])
+    along, down = step * np.pad(np.cumsum((way[:, 1:] + way[:, :-1]) / 2, axis=1), ((0, 0), (1, 0)))
     half = width / 2 * np.sin(np.pi * np.clip(part, 0.03, 0.995) ** 0.75) ** 0.8
     side = np.array([-1.0, 0.0, 1.0])
     off = half[:, None] * side
@@ -211,10 +223,10 @@ def leaf(length: float, width: float, bend: float, fold: float = 0.3, rows: int 
     return sheet(np.stack([along[:, None] + rise * np.sin(angle)[:, None], down[:, None] - rise, off], axis=-1))
 
 
-def moved(mesh: Mesh, turn: Vector = (0, 0, 0), by: Vector = (0, 0, 0), scale: float = 1.0) -> Mesh:
-    """The mesh scaled, turned about the x, then y, then z axis by angles in radians, and shifted."""
-    vertices = scale * np.asarray(mesh.vertices, float) @ rotation(turn).T + np.array(by)
-    return _mesh(vertices, mesh.faces, scale * mesh.uv, mesh.smooth)
+def moved(parts: Parts, turn: Vector = (0, 0, 0), by: Vector = (0, 0, 0)) -> Mesh:
+    """A mesh of parts, turned about the x, then y, then z axis by angles in radians, and shifted."""
+    mesh = joined(parts)
+    return _mesh(np.asarray(mesh.vertices, float) @ rotation(turn).T + by, mesh.faces, mesh.uv, mesh.smooth)
 
 
 def rotation(turn: Vector) -> Points:
@@ -229,8 +241,10 @@ def rotation(turn: Vector) -> Points:
     return found
 
 
-def joined(meshes: Sequence[Mesh]) -> Mesh:
+def joined(meshes: Parts) -> Mesh:
     """Several meshes as one; all of them smooth, or none."""
+    if isinstance(meshes, Mesh):
+        return meshes
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     return _mesh(
         np.concatenate([mesh.vertices for mesh in meshes]),
@@ -261,10 +275,7 @@ def copies(mesh: Mesh, axes: Points, places: Points, scales: npt.ArrayLike = 1.0
 
 def about_vertical(turns: npt.ArrayLike) -> Points:
     """Axes ``(N, 3, 3)`` of upright :func:`copies`, turned by angles ``(N,)`` in radians."""
-    turns = np.asarray(turns, float)
-    cos, sin, zero = np.cos(turns), np.sin(turns), np.zeros_like(turns)
-    rows = ((cos, zero, sin), (zero, zero + 1, zero), (-sin, zero, cos))
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return np.stack([rotation((0.0, turn, 0.0)) for turn in np.ravel(turns)])
 
 
 def normals(mesh: Mesh) -> FloatArray:
@@ -278,8 +289,7 @@ def normals(mesh: Mesh) -> FloatArray:
     for corner in range(3):
         np.add.at(total, same[mesh.faces[:, corner]], facing)
     length = np.linalg.norm(total, axis=1, keepdims=True)
-    found: FloatArray = (total / np.where(length > 0, length, 1))[same].astype(np.float32)
-    return found
+    return np.asarray((total / np.where(length > 0, length, 1))[same], np.float32)
 
 
 def _mesh(vertices: npt.ArrayLike, faces: npt.ArrayLike, uv: npt.ArrayLike, smooth: bool) -> Mesh:

@@ -9,8 +9,19 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from sepi.extensions.rendered.shapes import Points, ball, box, joined, moved, painted_from, plate, rod, turned_body
-from sepi.extensions.rendered.world import Lamp, Material, Mesh, Thing, Vector, World
+from sepi.extensions.rendered.shapes import (
+    Points,
+    ball,
+    box,
+    joined,
+    moved,
+    painted_from,
+    plate,
+    rod,
+    thing,
+    turned_body,
+)
+from sepi.extensions.rendered.world import Lamp, Material, Mesh, Things, Vector, World
 
 
 def seen_from(world: World, eye: Vector, below: float = 0.0, rightwards: float = 0.0) -> World:
@@ -30,23 +41,16 @@ def seen_from(world: World, eye: Vector, below: float = 0.0, rightwards: float =
     right = np.array([np.cos(yaw), 0, -np.sin(yaw)])
     axes = np.stack([right, np.cross(forward, right), forward])
 
-    def turned(vector: Vector) -> Vector:
-        x, y, z = (axes @ np.array(vector)).tolist()
-        return x, y, z
-
-    def shifted(point: Vector) -> Vector:
-        return turned((point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]))
-
-    def mesh(old: Mesh) -> Mesh:
-        vertices = (old.vertices.astype(np.float64) - np.array(eye)) @ axes.T
-        return replace(old, vertices=vertices.astype(np.float32))
+    def turned(mesh: Mesh) -> Mesh:
+        vertices = (mesh.vertices.astype(np.float64) - np.array(eye)) @ axes.T
+        return replace(mesh, vertices=vertices.astype(np.float32))
 
     lamps = [
-        replace(lamp, corner=shifted(lamp.corner), across=turned(lamp.across), down=turned(lamp.down))
+        Lamp(axes @ np.subtract(lamp.corner, eye), axes @ lamp.across, axes @ lamp.down, lamp.radiance)
         for lamp in world.light.lamps
     ]
-    suns = [replace(sun, direction=turned(sun.direction)) for sun in world.light.suns]
-    things = [replace(thing, mesh=mesh(thing.mesh)) for thing in world.things]
+    suns = [replace(sun, direction=axes @ sun.direction) for sun in world.light.suns]
+    things = [replace(one, mesh=turned(one.mesh)) for one in world.things]
     return replace(world, things=things, light=replace(world.light, lamps=lamps, suns=suns))
 
 
@@ -57,11 +61,10 @@ def lamp_towards(middle: Vector, target: Vector, size: float, radiance: Vector) 
     down = np.array([0.0, 1.0, 0.0]) - facing[1] * facing
     down *= size / np.linalg.norm(down)
     across = np.cross(down, facing)
-    corner, first, second = (edge.tolist() for edge in (np.array(middle) - across / 2 - down / 2, across, down))
-    return Lamp(tuple(corner), tuple(first), tuple(second), radiance)
+    return Lamp(np.array(middle) - across / 2 - down / 2, across, down, radiance)
 
 
-def book(size: Vector, cover: Material, paper: Material, turn: Vector, by: Vector) -> list[Thing]:
+def book(size: Vector, cover: Material, paper: Material, turn: Vector, by: Vector) -> Things:
     """A closed book of width, thickness and depth that lies on y=0 with its back to the left."""
     w, h, d = size
     board = min(0.003, h / 6)
@@ -72,7 +75,8 @@ def book(size: Vector, cover: Material, paper: Material, turn: Vector, by: Vecto
         box((-w / 2 + board / 2, middle, 0), (board, h - 2 * board, d)),
     ]
     pages = box((0, middle, 0), (w - 2.5 * board, h - 2 * board, d - 3 * board))
-    return [Thing(moved(joined(covers), turn, by), cover), Thing(moved(pages, turn, by), paper)]
+    yield thing(moved(covers, turn, by), cover)
+    yield thing(moved(pages, turn, by), paper)
 
 
 def crate(size: Vector, rows: int, turn: float, by: Vector) -> Mesh:
@@ -148,8 +152,7 @@ def profile(points: list[tuple[float, float]], count: int = 120) -> Points:
     """A curve through points ``(radius, height)`` of a body of revolution, given from the top down."""
     given = np.array(points, float)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(given, axis=0), axis=1))])
-    found: Points = PchipInterpolator(length, given)(np.linspace(0, length[-1], count))
-    return found
+    return np.asarray(PchipInterpolator(length, given)(np.linspace(0, length[-1], count)))
 
 
 def vessel(points: list[tuple[float, float]], wall: float, foot: Vector, floor: float = 0.006, sides: int = 96) -> Mesh:
@@ -169,7 +172,7 @@ def fruit(centre: Vector, radius: float, seed: int) -> Mesh:
 
     def relief(direction: Points) -> Points:
         dimple = np.exp(-(((np.arccos(np.clip(np.abs(direction[..., 1]), 0, 1))) / 0.25) ** 2))
-        found: Points = direction @ lean - 0.12 * dimple + 0.03 * np.cos(5 * direction[..., 0] + 3 * direction[..., 2])
-        return found
+        waves = 0.03 * np.cos(5 * direction[..., 0] + 3 * direction[..., 2])
+        return np.asarray(direction @ lean - 0.12 * dimple + waves)
 
     return ball(centre, radius, relief, 40)

@@ -8,17 +8,16 @@ have disparity zero, as in the HCI 4D benchmark. With the focal length ``f`` in 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.camera import Camera, camera_from
-
 FloatArray = npt.NDArray[np.float32]
-Vector = tuple[float, float, float]
+Vector = Sequence[float] | npt.NDArray[np.float64]
+"""Three numbers: a place, a direction, or a colour."""
 Kind = Literal["matte", "glossy", "mirror", "glass"]
 Metal = Literal["Ag", "Al", "Au", "Cr", "Cu"]
 
@@ -101,6 +100,9 @@ class Thing:
     mesh: Mesh
     material: Material
     thin: bool = False
+
+
+Things = Iterator[Thing]
 
 
 @dataclass(frozen=True)
@@ -224,6 +226,22 @@ class World:
 SENSOR_MM = 35.0
 
 
+class Position(NamedTuple):
+    """Pose of a view relative to the reference camera.
+
+    Attributes
+    ----------
+    right, down : float
+        Position, metres.
+    turn : (float, float, float)
+        Rotation about ``x``, ``y`` and ``z``, radians.
+    """
+
+    right: float
+    down: float
+    turn: Vector = (0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True)
 class Rig:
     """Cameras of a scene.
@@ -249,11 +267,6 @@ class Rig:
     focus: float
 
     @property
-    def camera(self) -> Camera:
-        """Camera of the light field."""
-        return camera_from(**self.settings, shape=(self.size, self.size), crop_of=None)
-
-    @property
     def settings(self) -> dict[str, float]:
         """Values for the benchmark's ``parameters.cfg``."""
         return {
@@ -269,6 +282,11 @@ class Rig:
         rows, columns = self.grid
         down, across = np.arange(rows) - rows // 2, np.arange(columns) - columns // 2
         return np.stack(np.broadcast_arrays(down[:, None], across[None, :]), axis=-1).astype(np.float64)
+
+    def axis(self, position: Position) -> tuple[float, float]:
+        """Row and column of a camera's axis in its picture, which is shifted to converge at the focus distance."""
+        shear = self.focal_px / (self.focus * self.size)
+        return (0.5 + position.down * shear) * self.size, (0.5 + position.right * shear) * self.size
 
     def disparity(self, depth: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Disparity in pixels per view step of depths along the viewing direction in metres."""

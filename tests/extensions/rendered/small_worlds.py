@@ -10,7 +10,7 @@ from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Paths
 WALL, FLOOR = 3.0, 0.6
 RED = Material((0.6, 0.2, 0.2))
 # no finer than ten pixels, so that it can be interpolated
-PAINT = noise(1, (0.5, 0.45, 0.4), 0.12, 2.4, finest=80)
+PAINT = noise(1, (0.5, 0.45, 0.4), 0.12, 2.4, (80, 256))
 
 
 def taking(size: int = 64, views: int = 3, samples: int = 4, **values: object) -> RenderOptions:

@@ -126,9 +126,8 @@ def test_paths_are_traced_where_views_differ() -> None:
     rig = rig_of(world, size, (9, 9))
     tracer = Tracer(world, rig)
     at = tracer.position(0, 0)
-    seen = tracer.first_surface(at)
-    disparity = rig.disparity(seen.depth).astype(np.float32)
-    plan = planned(tracer, at, seen, disparity, samples, 81, 0)
+    seen = tracer.surfaces.first(at)
+    plan = planned(tracer, at, seen, samples, 0)
     taken = np.zeros((size, size), int)
     for tiles, before in plan.tiles:
         rows, columns = tiles.pixels[..., 0], tiles.pixels[..., 1]
@@ -328,7 +327,7 @@ def test_every_ray_of_a_scene_meets_something(name: str) -> None:
     near, far = world.cameras.at_near, world.cameras.at_far
     slack = 0.1 * (near - far)
     for corner in ((0, 0), (-4, -4), (4, 4)):
-        seen = tracer.first_surface(tracer.position(*corner))
+        seen = tracer.surfaces.first(tracer.position(*corner))
         assert np.isfinite(seen.depth).all()
         disparity = rig.disparity(seen.depth)
         assert far - slack <= disparity.min()

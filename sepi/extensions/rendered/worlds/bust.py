@@ -22,12 +22,12 @@ TABLE, WALL = 0.33, 2.35
 def world() -> World:
     """By a large window at the upper left, and what a bright room sends back."""
     marble = Material(patterns.stone(3, 0.5, (0.86, 0.84, 0.8), (0.75, 0.73, 0.71)))
-    limestone = Material(patterns.noise(11, (0.66, 0.62, 0.55), 0.07, 0.5, finest=3))
-    plaster = Material(patterns.noise(21, (0.78, 0.72, 0.6), 0.022, 1.6, finest=4, coarsest=300))
-    paint = Material(patterns.noise(31, (0.36, 0.46, 0.45), 0.03, 1.2, finest=4, coarsest=300))
-    glaze = Material(patterns.noise(41, (0.2, 0.42, 0.4), 0.05, 0.4, coarsest=500), "glossy", 0.08)
+    limestone = Material(patterns.noise(11, (0.66, 0.62, 0.55), 0.07, 0.5, (3, 256)))
+    plaster = Material(patterns.noise(21, (0.78, 0.72, 0.6), 0.022, 1.6, (4, 300)))
+    paint = Material(patterns.noise(31, (0.36, 0.46, 0.45), 0.03, 1.2, (4, 300)))
+    glaze = Material(patterns.noise(41, (0.2, 0.42, 0.4), 0.05, 0.4, (4, 500)), "glossy", 0.08)
     clay = Material(_amphora_paint())
-    fruit = Material(patterns.noise(51, (0.72, 0.26, 0.14), 0.05, 0.12, finest=3))
+    fruit = Material(patterns.noise(51, (0.72, 0.26, 0.14), 0.05, 0.12, (3, 256)))
     lamp = Lamp((-2.5, -1.0, 0.3), (0, 0, 1.3), (0.6, -1.2, 0), (15.0, 14.2, 13.0))
     things = [
         Thing(shapes.moved(_bust(), (0, 0.5, 0), (0.03, TABLE - 0.59, 1.62)), marble),

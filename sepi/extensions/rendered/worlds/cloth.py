@@ -23,7 +23,7 @@ def world() -> World:
     blue = Material(patterns.linen(1, 1.0, (0.56, 0.63, 0.68), 0.05))
     cream = Material(patterns.plaid(11, 0.9, (0.84, 0.8, 0.7), (0.72, 0.6, 0.5), 5, 0.35))
     wool = Material(patterns.plaid(21, 0.8, (0.55, 0.5, 0.34), (0.3, 0.36, 0.3), 4, 0.8))
-    velvet = Material(patterns.noise(31, (0.55, 0.2, 0.17), 0.022, 0.7, finest=4, coarsest=80))
+    velvet = Material(patterns.noise(31, (0.55, 0.2, 0.17), 0.022, 0.7, (4, 80)))
     sheets = [(0.86, 0.84, 0.8), (0.62, 0.68, 0.6), (0.78, 0.66, 0.56), (0.86, 0.85, 0.83)]
     planks = Material(patterns.wood(41, 1.1, (0.56, 0.42, 0.29), (0.38, 0.26, 0.17)))
     beech = Material(patterns.wood(51, 0.4))

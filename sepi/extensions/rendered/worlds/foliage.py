@@ -51,9 +51,9 @@ def world() -> World:
 
 
 def _ground() -> list[Thing]:
-    plaster = patterns.noise(1, (0.72, 0.6, 0.44), 0.045, 1.3, finest=3, coarsest=500, chroma=0.25)
+    plaster = patterns.noise(1, (0.72, 0.6, 0.44), 0.045, 1.3, (3, 500), 0.25)
     plinth = patterns.stone(2, 0.9, (0.66, 0.64, 0.6), (0.42, 0.4, 0.38))
-    soil = patterns.noise(3, (0.34, 0.26, 0.19), 0.08, 0.9, finest=3, coarsest=50, chroma=0.2)
+    soil = patterns.noise(3, (0.34, 0.26, 0.19), 0.08, 0.9, (3, 50), 0.2)
     blocks = [rectangle((-3 + 0.6 * n, -0.3, _WALL - 0.06), (0.592, 0, 0), (0, 0.3, 0)) for n in range(10)]
     top = rectangle((-3, -0.3, _WALL - 0.06), (6, 0, 0), (0, 0, 0.06))
     return [
@@ -75,11 +75,11 @@ def _shrubs() -> list[Thing]:
         (_grown(rng, willow, (-0.62, 0.0, 2.35), _UP), willow, (0.5, 0.56, 0.38)),
         (_grown(rng, bough, (-0.8, -1.36, 1.68), np.array([0.9, 0.12, 0.1])), bough, (0.38, 0.5, 0.15)),
     ]
-    bark = Material(patterns.noise(11, (0.34, 0.26, 0.2), 0.06, 0.2, finest=3, coarsest=40, chroma=0.2))
+    bark = Material(patterns.noise(11, (0.34, 0.26, 0.2), 0.06, 0.2, (3, 40), 0.2))
     found = []
     for number, (plant, habit, green) in enumerate(plants):
         found.append(Thing(joined(plant.wood), bark, thin=True))
-        blades = Material(patterns.noise(20 + 5 * number, green, 0.045, 0.5, finest=4, coarsest=200, chroma=0.6))
+        blades = Material(patterns.noise(20 + 5 * number, green, 0.045, 0.5, (4, 200), 0.6))
         found.append(Thing(_leaves(rng, plant, habit.leaf), blades))
     places = np.concatenate(plants[0][0].places)[::14] + np.array([0, 0.012, 0])
     berries = copies(ball((0, 0, 0), 0.008, fineness=10), about_vertical(np.zeros(len(places))), places)
@@ -134,7 +134,7 @@ def _fallen(rng: np.random.Generator, blade: Mesh) -> Thing:
     count = 220
     places = np.stack([rng.uniform(-1.4, 1.4, count), np.full(count, -0.008), rng.uniform(1.9, 2.95, count)], axis=1)
     axes = about_vertical(rng.uniform(0, 2 * np.pi, count))
-    brown = patterns.noise(41, (0.5, 0.33, 0.14), 0.06, 0.3, finest=4, coarsest=200, chroma=0.6)
+    brown = patterns.noise(41, (0.5, 0.33, 0.14), 0.06, 0.3, (4, 200), 0.6)
     return Thing(copies(blade, axes, places), Material(brown))
 
 

@@ -94,9 +94,7 @@ def _village() -> list[Thing]:
         for parts, kind in ((body, walls[number % 3]), (roof, roofs), (openings, dark)):
             kind.append(moved(parts, (0, turn, 0), at))
     colours = ((0.8, 0.76, 0.66), (0.74, 0.6, 0.46), (0.84, 0.83, 0.8))
-    plaster = [
-        Material(patterns.noise(30 + 5 * n, c, 0.04, 9.0, finest=4, coarsest=300)) for n, c in enumerate(colours)
-    ]
+    plaster = [Material(patterns.noise(30 + 5 * n, c, 0.04, 9.0, (4, 300))) for n, c in enumerate(colours)]
     return [
         *(Thing(joined(group), colour) for group, colour in zip(walls, plaster, strict=True)),
         Thing(joined(roofs), Material(patterns.bricks(21, 7.0, 24, (0.56, 0.27, 0.18)))),
@@ -124,7 +122,7 @@ def _trees() -> list[Thing]:
         x, z = x[keep], z[keep]
         places = np.stack([x, -_height(x, z) + 0.4, z], axis=1)
         axes = about_vertical(rng.uniform(0, 2 * np.pi, len(x)))
-        leaves = patterns.noise(50 + 5 * number, green, 0.07, 12.0, finest=3, coarsest=120, chroma=0.3)
+        leaves = patterns.noise(50 + 5 * number, green, 0.07, 12.0, (3, 120), 0.3)
         found.append(Thing(copies(shape, axes, places, rng.uniform(*heights, len(x))), Material(leaves)))
     return found
 
@@ -158,7 +156,7 @@ def _lane() -> list[Thing]:
     x = _lane_at(z)
     across = np.array([-1.5, -0.5, 0.5, 1.5])[None, :] + x[:, None]
     along = np.broadcast_to(z[:, None], across.shape)
-    gravel = patterns.noise(61, (0.6, 0.55, 0.45), 0.06, 20.0, finest=3, coarsest=100)
+    gravel = patterns.noise(61, (0.6, 0.55, 0.45), 0.06, 20.0, (3, 100))
     places = np.stack([x, -_height(x, z), z], axis=1)[10::6].tolist()
     posts = [box((a - 2.6, b - 0.5, c), (0.16, 1.6, 0.16)) for a, b, c in places]
     rng = np.random.default_rng(7)
@@ -169,7 +167,7 @@ def _lane() -> list[Thing]:
     for right, far in zip(rng.uniform(3, 32, 22).tolist(), rng.uniform(58, 125, 22).tolist(), strict=True):
         at = (right, -float(_height(np.array(right), np.array(far))) - 0.7, far)
         bales.append(moved(drum, (np.pi / 2, float(rng.uniform(0, 3)), 0), at))
-    straw = patterns.noise(62, (0.72, 0.6, 0.32), 0.08, 6.0, finest=3, coarsest=60)
+    straw = patterns.noise(62, (0.72, 0.6, 0.32), 0.08, 6.0, (3, 60))
     return [
         Thing(sheet(np.stack([across, -_height(across, along) - 0.12, along], axis=-1)), Material(gravel)),
         Thing(joined(posts), Material((0.62, 0.58, 0.5)), thin=True),

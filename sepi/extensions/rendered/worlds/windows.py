@@ -16,7 +16,7 @@ from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Paths
 GROUND = 4.0
 _PANE = Material((0.1, 0.12, 0.14), "glossy")
 _WHITE, _IRON = Material((0.86, 0.85, 0.8)), Material((0.13, 0.14, 0.15))
-_SILL = Material(patterns.noise(91, (0.74, 0.7, 0.62), 0.05, 2.0, finest=3))
+_SILL = Material(patterns.noise(91, (0.74, 0.7, 0.62), 0.05, 2.0, (3, 256)))
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ def world() -> World:
     green = Material(patterns.stripes(0.6, [(0.2, 0.4, 0.28), (0.88, 0.85, 0.74)]))
     slats = Material(patterns.stripes(0.16, [(0.22, 0.36, 0.34), (0.3, 0.46, 0.43)], across=False))
     brick = Material(patterns.bricks(1, 2.4, 20, (0.62, 0.36, 0.27)))
-    stucco = Material(patterns.noise(11, (0.8, 0.66, 0.44), 0.035, 4.0, finest=3, coarsest=400))
-    stone = Material(patterns.noise(21, (0.74, 0.71, 0.65), 0.04, 3.0, finest=3, coarsest=100))
+    stucco = Material(patterns.noise(11, (0.8, 0.66, 0.44), 0.035, 4.0, (3, 400)))
+    stone = Material(patterns.noise(21, (0.74, 0.71, 0.65), 0.04, 3.0, (3, 100)))
     left = Front((-14.0, GROUND, 15), 0, 5, 5, stucco, 1, 2.1, shutters=slats, awnings=green)
     fronts = [
         Front((-8, GROUND, 25), 0, 9, 7, brick, 2, 2.05, (1.0, 1.8), awnings=red_white),
