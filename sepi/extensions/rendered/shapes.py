@@ -13,6 +13,7 @@ import numpy.typing as npt
 from sepi.extensions.rendered.world import FloatArray, Material, Mesh, Pattern, Thing, Vector
 
 Points = npt.NDArray[np.float64]
+Outline = Points | Sequence[Sequence[float]]
 Parts = Mesh | Sequence[Mesh]
 
 # angles round a body; the seam of its pattern lies behind
@@ -116,10 +117,10 @@ def ball(
     return _mesh(mesh.vertices, mesh.faces, raster(turn * radius, polar * radius).reshape(-1, 2), True)
 
 
-def tube(path: Points, radius: float | npt.NDArray[np.float64], sides: int = 12) -> Mesh:
+def tube(path: Outline, radius: float | npt.NDArray[np.float64], sides: int = 12) -> Mesh:
     """A tube along a line of points ``(N, 3)``, of one radius or one for each point; its ends are open."""
-    path = np.asarray(path, float)
-    along = np.gradient(path, axis=0)
+    points = np.asarray(path, float)
+    along = np.gradient(points, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     # parallel transport, so that the tube does not twist
     normal = np.cross(along[0], np.eye(3)[np.argmin(np.abs(along[0]))])
@@ -132,7 +133,7 @@ def tube(path: Points, radius: float | npt.NDArray[np.float64], sides: int = 12)
     second = np.cross(along, first)
     angle = np.linspace(0, 2 * np.pi, sides + 1)[None, :, None]
     ring = np.cos(angle) * first[:, None] + np.sin(angle) * second[:, None]
-    return sheet(path[:, None] + np.broadcast_to(radius, len(path))[:, None, None] * ring)
+    return sheet(points[:, None] + np.broadcast_to(radius, len(points))[:, None, None] * ring)
 
 
 def rod(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 12) -> Mesh:
@@ -147,15 +148,15 @@ def rod(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 12
     return tube(first + along[:, None] / length * (last - first), widths, sides)
 
 
-def bevelled(outline: Points, by: float) -> Points:
+def bevelled(outline: Outline, by: float) -> Points:
     """An outline ``(N, 2)`` with its corners cut off, so that smooth bodies have sharp edges."""
-    outline = np.asarray(outline, float)
-    points = [outline[0]]
-    for before, corner, after in zip(outline[:-2], outline[1:-1], outline[2:], strict=True):
+    first, *corners, last = np.asarray(outline, float)
+    points = [first]
+    for before, corner, after in zip([first, *corners[:-1]], corners, [*corners[1:], last], strict=True):
         for other in (before, after):
             part = by / max(float(np.linalg.norm(other - corner)), 3 * by)
             points.append(corner + part * (other - corner))
-    return np.array([*points, outline[-1]])
+    return np.array([*points, last])
 
 
 def painted_from(mesh: Mesh, across: float, down: float) -> Mesh:
@@ -163,7 +164,7 @@ def painted_from(mesh: Mesh, across: float, down: float) -> Mesh:
     return _mesh(mesh.vertices, mesh.faces, mesh.uv + np.array([across, down]), mesh.smooth)
 
 
-def turned_body(profile: Points, centre: Vector, sides: int = 96) -> Mesh:
+def turned_body(profile: Outline, centre: Vector, sides: int = 96) -> Mesh:
     """A body of revolution about the vertical through ``centre``: vases, bottles, columns.
 
     Parameters
@@ -173,13 +174,13 @@ def turned_body(profile: Points, centre: Vector, sides: int = 96) -> Mesh:
     centre : (float, float, float)
     sides : int
     """
-    profile = np.asarray(profile, float)
+    radius, height = np.hsplit(np.asarray(profile, float), 2)
     angle = np.linspace(*_ROUND, sides + 1)[None, :]
-    points = raster(profile[:, :1] * np.cos(angle), -profile[:, 1:], -profile[:, :1] * np.sin(angle))
+    points = raster(radius * np.cos(angle), -height, -radius * np.sin(angle))
     return sheet(points + np.array(centre))
 
 
-def plate(outline: Points, thickness: float) -> Mesh:
+def plate(outline: Outline, thickness: float) -> Mesh:
     """A flat body of a star-shaped outline, such as a leaf or a disc.
 
     Parameters
@@ -188,11 +189,11 @@ def plate(outline: Points, thickness: float) -> Mesh:
         Points ``(x, y)`` in order, in metres; the body lies about ``z = 0``. With no thickness it has one side.
     thickness : float
     """
-    outline = np.asarray(outline, float)
-    count, rim = len(outline), np.concatenate([outline, outline.mean(0)[None]])
+    corners = np.asarray(outline, float)
+    count, rim = len(corners), np.concatenate([corners, corners.mean(0)[None]])
     fan = np.stack([np.full(count, count), np.arange(count), np.roll(np.arange(count), -1)], axis=1)
     faces = [np.c_[rim, np.full(count + 1, z)] for z in (0 - thickness / 2, thickness / 2)]
-    front, back = (_mesh(faces[n], fan[:, :: 1 - 2 * n], rim - outline.min(0), False) for n in (0, 1))
+    front, back = (_mesh(faces[n], fan[:, :: 1 - 2 * n], rim - corners.min(0), False) for n in (0, 1))
     if thickness == 0:
         return front
     return joined([front, back, sheet(np.stack(faces)[:, [*range(count), 0]], smooth=False)])

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from sepi.extensions.rendered.shapes import (
+    Outline,
     Points,
     ball,
     box,
@@ -124,7 +125,7 @@ def table(size: Vector, turn: float, by: Vector) -> Mesh:
 
 def house(wide: float, deep: float, tall: float, rise: float) -> tuple[Mesh, Mesh, Mesh]:
     """Walls with gables, roof and chimney, and windows, of a house that stands on y=0."""
-    gable = np.array([[-deep / 2, -tall], [0, -tall - rise], [deep / 2, -tall]])
+    gable = [[-deep / 2, -tall], [0, -tall - rise], [deep / 2, -tall]]
     ends = [moved(plate(gable, 0.0), (0, np.pi / 2, 0), (side * (wide / 2 - 0.01), 0, 0)) for side in (-1, 1)]
     body = joined([box((0, -tall / 2, 0), (wide, tall, deep)), *ends])
     slope, over = np.hypot(deep / 2, rise), 0.5
@@ -148,14 +149,14 @@ def leaning(foot: npt.ArrayLike, over: npt.ArrayLike, beyond: float, radius: flo
     return rod(start + lift, rest + lift + beyond * along, radius)
 
 
-def profile(points: list[tuple[float, float]], count: int = 120) -> Points:
+def profile(points: Outline, count: int = 120) -> Points:
     """A curve through points ``(radius, height)`` of a body of revolution, given from the top down."""
     given = np.array(points, float)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(given, axis=0), axis=1))])
     return np.asarray(PchipInterpolator(length, given)(np.linspace(0, length[-1], count)))
 
 
-def vessel(points: list[tuple[float, float]], wall: float, foot: Vector, floor: float = 0.006, sides: int = 96) -> Mesh:
+def vessel(points: Outline, wall: float, foot: Vector, floor: float = 0.006, sides: int = 96) -> Mesh:
     """An open vessel of an outline, its inside ``wall`` metres within and ``floor`` above ``foot``, where it stands."""
     outer = profile(points)
     low = outer[-1, 1]

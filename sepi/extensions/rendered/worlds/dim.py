@@ -125,7 +125,7 @@ def _brushes(foot: Vector, wood: Material) -> Things:
     sticks, hairs = [], []
     for angle, rise in ((0.3, 0.2), (2.2, 0.23), (4.0, 0.18), (5.2, 0.25)):
         out = np.array([np.cos(angle), 0, np.sin(angle)])
-        path = np.array(foot) + [0.01 * out, 0.03 * out + [0, -0.11, 0], 0.03 * out * rise / 0.1 + [0, -rise, 0]]
+        path = np.add(foot, [0.01 * out, 0.03 * out + [0, -0.11, 0], 0.03 * out * rise / 0.1 + [0, -rise, 0]])
         sticks.append(tube(path, 0.004, 8))
         tip = path[-1] + (path[-1] - path[-2]) / np.linalg.norm(path[-1] - path[-2]) * np.linspace(0, 0.04, 6)[:, None]
         hairs.append(tube(tip, np.array([0.006, 0.008, 0.009, 0.009, 0.006, 0.001])))
@@ -153,7 +153,7 @@ def _saw(at: Vector, wood: Material) -> Things:
 
 
 def _hammer(at: Vector, turn: Vector, wood: Material) -> Things:
-    face = turned_body(np.array([[0.0005, 0.0], [0.015, 0.0], [0.015, -0.035]]), (0, 0, 0), 24)
+    face = turned_body([[0.0005, 0.0], [0.015, 0.0], [0.015, -0.035]], (0, 0, 0), 24)
     head = [box((0.01, -0.13, 0), (0.06, 0.026, 0.026))]
     head += [box((-0.035, -0.127, 0), (0.05, 0.012, 0.026), (0, 0, 0.15))]
     head += [moved(face, (0, 0, np.pi / 2), (0.065, -0.13, 0))]

@@ -58,7 +58,7 @@ def _chairs() -> Things:
     yield thing(chair(0.55, (-0.42, 0, 2.75), 5), patterns.wood(31, 0.8, (0.74, 0.52, 0.32), (0.58, 0.37, 0.2)))
     yield thing(chair(-2.5, (0.35, 0, 3.1), 3), Material((0.6, 0.1, 0.07), "glossy", 0.08))
     x, z = 0.86, 3.5
-    seat = turned_body(bevelled(np.array([[0, 0.62], [0.17, 0.62], [0.17, 0.58], [0, 0.58]]), 0.006), (x, 0, z))
+    seat = turned_body(bevelled([[0, 0.62], [0.17, 0.62], [0.17, 0.58], [0, 0.58]], 0.006), (x, 0, z))
     turns = np.arange(4) * np.pi / 2 + 0.5
     sides = zip(np.cos(turns), np.sin(turns), strict=True)
     legs = [rod((x + 0.19 * c, -0.013, z + 0.19 * s), (x + 0.1 * c, -0.59, z + 0.1 * s), 0.014) for c, s in sides]
@@ -67,16 +67,25 @@ def _chairs() -> Things:
 
 def _pots() -> Things:
     vase = [[0.052, 0.43], [0.06, 0.44], [0.05, 0.4], [0.075, 0.34], [0.115, 0.27], [0.13, 0.2], [0.115, 0.11]]
-    vase += [[0.085, 0.04], [0.075, 0.0], [0, 0]]
-    pot = [[0.14, 0.24], [0.155, 0.24], [0.155, 0.27], [0.17, 0.27], [0.17, 0.22], [0.155, 0.22], [0.115, 0.0], [0, 0]]
-    small = [[0.05, 0.1], [0.056, 0.1], [0.06, 0.085], [0.045, 0.0], [0, 0]]
-    smalls = [turned_body(bevelled(np.array(small), 0.003), place) for place in ((-0.3, 0, 2.0), (-0.12, 0, 2.2))]
+    vase += [[0.085, 0.04], [0.075, 0.0], [0.0, 0.0]]
+    pot = [
+        [0.14, 0.24],
+        [0.155, 0.24],
+        [0.155, 0.27],
+        [0.17, 0.27],
+        [0.17, 0.22],
+        [0.155, 0.22],
+        [0.115, 0.0],
+        [0.0, 0.0],
+    ]
+    small = [[0.05, 0.1], [0.056, 0.1], [0.06, 0.085], [0.045, 0.0], [0.0, 0.0]]
+    smalls = [turned_body(bevelled(small, 0.003), place) for place in ((-0.3, 0, 2.0), (-0.12, 0, 2.2))]
     glazed = Material(noise(41, (0.12, 0.3, 0.42), 0.05, 0.5, (4, 200), 0.5), "glossy", 0.05)
     yield thing(turned_body(_round(vase), (-0.88, 0, 3.2)), glazed)
     clay = noise(42, (0.62, 0.34, 0.22), 0.035, 0.6, (3, 200), 0.2)
-    yield thing(turned_body(bevelled(np.array(pot), 0.004), (0.44, 0, 2.3)), clay)
+    yield thing(turned_body(bevelled(pot, 0.004), (0.44, 0, 2.3)), clay)
     yield thing(smalls, Material((0.8, 0.78, 0.7), "glossy", 0.05))
-    soil = turned_body(np.array([[0, 0.235], [0.15, 0.225]]), (0.44, 0, 2.3))
+    soil = turned_body([[0, 0.235], [0.15, 0.225]], (0.44, 0, 2.3))
     yield thing(soil, noise(43, (0.16, 0.12, 0.09), 0.05, 0.3, (3, 30)))
     yield thing(ball((0.08, -0.06, 2.45), 0.06), Material((0.78, 0.52, 0.08), "glossy", 0.1))
 

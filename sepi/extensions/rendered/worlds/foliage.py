@@ -11,10 +11,20 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from sepi.extensions.rendered import patterns
-from sepi.extensions.rendered.shapes import Points, about_vertical, ball, copies, joined, leaf, rectangle, tube
+from sepi.extensions.rendered.patterns import noise, stone
+from sepi.extensions.rendered.shapes import (
+    Points,
+    about_vertical,
+    ball,
+    copies,
+    ground,
+    leaf,
+    thing,
+    tube,
+    wall,
+)
 from sepi.extensions.rendered.staging import of_boards, seen_from
-from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Sun, Thing, World
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Sun, Things, World
 
 _WALL = 3.1
 _UP = np.array([0.0, -1.0, 0.0])
@@ -44,27 +54,21 @@ class _Habit:
 
 def world() -> World:
     """The wall of a garden."""
-    things = [*_ground(), *_shrubs()]
     light = Light(sky=(0.75, 0.86, 1.0), suns=[Sun((0.6, 0.9, 0.75), (7.5, 6.9, 5.8))], exposure=0.85)
-    garden = World(things, Cameras(1.13, 2.75, 2.2, -1.6, 42), light)
+    garden = World([*_ground(), *_shrubs()], Cameras(1.13, 2.75, 2.2, -1.6, 42), light)
     return seen_from(garden, (-0.05, -0.92, 0.42), below=5)
 
 
-def _ground() -> list[Thing]:
-    plaster = patterns.noise(1, (0.72, 0.6, 0.44), 0.045, 1.3, (3, 500), 0.25)
-    plinth = patterns.stone(2, 0.9, (0.66, 0.64, 0.6), (0.42, 0.4, 0.38))
-    soil = patterns.noise(3, (0.34, 0.26, 0.19), 0.08, 0.9, (3, 50), 0.2)
-    blocks = [rectangle((-3 + 0.6 * n, -0.3, _WALL - 0.06), (0.592, 0, 0), (0, 0.3, 0)) for n in range(10)]
-    top = rectangle((-3, -0.3, _WALL - 0.06), (6, 0, 0), (0, 0, 0.06))
-    return [
-        Thing(rectangle((-3, -4, _WALL), (6, 0, 0), (0, 4, 0)), Material(plaster)),
-        Thing(rectangle((-3, -0.3, _WALL - 0.055), (6, 0, 0), (0, 0.3, 0)), Material((0.3, 0.28, 0.26))),
-        Thing(joined([of_boards(blocks, 0.33, 0.2), top]), Material(plinth)),
-        Thing(rectangle((-3, 0, -1), (6, 0, 0), (0, 0, 5)), Material(soil)),
-    ]
+def _ground() -> Things:
+    blocks = [wall((-3 + 0.6 * n, -0.3, _WALL - 0.06), 0.592, 0.3) for n in range(10)]
+    yield thing(wall((-3, -4, _WALL), 6, 4), noise(1, (0.72, 0.6, 0.44), 0.045, 1.3, (3, 500), 0.25))
+    yield thing(wall((-3, -0.3, _WALL - 0.055), 6, 0.3), (0.3, 0.28, 0.26))
+    plinth = [of_boards(blocks, 0.33, 0.2), ground((-3, -0.3, _WALL - 0.06), 6, 0.06)]
+    yield thing(plinth, stone(2, 0.9, (0.66, 0.64, 0.6), (0.42, 0.4, 0.38)))
+    yield thing(ground((-3, 0, -1), 6, 5), noise(3, (0.34, 0.26, 0.19), 0.08, 0.9, (3, 50), 0.2))
 
 
-def _shrubs() -> list[Thing]:
+def _shrubs() -> Things:
     rng = np.random.default_rng(8)
     round_leaf, narrow, broad = leaf(0.062, 0.036, 0.5, 0.3), leaf(0.085, 0.016, 0.7, 0.4), leaf(0.085, 0.05, 0.6, 0.25)
     laurel = _Habit((9, 6, 4), (0.66, 0.4, 0.24), 0.011, 0.75, 0.22, 8, round_leaf)
@@ -75,15 +79,18 @@ def _shrubs() -> list[Thing]:
         (_grown(rng, willow, (-0.62, 0.0, 2.35), _UP), willow, (0.5, 0.56, 0.38)),
         (_grown(rng, bough, (-0.8, -1.36, 1.68), np.array([0.9, 0.12, 0.1])), bough, (0.38, 0.5, 0.15)),
     ]
-    bark = Material(patterns.noise(11, (0.34, 0.26, 0.2), 0.06, 0.2, (3, 40), 0.2))
-    found = []
+    bark = Material(noise(11, (0.34, 0.26, 0.2), 0.06, 0.2, (3, 40), 0.2))
     for number, (plant, habit, green) in enumerate(plants):
-        found.append(Thing(joined(plant.wood), bark, thin=True))
-        blades = Material(patterns.noise(20 + 5 * number, green, 0.045, 0.5, (4, 200), 0.6))
-        found.append(Thing(_leaves(rng, plant, habit.leaf), blades))
+        yield thing(plant.wood, bark, thin=True)
+        blades = noise(20 + 5 * number, green, 0.045, 0.5, (4, 200), 0.6)
+        yield thing(_leaves(rng, plant, habit.leaf), blades)
     places = np.concatenate(plants[0][0].places)[::14] + np.array([0, 0.012, 0])
     berries = copies(ball((0, 0, 0), 0.008, fineness=10), about_vertical(np.zeros(len(places))), places)
-    return [*found, Thing(berries, Material((0.62, 0.07, 0.05), "glossy", 0.15)), _fallen(rng, round_leaf)]
+    yield thing(berries, Material((0.62, 0.07, 0.05), "glossy", 0.15))
+    # and fallen ones
+    places = np.stack([rng.uniform(-1.4, 1.4, 220), np.full(220, -0.008), rng.uniform(1.9, 2.95, 220)], axis=1)
+    fallen = copies(round_leaf, about_vertical(rng.uniform(0, 2 * np.pi, 220)), places)
+    yield thing(fallen, noise(41, (0.5, 0.33, 0.14), 0.06, 0.3, (4, 200), 0.6))
 
 
 def _grown(rng: np.random.Generator, habit: _Habit, foot: npt.ArrayLike, direction: Points) -> _Plant:
@@ -129,15 +136,5 @@ def _leaves(rng: np.random.Generator, plant: _Plant, blade: Mesh) -> Mesh:
     return copies(blade, axes, places, rng.uniform(0.7, 1.15, len(places)))
 
 
-def _fallen(rng: np.random.Generator, blade: Mesh) -> Thing:
-    """Leaves on the ground."""
-    count = 220
-    places = np.stack([rng.uniform(-1.4, 1.4, count), np.full(count, -0.008), rng.uniform(1.9, 2.95, count)], axis=1)
-    axes = about_vertical(rng.uniform(0, 2 * np.pi, count))
-    brown = patterns.noise(41, (0.5, 0.33, 0.14), 0.06, 0.3, (4, 200), 0.6)
-    return Thing(copies(blade, axes, places), Material(brown))
-
-
 def _unit(vectors: Points) -> Points:
-    found: Points = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return found
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

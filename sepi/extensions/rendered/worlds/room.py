@@ -90,7 +90,7 @@ def _shelves() -> Things:
             x += thick + 0.001
     for colour, spines in books.items():
         yield thing(moved(spines, turn, place), Material(colour, "glossy", 0.25))
-    vase = bevelled(np.array([[0.03, 0.22], [0.026, 0.2], [0.05, 0.14], [0.06, 0.08], [0.035, 0.0], [0, 0]]), 0.008)
+    vase = bevelled([[0.03, 0.22], [0.026, 0.2], [0.05, 0.14], [0.06, 0.08], [0.035, 0.0], [0, 0]], 0.008)
     vases = [turned_body(vase, (0.42, -0.051 - pitch * n, -0.02)) for n in (1, 3, 5)]
     yield thing(moved(vases, turn, place), Material((0.62, 0.3, 0.2), "glossy", 0.1))
 
@@ -103,7 +103,7 @@ def _table() -> Things:
     top, white = -0.76, Material((0.82, 0.82, 0.8), "glossy", 0.08)
     bowl = np.array([[0.15, 0.075], [0.12, 0.03], [0.06, 0.006], [0.05, 0], [0, 0]])
     yield thing(turned_body(bowl, (0.35, top, 2.8)), white)
-    mug = bevelled(np.array([[0, 0.006], [0.037, 0.006], [0.037, 0.1], [0.041, 0.1], [0.041, 0], [0, 0]]), 0.001)
+    mug = bevelled([[0, 0.006], [0.037, 0.006], [0.037, 0.1], [0.041, 0.1], [0.041, 0], [0, 0]], 0.001)
     yield thing(turned_body(mug, (-0.02, top, 2.6)), white)
     places = [(0.0, -0.05, 0.0), (0.075, -0.052, 0.02), (-0.02, -0.055, 0.075), (0.02, -0.115, 0.03)]
     fruit = [ball((0.35 + x, top + y, 2.8 + z), 0.038, fineness=32) for x, y, z in places]
@@ -114,9 +114,9 @@ def _table() -> Things:
 
 def _lamp() -> Things:
     x, z = 1.82, 4.0
-    foot = turned_body(bevelled(np.array([[0, 0.025], [0.15, 0.025], [0.15, 0], [0, 0]]), 0.003), (x, 0, z))
+    foot = turned_body(bevelled([[0, 0.025], [0.15, 0.025], [0.15, 0], [0, 0]], 0.003), (x, 0, z))
     yield thing([foot, rod((x, -0.02, z), (x, -1.6, z), 0.012)], Material((0.12, 0.12, 0.12), "glossy", 0.2))
-    yield thing(turned_body(np.array([[0.14, 1.78], [0.22, 1.45]]), (x, 0, z)), (0.84, 0.8, 0.7))
-    hanging = turned_body(np.array([[0.02, 0.2], [0.05, 0.18], [0.14, 0.1], [0.18, 0.0]]), (0.35, -1.72, 2.75))
+    yield thing(turned_body([[0.14, 1.78], [0.22, 1.45]], (x, 0, z)), (0.84, 0.8, 0.7))
+    hanging = turned_body([[0.02, 0.2], [0.05, 0.18], [0.14, 0.1], [0.18, 0.0]], (0.35, -1.72, 2.75))
     yield thing(hanging, Material((0.75, 0.28, 0.16), "glossy", 0.2))
     yield thing(rod((0.35, -1.9, 2.75), (0.35, -_HIGH, 2.75), 0.003), (0.08, 0.08, 0.08), thin=True)

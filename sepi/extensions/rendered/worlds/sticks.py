@@ -101,7 +101,7 @@ def _sticks() -> Things:
 
 def _bucket(rng: np.random.Generator) -> Things:
     x, z, height, rim = -0.34, 2.22, 0.26, 0.1
-    outline = bevelled(np.array([[0.07, 0.01], [rim - 0.004, height], [rim, height], [0.075, 0], [0, 0]]), 0.002)
+    outline = bevelled([[0.07, 0.01], [rim - 0.004, height], [rim, height], [0.075, 0], [0, 0]], 0.002)
     canes = []
     for angle in rng.uniform(0, 2 * np.pi, 14):
         out = np.array([np.cos(angle), 0, np.sin(angle)])

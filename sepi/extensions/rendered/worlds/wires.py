@@ -76,7 +76,7 @@ def _store() -> Things:
     ]
     side = [[0, 0.88], [0.27, 0.88], [0.285, 0.86], [0.28, 0.6], [0.295, 0.59], [0.28, 0.58], [0.28, 0.3]]
     side += [[0.295, 0.29], [0.28, 0.28], [0.285, 0.0], [0, 0]]
-    barrel = shapes.turned_body(shapes.bevelled(np.array(side), 0.006), (1.42, 0, 3.6))
+    barrel = shapes.turned_body(shapes.bevelled(side, 0.006), (1.42, 0, 3.6))
     ladder = [rod((-2.32, -0.3 * n, 6.03 + 0.034 * n), (-1.98, -0.3 * n, 6.03 + 0.034 * n), 0.014) for n in range(1, 9)]
     ladder += [rod((x, 0, 6.0), (x, -2.7, 6.3), 0.022) for x in (-2.34, -1.96)]
     poles = [
