@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import zlib
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,8 +20,7 @@ from sepi.validation.models import CheckedModel, validated
 from sepi.workflow.rendered_scenes import NoiseLevel, exposed_name
 
 
-@dataclass(frozen=True)
-class Electrons:
+class Electrons(NamedTuple):
     """A sensor: electrons of a white pixel, and standard deviation of the read noise in electrons."""
 
     white: float
@@ -112,7 +110,7 @@ def exposed(render: Render, exposure: Exposure) -> LightField:
     for t, s in np.ndindex(rows, columns):
         light = np.maximum(render.views[t, s].astype(np.float64), 0) * (factors[t, s] * shade)
         rng = np.random.default_rng([exposure.noise_seed, key, t * columns + s])
-        views[t, s] = _values(_noisy(light, exposure, render.light, rng), exposure)
+        views[t, s] = _taken(light, exposure, render.light, rng)
     return LightField(
         views=views,
         name=exposed_name(render.name, exposure.noise, exposure.noise_seed),
@@ -124,27 +122,18 @@ def exposed(render: Render, exposure: Exposure) -> LightField:
     )
 
 
-def _noisy(
+def _taken(
     light: npt.NDArray[np.float64], exposure: Exposure, share: float, rng: np.random.Generator
 ) -> npt.NDArray[np.float64]:
-    """Light with photon noise and read noise."""
-    sensor = NOISE[exposure.noise]
-    if sensor is None:
-        return light
-    white = sensor.white * share
-    # a full well is white
-    electrons = rng.poisson(np.minimum(light, 1) * white) + sensor.read * rng.standard_normal(light.shape)
-    return electrons / white
-
-
-def _values(light: npt.NDArray[np.float64], exposure: Exposure) -> npt.NDArray[np.float64]:
-    """Pixel values before rounding."""
+    """Pixel values before their type: with photon noise and read noise, cut off at white, through the curve."""
+    if sensor := NOISE[exposure.noise]:
+        white = sensor.white * share
+        # a full well is white
+        electrons = rng.poisson(np.minimum(light, 1) * white) + sensor.read * rng.standard_normal(light.shape)
+        light = electrons / white
     light = np.clip(light, 0, 1)
-    curve = (
-        np.float64(srgb_encoded(light.astype(np.float32))) if exposure.gamma is None else light ** (1 / exposure.gamma)
-    )
-    values: npt.NDArray[np.float64] = np.round(curve * (2**exposure.bits - 1))
-    return values
+    curve = srgb_encoded(light.astype(np.float32)) if exposure.gamma is None else light ** (1 / exposure.gamma)
+    return np.asarray(np.round(np.float64(curve) * (2**exposure.bits - 1)))
 
 
 def _vignette(shape: tuple[int, int], strength: float) -> npt.NDArray[np.float64]:

@@ -55,12 +55,7 @@ def _amplitude(finest: float, coarsest: float, texels: int, stretch: float) -> F
 
 
 def noise(
-    seed: int,
-    colour: Vector,
-    contrast: float,
-    size: float,
-    waves: tuple[float, float] = (4.0, 256.0),
-    chroma: float = 0.3,
+    seed: int, colour: Vector, contrast: float, size: float, waves: tuple[float, float] = (4, 256), chroma: float = 0.3
 ) -> Pattern:
     """Noise about a colour.
 

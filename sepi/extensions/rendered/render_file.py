@@ -90,9 +90,9 @@ def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64]) -> Bi
     return bits
 
 
-def mask(bits: Bits, name: str) -> BoolMap:
-    """One of a view's masks."""
-    return np.asarray(bits & _BIT[name], bool)
+def masks_in(bits: Bits) -> dict[str, BoolMap]:
+    """A view's masks by name."""
+    return {name: np.asarray(bits & _BIT[name], bool) for name in MASKS}
 
 
 _ARRAYS = ("views", "disparity", "normal", "masks", "positions", "turns")
@@ -151,7 +151,7 @@ class Render:
 
     def masks_of(self, view: tuple[int, int]) -> dict[str, BoolMap]:
         """The masks of a view by name."""
-        return {name: mask(self.masks[view], name) for name in MASKS}
+        return masks_in(self.masks[view])
 
 
 def write_render(path: Path, render: Render) -> None:
@@ -191,4 +191,4 @@ def read_truth(path: Path) -> tuple[FloatMap, dict[str, BoolMap]]:
         rows, columns = file["disparity"].shape[:2]
         centre = (rows // 2, columns // 2)
         bits = read_dataset(path, file["masks"], centre)
-        return read_dataset(path, file["disparity"], centre), {name: mask(bits, name) for name in MASKS}
+        return read_dataset(path, file["disparity"], centre), masks_in(bits)

@@ -31,18 +31,6 @@ from sepi.validation.models import CheckedModel
 _Share = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 _Rows = Annotated[int, Field(ge=1, le=33)]
 
-# arrays of a view that are kept until all views are finished
-_TYPES = {
-    "views": np.float32,
-    "albedo": np.float32,
-    "disparity": np.float32,
-    "normal": np.float16,
-    "masks": np.uint16,
-    "upright": np.float32,
-    "things": np.int16,
-    "whole": np.bool_,
-}
-
 
 class RenderOptions(CheckedModel):
     """Options of rendering."""
@@ -103,7 +91,11 @@ def render_world(
     # the folder of finished views
     parts = path.with_name(f"{path.name}.parts")
     digest = hashlib.sha256(pickle.dumps(world)).hexdigest()
-    _take_over(parts, json.dumps({**made_by(name, options), "world": digest}, sort_keys=True))
+    record, note = json.dumps({**made_by(name, options), "world": digest}, sort_keys=True), parts / "made_by.json"
+    if not (note.is_file() and note.read_text(encoding="utf-8") == record):
+        shutil.rmtree(parts, ignore_errors=True)
+        with atomic_path(note) as temporary:
+            temporary.write_text(record, encoding="utf-8")
     files = [parts / f"view_{number:03d}.npz" for number in range(count)]
     missing = [number for number, file in enumerate(files) if not _is_whole(file)]
     for done, (number, values) in enumerate(_views(world, rig, options, missing), count - len(missing) + 1):
@@ -131,8 +123,7 @@ def _views(
             truth, picture = coming.result()
             if following is not None:
                 coming = beside.submit(_looked_at, tracer, options, following)
-            found = {**truth, "views": picture()}
-            yield number, {part: values.astype(_TYPES[part]) for part, values in found.items()}
+            yield number, {**truth, "views": picture()}
 
 
 def _looked_at(
@@ -147,18 +138,18 @@ def _looked_at(
     seen = tracer.surfaces.first(at)
     disparity = tracer.rig.disparity(seen.depth).astype(np.float32)
     straight = tracer.surfaces.first(tracer.position(down, across)) if any(turn) else seen
-    plan = planned(tracer, at, seen, options.samples, seed) if options.shares_light else None
-    truth = {
-        "albedo": plan.albedo if plan else np.zeros((*disparity.shape, 3)),
-        "whole": plan.whole if plan else np.zeros(disparity.shape),
-        "things": seen.thing,
+    truth: dict[str, npt.NDArray[Any]] = {
         "disparity": disparity,
-        "normal": seen.normal,
+        "normal": seen.normal.astype(np.float16),
         "masks": surface_bits(tracer.world.things, seen, disparity),
         # occlusion masks need a view without a turn
-        "upright": tracer.rig.disparity(straight.depth),
+        "upright": tracer.rig.disparity(straight.depth).astype(np.float32),
     }
-    return truth, partial(pictured, tracer, plan) if plan else partial(tracer.picture, at, seed, options.samples)
+    if not options.shares_light:
+        return truth, partial(tracer.picture, at, seed, options.samples)
+    plan = planned(tracer, at, seen, options.samples, seed)
+    truth |= {"albedo": plan.albedo, "things": seen.thing.astype(np.int16), "whole": plan.whole}
+    return truth, partial(pictured, plan)
 
 
 def _stand(rig: Rig, options: RenderOptions) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
@@ -177,14 +168,14 @@ def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files:
     views: dict[str, npt.NDArray[Any]] = {}
     for number, file in enumerate(files):
         with np.load(file) as values:
-            for part, kind in _TYPES.items():
+            for part in values:
                 if number == 0:
-                    views[part] = np.empty((len(files), *values[part].shape), kind)
+                    views[part] = np.empty((len(files), *values[part].shape), values[part].dtype)
                 views[part][number] = values[part]
-    upright, albedo, things, whole = (views.pop(part) for part in ("upright", "albedo", "things", "whole"))
-    stands, turned = positions.reshape(-1, 2), turns.reshape(-1, 3).any(axis=1)
+    upright, stands, turned = views.pop("upright"), positions.reshape(-1, 2), turns.reshape(-1, 3).any(axis=1)
     if options.shares_light:
-        views["views"] = with_shared_light(views["views"], albedo, upright, things, whole, stands)
+        albedo, things, whole = (views.pop(part) for part in ("albedo", "things", "whole"))
+        views["views"] = with_shared_light(views["views"], albedo, things, whole, upright, stands)
     # the limit of half precision lies far beyond white
     views["views"] = np.minimum(views["views"], 60000.0).astype(np.float16)
     # unknown for turned views
@@ -200,23 +191,10 @@ def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files:
     )
 
 
-def _take_over(parts: Path, made_by: str) -> None:
-    """Make the folder of views; keep an existing one with the same scene and options."""
-    note = parts / "made_by.json"
-    if note.is_file() and note.read_text(encoding="utf-8") == made_by:
-        return
-    shutil.rmtree(parts, ignore_errors=True)
-    parts.mkdir(parents=True)
-    with atomic_path(note) as temporary:
-        temporary.write_text(made_by, encoding="utf-8")
-
-
 def _is_whole(file: Path) -> bool:
-    """Whether a view's file is complete."""
-    if not file.is_file():
-        return False
+    """Whether a view's file is there, and complete."""
     try:
-        with np.load(file) as values:
-            return set(_TYPES) == set(values.files)
+        with np.load(file):
+            return True
     except (OSError, ValueError, BadZipFile):
         return False

@@ -80,19 +80,10 @@ def _rectangles(corners: Points, across: Points, down: Points) -> Mesh:
 
 def box(centre: Vector, size: Vector, turn: Vector = (0, 0, 0)) -> Mesh:
     """A box, turned by angles about its own x, y and z axes, in radians."""
-    w, h, d = size
-    x, y, z = (-w / 2, -h / 2, -d / 2)
-    sides = np.array(
-        [
-            [(x, y, z), (w, 0, 0), (0, h, 0)],
-            [(-x, y, -z), (-w, 0, 0), (0, h, 0)],
-            [(x, y, -z), (0, 0, -d), (0, h, 0)],
-            [(-x, y, z), (0, 0, d), (0, h, 0)],
-            [(x, y, -z), (w, 0, 0), (0, 0, -d)],
-            [(x, -y, z), (w, 0, 0), (0, 0, d)],
-        ]
-    )
-    return moved(_rectangles(*np.moveaxis(sides, 1, 0)), turn, centre)
+    right, down, away = np.diag(np.asarray(size, float))
+    corners = np.array([[-1, -1, -1], [1, -1, 1], [-1, -1, 1], [1, -1, -1], [-1, -1, 1], [-1, 1, -1]]) * size / 2
+    across, below = [right, -right, -away, away, right, right], [down, down, down, down, -away, away]
+    return moved(_rectangles(corners, np.array(across), np.array(below)), turn, centre)
 
 
 def ball(
@@ -287,8 +278,7 @@ def normals(mesh: Mesh) -> FloatArray:
     _, same = np.unique(np.round(mesh.vertices, 6), axis=0, return_inverse=True)
     same = same.ravel()
     total = np.zeros((same.max() + 1, 3))
-    for corner in range(3):
-        np.add.at(total, same[mesh.faces[:, corner]], facing)
+    np.add.at(total, same[mesh.faces.T], facing)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.asarray((total / np.where(length > 0, length, 1))[same], np.float32)
 

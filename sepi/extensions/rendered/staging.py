@@ -70,11 +70,8 @@ def book(size: Vector, cover: Material, paper: Material, turn: Vector, by: Vecto
     w, h, d = size
     board = min(0.003, h / 6)
     middle = -h / 2
-    covers = [
-        box((0, -h + board / 2, 0), (w, board, d)),
-        box((0, -board / 2, 0), (w, board, d)),
-        box((-w / 2 + board / 2, middle, 0), (board, h - 2 * board, d)),
-    ]
+    covers = [box((0, y, 0), (w, board, d)) for y in (-h + board / 2, -board / 2)]
+    covers.append(box((-w / 2 + board / 2, middle, 0), (board, h - 2 * board, d)))
     pages = box((0, middle, 0), (w - 2.5 * board, h - 2 * board, d - 3 * board))
     yield thing(moved(covers, turn, by), cover)
     yield thing(moved(pages, turn, by), paper)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import importlib.util
 import math
+from collections.abc import Callable
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,18 +19,7 @@ from sepi.errors import SepiError
 from sepi.extensions.rendered.patterns import srgb_decoded
 from sepi.extensions.rendered.shapes import normals, rotation
 from sepi.extensions.rendered.surfaces import NEAR, Surfaces, period
-from sepi.extensions.rendered.world import (
-    FloatArray,
-    Lamp,
-    Light,
-    Material,
-    Pattern,
-    Position,
-    Rig,
-    Thing,
-    Vector,
-    World,
-)
+from sepi.extensions.rendered.world import FloatArray, Lamp, Material, Pattern, Position, Rig, Thing, Vector, World
 from sepi.process.threads import threads_used
 
 # side of Mitsuba's blocks; by default, it depends on the number of threads, and so would the seeds
@@ -43,27 +33,6 @@ _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 
 
 Pixels = npt.NDArray[np.int64]
-
-
-class Tiles(NamedTuple):
-    """Square tiles of a picture.
-
-    Attributes
-    ----------
-    pixels : ndarray, shape (N, T, T, 2), int64
-        Rows and columns of their pixels.
-    paths : int
-        Number of paths of each pixel.
-    seed : int
-        First seed of the paths; some that follow are used, too.
-    cameras : list
-        Cameras of the tiles.
-    """
-
-    pixels: Pixels
-    paths: int
-    seed: int
-    cameras: list[Any]
 
 
 def require_mitsuba() -> None:
@@ -107,23 +76,17 @@ class Tracer:
     def __init__(self, world: World, rig: Rig, lens: float = 0.0, lens_points: int = 32) -> None:
         self._mi = _mitsuba()
         self.world, self.rig, self._lens, self._lens_points = world, rig, lens, lens_points if lens else 1
-        self.surfaces, light = Surfaces(world, rig), world.light
-        parts: dict[str, Any] = {}
+        self.surfaces = Surfaces(world, rig)
         # things with the same material share its textures
         surfaces = {id(thing.material): thing.material for thing in world.things}
         loaded = {key: self._mi.load_dict(self._surface(material)) for key, material in surfaces.items()}
-        for number, thing in enumerate(world.things):
-            parts[f"thing{number}"] = self._shape(thing, loaded[id(thing.material)])
-        for number, lamp in enumerate(light.lamps):
-            parts[f"lamp{number}"] = self._lamp(lamp)
-        for number, sun in enumerate(light.suns):
-            irradiance = {"type": "rgb", "value": list(sun.irradiance)}
-            parts[f"sun{number}"] = {
-                "type": "directional",
-                "direction": np.asarray(sun.direction).tolist(),
-                "irradiance": irradiance,
-            }
-        self._scene = self._mi.load_dict({"type": "scene", **parts, **self._sky(light)})
+        things = [self._shape(thing, loaded[id(thing.material)]) for thing in world.things]
+        parts = {f"thing{number}": thing for number, thing in enumerate(things)}
+        parts |= {f"lamp{number}": self._lamp(lamp) for number, lamp in enumerate(world.light.lamps)}
+        for number, sun in enumerate(world.light.suns):
+            direction = np.asarray(sun.direction).tolist()
+            parts[f"sun{number}"] = {"type": "directional", "direction": direction, "irradiance": _rgb(sun.irradiance)}
+        self._scene = self._mi.load_dict({"type": "scene", **parts, **self._sky()})
 
     def position(self, down: float, across: float, turn: Vector = (0.0, 0.0, 0.0)) -> Position:
         """The camera of the view ``(down, across)`` view steps from the centre."""
@@ -140,21 +103,22 @@ class Tracer:
             total += part * self._seen(camera, size, part, seed + number)
         return (self.world.light.exposure / samples * total).astype(np.float32)
 
-    def tiles(self, position: Position, pixels: Pixels, paths: int, seed: int) -> Tiles:
-        """Cameras for square tiles of :meth:`picture`, given their pixels ``(N, T, T, 2)``."""
+    def tiles(self, position: Position, pixels: Pixels, paths: int, seed: int) -> Callable[[], FloatArray]:
+        """Prepare pictures of square tiles, given their pixels ``(N, T, T, 2)``.
+
+        They are linear, 1 is white, of shape (N, T, T, 3); ``seed`` is the first of several in a row.
+        """
         corners, side = pixels[:, 0, 0], pixels.shape[1]
         # groups small enough for single precision to distinguish their rays
         groups = np.split(corners, range(max(4096 // side, 1), len(corners), max(4096 // side, 1)))
-        return Tiles(pixels, paths, seed, [self._side_by_side(position, group, side, paths) for group in groups])
+        cameras = [self._side_by_side(position, group, side, paths) for group in groups]
 
-    def seen(self, tiles: Tiles) -> FloatArray:
-        """Linear pictures of tiles, 1 is white; shape (N, T, T, 3)."""
-        side = tiles.pixels.shape[1]
-        found = [
-            self._seen(cameras, side, tiles.paths, tiles.seed + number).reshape(side, -1, side, 3)
-            for number, cameras in enumerate(tiles.cameras)
-        ]
-        return np.float32(self.world.light.exposure) * np.concatenate(found, axis=1).transpose(1, 0, 2, 3)
+        def pictures() -> FloatArray:
+            found = [self._seen(camera, side, paths, seed + number) for number, camera in enumerate(cameras)]
+            apart = np.concatenate([picture.reshape(side, -1, side, 3) for picture in found], axis=1)
+            return np.float32(self.world.light.exposure) * apart.transpose(1, 0, 2, 3)
+
+        return pictures
 
     def _side_by_side(self, position: Position, corners: npt.NDArray[np.int64], side: int, paths: int) -> Any:
         """Cameras of square tiles, side by side in one picture, given their first pixels ``(N, 2)``."""
@@ -186,18 +150,10 @@ class Tracer:
 
     def _shape(self, thing: Thing, surface: Any) -> Any:
         """Mitsuba's shape of a thing."""
-        mesh = thing.mesh
-        properties = self._mi.Properties()
-        properties["bsdf"] = surface
-        properties["face_normals"] = not mesh.smooth
-        shape = self._mi.Mesh(
-            "thing",
-            len(mesh.vertices),
-            len(mesh.faces),
-            props=properties,
-            has_vertex_normals=mesh.smooth,
-            has_vertex_texcoords=True,
-        )
+        mesh, properties = thing.mesh, self._mi.Properties()
+        properties["bsdf"], properties["face_normals"] = surface, not mesh.smooth
+        layers = {"has_vertex_normals": mesh.smooth, "has_vertex_texcoords": True}
+        shape = self._mi.Mesh("thing", len(mesh.vertices), len(mesh.faces), props=properties, **layers)
         values = self._mi.traverse(shape)
         values["vertex_positions"] = np.ravel(mesh.vertices)
         values["faces"] = np.ravel(mesh.faces)
@@ -209,16 +165,12 @@ class Tracer:
 
     def _lamp(self, lamp: Lamp) -> dict[str, Any]:
         """Mitsuba's rectangle (-1 to 1 in x and y, shining towards z), moved to the lamp's corner and edges."""
-        corner, across, down = (np.array(values, float) for values in (lamp.corner, lamp.across, lamp.down))
-        facing = np.cross(across, down)
+        corner, across, down = (np.asarray(values, float) for values in (lamp.corner, lamp.across, lamp.down))
+        facing, matrix = np.cross(across, down), np.eye(4)
         columns = [across / 2, down / 2, facing / np.linalg.norm(facing), corner + across / 2 + down / 2]
-        matrix = np.vstack([np.stack(columns, axis=1), [0, 0, 0, 1]])
-        radiance = {"type": "rgb", "value": list(lamp.radiance)}
-        return {
-            "type": "rectangle",
-            "to_world": self._mi.ScalarTransform4f(matrix),
-            "emitter": {"type": "area", "radiance": radiance},
-        }
+        matrix[:3] = np.stack(columns, axis=1)
+        emitter = {"type": "area", "radiance": _rgb(lamp.radiance)}
+        return {"type": "rectangle", "to_world": self._mi.ScalarTransform4f(matrix), "emitter": emitter}
 
     def _surface(self, material: Material) -> dict[str, Any]:
         """Mitsuba's description of a material."""
@@ -237,21 +189,25 @@ class Tracer:
 
     def _texture(self, material: Material) -> dict[str, Any]:
         if not isinstance(material.pattern, Pattern):
-            return {"type": "rgb", "value": srgb_decoded(np.array(material.pattern)).tolist()}
+            return _rgb(srgb_decoded(np.array(material.pattern)))
         raster = self._mi.Bitmap(self.surfaces.linear(material.pattern))
         # without interpolation, for a fifth of the time: pixels are at least texels, and paths spread over them
         return {"type": "bitmap", "bitmap": raster, "raw": True, "format": "fp16", "filter_type": "nearest"}
 
-    def _sky(self, light: Light) -> dict[str, Any]:
+    def _sky(self) -> dict[str, Any]:
+        sky = self.world.light.sky
         # each path samples one light at a time, and a sun contributes more than the sky
-        asked = {"sampling_weight": _SKY_BESIDE_SUN if light.suns else 1.0}
-        if not isinstance(light.sky, np.ndarray):
-            radiance = {"type": "rgb", "value": list(light.sky)}
-            return {"sky": {"type": "constant", "radiance": radiance, **asked}} if any(light.sky) else {}
+        asked = {"sampling_weight": _SKY_BESIDE_SUN if self.world.light.suns else 1.0}
+        if np.ndim(sky) == 1:
+            return {"sky": {"type": "constant", "radiance": _rgb(sky), **asked}} if np.any(sky) else {}
         # Mitsuba's panoramas have y up
         upright = self._mi.ScalarTransform4f().rotate([0, 0, 1], 180.0)
-        bitmap = self._mi.Bitmap(light.sky.astype(np.float32))
+        bitmap = self._mi.Bitmap(np.asarray(sky, np.float32))
         return {"sky": {"type": "envmap", "bitmap": bitmap, "to_world": upright, **asked}}
+
+
+def _rgb(values: npt.ArrayLike) -> dict[str, Any]:
+    return {"type": "rgb", "value": np.asarray(values, float).tolist()}
 
 
 def _film(width: int, height: int) -> dict[str, Any]:

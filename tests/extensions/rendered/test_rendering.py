@@ -15,7 +15,7 @@ from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.extensions.rendered import patterns, shapes, tracing
 from sepi.extensions.rendered.exposure import NOISE, Exposure, exposed
-from sepi.extensions.rendered.render_file import MASKS, Render, mask, read_render, seen_bits
+from sepi.extensions.rendered.render_file import MASKS, Render, masks_in, read_render, seen_bits
 from sepi.extensions.rendered.rendering import render_world
 from sepi.extensions.rendered.sampling import pictured, planned
 from sepi.extensions.rendered.tracing import Tracer
@@ -129,11 +129,11 @@ def test_paths_are_traced_where_views_differ() -> None:
     seen = tracer.surfaces.first(at)
     plan = planned(tracer, at, seen, samples, 0)
     taken = np.zeros((size, size), int)
-    for tiles, before in plan.tiles:
-        rows, columns = tiles.pixels[..., 0], tiles.pixels[..., 1]
-        assert (taken[rows, columns] <= samples + before).all()
-        taken[rows, columns] = before + tiles.paths
-    shown, mirror = pictured(tracer, plan), seen.thing == 2
+    for pixels, before, paths, _ in plan.passes:
+        where = pixels[..., 0], pixels[..., 1]
+        assert (taken[where] <= samples + before).all()
+        taken[where] = before + paths
+    shown, mirror = pictured(plan), seen.thing == 2
     # a tile of another kind may hold some of the mirror's border
     inside = ndimage.minimum_filter(mirror, 3)
     assert set(np.unique(taken[inside])) == {samples}
@@ -191,11 +191,11 @@ def test_what_one_view_alone_sees_is_told() -> None:
     bits = seen_bits(disparities, positions)[0]
     for name in ("occluded", "alone"):
         # all of them, whether a mirror would swap right and left or not
-        assert mask(bits, name)[1].nonzero()[0].tolist() == [4, 5, 6, 7]
+        assert masks_in(bits)[name][1].nonzero()[0].tolist() == [4, 5, 6, 7]
     # what lies outside the other picture is hidden by nothing, and seen by nobody else
     shifted = seen_bits(np.ones((2, 4, 12), np.float32), positions)[0]
-    assert not mask(shifted, "occluded").any()
-    assert mask(shifted, "alone")[1].nonzero()[0].tolist() == [0, 1]
+    assert not masks_in(shifted)["occluded"].any()
+    assert masks_in(shifted)["alone"][1].nonzero()[0].tolist() == [0, 1]
 
 
 def test_noise_is_that_of_the_stated_sensor(plain: Render) -> None:
