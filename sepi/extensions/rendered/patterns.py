@@ -96,9 +96,7 @@ def bricks(seed: int, size: float, rows: int = 10, colour: Vector = (0.6, 0.32, 
     return painted(np.where((to_joint > 0.06)[..., None], face, mortar), size)
 
 
-def tiles(
-    seed: int, size: float, count: int = 8, light: Vector = (0.85, 0.84, 0.8), dark: Vector = (0.2, 0.24, 0.3)
-) -> Pattern:
+def tiles(seed: int, size: float, count: int, light: Vector, dark: Vector) -> Pattern:
     """Squares of two colours in turn, with joints; an even count a side."""
     odd, joint = checks(count, 0.02)
     colour = _between(light, dark, odd[..., 0]) + 0.03 * field(seed, 4, 200)[..., None]
@@ -114,10 +112,8 @@ def checks(count: int, joint: float) -> tuple[Field, BoolMap]:
 
 def stripes(size: float, colours: list[Vector], across: bool = True) -> Pattern:
     """Equal stripes in turn; ``across``: side by side, else one below the other."""
-    position = np.arange(TEXELS) * len(colours) // TEXELS
-    row = np.array(colours)[position]
-    raster = np.broadcast_to(row[None, :] if across else row[:, None], (TEXELS, TEXELS, 3))
-    return painted(raster, size)
+    row = np.array(colours)[np.arange(TEXELS) * len(colours) // TEXELS]
+    return painted(np.broadcast_to(row if across else row[:, None], (TEXELS, TEXELS, 3)), size)
 
 
 def weave(seed: int, size: float, colour: Vector, contrast: float = 0.1, threads: int = 128) -> Pattern:

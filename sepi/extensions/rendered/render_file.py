@@ -61,15 +61,10 @@ def surface_bits(things: Sequence[Thing], seen: FirstSurface, disparity: FloatMa
     thin = np.array([thing.thin for thing in things] + [False])[seen.thing]
     plain = textureless(albedo_of(things, seen))
     solid = (kinds == "matte") | (kinds == "glossy")
-    masks = {
-        "textured": solid & ~plain,
-        "textureless": solid & plain,
-        **{kind: kinds == kind for kind in ("glossy", "mirror", "glass")},
-        "thin": thin,
-        "discontinuities": edges_of(disparity).region,
-    }
-    bits: Bits = np.bitwise_or.reduce([mask.astype(np.uint16) * _BIT[name] for name, mask in masks.items()])
-    return bits
+    masks = {"textured": solid & ~plain, "textureless": solid & plain, "thin": thin}
+    masks |= {kind: kinds == kind for kind in ("glossy", "mirror", "glass")}
+    masks["discontinuities"] = edges_of(disparity).region
+    return np.asarray(np.bitwise_or.reduce([mask.astype(np.uint16) * _BIT[name] for name, mask in masks.items()]))
 
 
 def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64]) -> Bits:
@@ -146,8 +141,7 @@ class Render:
     @property
     def centre(self) -> tuple[int, int]:
         """Grid position of the reference view."""
-        rows, columns = self.views.shape[:2]
-        return rows // 2, columns // 2
+        return self.views.shape[0] // 2, self.views.shape[1] // 2
 
     def masks_of(self, view: tuple[int, int]) -> dict[str, BoolMap]:
         """The masks of a view by name."""
@@ -158,9 +152,9 @@ def write_render(path: Path, render: Render) -> None:
     """Write a render, whole or not at all; equal content gives equal bytes."""
     with create_hdf5(path) as file:
         for name in _ARRAYS:
-            values = getattr(render, name)
-            # compression is worth while for masks only
-            file.create_dataset(name, data=values, **({"compression": "gzip"} if name == "masks" else {}))
+            # worth while for masks only
+            compression = "gzip" if name == "masks" else None
+            file.create_dataset(name, data=getattr(render, name), compression=compression)
             if name in _AXES:
                 file[name].attrs["axes"] = _AXES[name]
         file["masks"].attrs["names"] = [fixed_text(name) for name in MASKS]
@@ -188,7 +182,6 @@ def read_render(path: Path) -> Render:
 def read_truth(path: Path) -> tuple[FloatMap, dict[str, BoolMap]]:
     """Disparity and masks of a render's reference view, read without its pictures."""
     with open_hdf5(path, "render of a scene") as file:
-        rows, columns = file["disparity"].shape[:2]
-        centre = (rows // 2, columns // 2)
+        centre = tuple(count // 2 for count in file["disparity"].shape[:2])
         bits = read_dataset(path, file["masks"], centre)
         return read_dataset(path, file["disparity"], centre), masks_in(bits)

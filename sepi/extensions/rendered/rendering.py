@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
-from zipfile import BadZipFile
+from zipfile import is_zipfile
 
 import numpy as np
 import numpy.typing as npt
@@ -20,15 +20,16 @@ from pydantic import Field
 
 from sepi.extensions.rendered.render_file import Render, seen_bits, surface_bits, write_render
 from sepi.extensions.rendered.sampling import pictured, planned, with_shared_light
+from sepi.extensions.rendered.shapes import Points
 from sepi.extensions.rendered.tracing import Tracer
-from sepi.extensions.rendered.world import FloatArray, Rig, World, rig_of
+from sepi.extensions.rendered.world import FloatArray, Rig, Share, World, rig_of
 from sepi.io.files import atomic_path
 from sepi.io.provenance import package_version
 from sepi.process.threads import threads_used, use_threads
 from sepi.stage import no_progress
-from sepi.validation.models import CheckedModel
+from sepi.validation.models import CheckedModel, Positive
 
-_Share = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Arrays = dict[str, npt.NDArray[Any]]
 _Rows = Annotated[int, Field(ge=1, le=33)]
 
 
@@ -38,16 +39,14 @@ class RenderOptions(CheckedModel):
     size: int = Field(512, ge=32, le=4096, description="height and width of a view in pixels; disparities stay")
     grid: tuple[_Rows, _Rows] = Field((9, 9), description="rows and columns of views")
     samples: int = Field(64, ge=1, le=65536, description="paths of light for each pixel; few leave their own noise")
-    baseline: float = Field(
-        1.0, gt=0, allow_inf_nan=False, description="distance of views, and so disparity, as part of the scene's own"
-    )
-    lens: _Share = Field(
+    baseline: Positive = Field(1.0, description="distance of views, and so disparity, as part of the scene's own")
+    lens: Share = Field(
         0.0, description="radius of the lens in view steps; 0: a pinhole. Disparity d is a disc 2 lens |d| pixels wide"
     )
-    position_error: _Share = Field(
+    position_error: Share = Field(
         0.0, description="standard deviation of where views but the reference view stand, in view steps"
     )
-    rotation_error: _Share = Field(
+    rotation_error: Share = Field(
         0.0, description="standard deviation of how they are turned about each axis, in degrees"
     )
     seed: int = Field(0, ge=0, lt=2**31, description="of the light's paths and of these errors")
@@ -97,7 +96,8 @@ def render_world(
         with atomic_path(note) as temporary:
             temporary.write_text(record, encoding="utf-8")
     files = [parts / f"view_{number:03d}.npz" for number in range(count)]
-    missing = [number for number, file in enumerate(files) if not _is_whole(file)]
+    # those that are not there, or cut off
+    missing = [number for number, file in enumerate(files) if not is_zipfile(file)]
     for done, (number, values) in enumerate(_views(world, rig, options, missing), count - len(missing) + 1):
         with atomic_path(files[number]) as temporary, temporary.open("wb") as stream:
             np.savez(stream, allow_pickle=False, **values)
@@ -107,9 +107,7 @@ def render_world(
     progress(1.0)
 
 
-def _views(
-    world: World, rig: Rig, options: RenderOptions, numbers: Sequence[int]
-) -> Iterator[tuple[int, dict[str, npt.NDArray[np.generic]]]]:
+def _views(world: World, rig: Rig, options: RenderOptions, numbers: Sequence[int]) -> Iterator[tuple[int, Arrays]]:
     """Picture and ground truth of each of these views.
 
     A thread prepares the next view while the renderer works, since the preparation uses one core only.
@@ -126,19 +124,16 @@ def _views(
             yield number, {**truth, "views": picture()}
 
 
-def _looked_at(
-    tracer: Tracer, options: RenderOptions, number: int
-) -> tuple[dict[str, npt.NDArray[Any]], Callable[[], FloatArray]]:
+def _looked_at(tracer: Tracer, options: RenderOptions, number: int) -> tuple[Arrays, Callable[[], FloatArray]]:
     """Ground truth of a view by name, and what makes its picture."""
-    positions, turns = _stand(tracer.rig, options)
-    (down, across), turn = positions.reshape(-1, 2)[number].tolist(), turns.reshape(-1, 3)[number].tolist()
+    (down, across), turn = (values[number].tolist() for values in _stand(tracer.rig, options))
     # one seed per view, far from others: a view's tiles use several in a row
     seed = int(np.random.SeedSequence([options.seed, number]).generate_state(1)[0])
     at = tracer.position(down, across, turn)
     seen = tracer.surfaces.first(at)
     disparity = tracer.rig.disparity(seen.depth).astype(np.float32)
     straight = tracer.surfaces.first(tracer.position(down, across)) if any(turn) else seen
-    truth: dict[str, npt.NDArray[Any]] = {
+    truth: Arrays = {
         "disparity": disparity,
         "normal": seen.normal.astype(np.float16),
         "masks": surface_bits(tracer.world.things, seen, disparity),
@@ -152,49 +147,33 @@ def _looked_at(
     return truth, partial(pictured, plan)
 
 
-def _stand(rig: Rig, options: RenderOptions) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Positions and turns of the views; those of the reference view are exact."""
-    rng = np.random.default_rng(options.seed)
-    positions = rig.positions
-    shift, turns = rng.standard_normal(positions.shape), rng.standard_normal((*positions.shape[:2], 3))
-    centre = positions.shape[0] // 2, positions.shape[1] // 2
-    shift[centre], turns[centre] = 0, 0
-    return positions + options.position_error * shift, np.radians(options.rotation_error) * turns
+def _stand(rig: Rig, options: RenderOptions) -> tuple[Points, Points]:
+    """Positions ``(N, 2)`` and turns ``(N, 3)`` of the views; those of the reference view are exact."""
+    rng, (rows, columns) = np.random.default_rng(options.seed), rig.grid
+    shift, turns = rng.standard_normal((rows * columns, 2)), rng.standard_normal((rows * columns, 3))
+    for values in (shift, turns):
+        values[rows // 2 * columns + columns // 2] = 0
+    return rig.positions.reshape(-1, 2) + options.position_error * shift, np.radians(options.rotation_error) * turns
 
 
 def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files: Sequence[Path]) -> Render:
     """The render of all views, with their occlusion masks."""
-    positions, turns = _stand(rig, options)
-    views: dict[str, npt.NDArray[Any]] = {}
+    views: Arrays = {}
     for number, file in enumerate(files):
         with np.load(file) as values:
             for part in values:
                 if number == 0:
                     views[part] = np.empty((len(files), *values[part].shape), values[part].dtype)
                 views[part][number] = values[part]
-    upright, stands, turned = views.pop("upright"), positions.reshape(-1, 2), turns.reshape(-1, 3).any(axis=1)
+    upright, (positions, turns) = views.pop("upright"), _stand(rig, options)
     if options.shares_light:
         albedo, things, whole = (views.pop(part) for part in ("albedo", "things", "whole"))
-        views["views"] = with_shared_light(views["views"], albedo, things, whole, upright, stands)
+        views["views"] = with_shared_light(views["views"], albedo, things, whole, upright, positions)
     # the limit of half precision lies far beyond white
     views["views"] = np.minimum(views["views"], 60000.0).astype(np.float16)
     # unknown for turned views
-    views["masks"][~turned] |= seen_bits(upright, stands)[~turned]
-    return Render(
-        name=name,
-        **{part: values.reshape(*options.grid, *values.shape[1:]) for part, values in views.items()},
-        positions=positions,
-        turns=turns,
-        settings=rig.settings,
-        light=world.light.share,
-        made_by=made_by(name, options),
-    )
-
-
-def _is_whole(file: Path) -> bool:
-    """Whether a view's file is there, and complete."""
-    try:
-        with np.load(file):
-            return True
-    except (OSError, ValueError, BadZipFile):
-        return False
+    straight = ~turns.any(axis=1)
+    views["masks"][straight] |= seen_bits(upright, positions)[straight]
+    views |= {"positions": positions, "turns": turns}
+    arrays = {part: values.reshape(*options.grid, *values.shape[1:]) for part, values in views.items()}
+    return Render(name, settings=rig.settings, light=world.light.share, made_by=made_by(name, options), **arrays)

@@ -103,13 +103,13 @@ def planned(tracer: Tracer, position: Position, seen: FirstSurface, samples: int
     few = min(samples, math.ceil(3 * samples / math.prod(tracer.rig.grid)))
     # with several surfaces, so many that those after the first few are spread evenly; as on gloss
     mixed = max(samples // 6, min(samples, few + SPREAD))
-    glossy = max(few, round(tracer.world.paths.gloss * samples), min(samples, SPREAD))
+    glossy = max(few, round(tracer.world.light.gloss * samples), min(samples, SPREAD))
     kinds = ((~differs, 0, few), (~differs & ~whole, few, mixed - few), (differs, 0, glossy))
-    squares = [(tiles, taken, paths) for asked, taken, paths in kinds if paths > 0 for tiles in _tiles(asked, paths)]
-    passes = [
-        Pass(pixels, taken, paths, tracer.tiles(position, pixels, paths, seed + 4096 * number))
-        for number, (pixels, taken, paths) in enumerate(squares)
-    ]
+    passes: list[Pass] = []
+    for asked, taken, paths in kinds:
+        for pixels in _tiles(asked, paths) if paths > 0 else ():
+            pictures = tracer.tiles(position, pixels, paths, seed + 4096 * len(passes))
+            passes.append(Pass(pixels, taken, paths, pictures))
     return Plan(passes, albedo, whole)
 
 

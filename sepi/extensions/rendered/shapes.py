@@ -86,9 +86,7 @@ def box(centre: Vector, size: Vector, turn: Vector = (0, 0, 0)) -> Mesh:
     return moved(_rectangles(corners, np.array(across), np.array(below)), turn, centre)
 
 
-def ball(
-    centre: Vector, radius: float, relief: Callable[[Points], npt.NDArray[np.float64]] | None = None, fineness: int = 96
-) -> Mesh:
+def ball(centre: Vector, radius: float, relief: Callable[[Points], Points] | None = None, fineness: int = 96) -> Mesh:
     """A ball, each point of which is moved outwards by a part of the radius.
 
     Parameters
@@ -237,13 +235,10 @@ def joined(meshes: Parts) -> Mesh:
     """Several meshes as one; all of them smooth, or none."""
     if isinstance(meshes, Mesh):
         return meshes
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    return _mesh(
-        np.concatenate([mesh.vertices for mesh in meshes]),
-        np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)]),
-        np.concatenate([mesh.uv for mesh in meshes]),
-        all(mesh.smooth for mesh in meshes),
-    )
+    vertices, faces, uv, smooth = zip(*meshes, strict=True)
+    starts = np.cumsum([0, *map(len, vertices[:-1])])
+    shifted = [part + start for part, start in zip(faces, starts, strict=True)]
+    return _mesh(np.concatenate(vertices), np.concatenate(shifted), np.concatenate(uv), all(smooth))
 
 
 def copies(mesh: Mesh, axes: Points, places: Points, scales: npt.ArrayLike = 1.0) -> Mesh:

@@ -1,27 +1,15 @@
-"""Furniture of scenes (books, crates, chairs, tables, vessels, fruit), and a world seen from any place in it."""
+"""What scenes hold (books, furniture, vessels, fruit, houses, wires), and a world seen from any place in it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from sepi.extensions.rendered.shapes import (
-    Outline,
-    Points,
-    ball,
-    box,
-    joined,
-    moved,
-    painted_from,
-    plate,
-    rod,
-    thing,
-    turned_body,
-)
+from sepi.extensions.rendered import shapes
+from sepi.extensions.rendered.shapes import Points, ball, box, joined, moved, plate, rod, thing, turned_body
 from sepi.extensions.rendered.world import Lamp, Material, Mesh, Things, Vector, World
 
 
@@ -44,15 +32,15 @@ def seen_from(world: World, eye: Vector, below: float = 0.0, rightwards: float =
 
     def turned(mesh: Mesh) -> Mesh:
         vertices = (mesh.vertices.astype(np.float64) - np.array(eye)) @ axes.T
-        return replace(mesh, vertices=vertices.astype(np.float32))
+        return mesh._replace(vertices=vertices.astype(np.float32))
 
     lamps = [
         Lamp(axes @ np.subtract(lamp.corner, eye), axes @ lamp.across, axes @ lamp.down, lamp.radiance)
         for lamp in world.light.lamps
     ]
-    suns = [replace(sun, direction=axes @ sun.direction) for sun in world.light.suns]
-    things = [replace(one, mesh=turned(one.mesh)) for one in world.things]
-    return replace(world, things=things, light=replace(world.light, lamps=lamps, suns=suns))
+    suns = [sun._replace(direction=axes @ sun.direction) for sun in world.light.suns]
+    things = [one._replace(mesh=turned(one.mesh)) for one in world.things]
+    return world._replace(things=things, light=world.light._replace(lamps=lamps, suns=suns))
 
 
 def lamp_towards(middle: Vector, target: Vector, size: float, radiance: Vector) -> Lamp:
@@ -90,7 +78,7 @@ def crate(size: Vector, rows: int, turn: float, by: Vector) -> Mesh:
 
 def of_boards(parts: Sequence[Mesh], across: float = 0.137, down: float = 0.091) -> Mesh:
     """Boards as one mesh, the pattern of each these metres further than that of the one before."""
-    return joined([painted_from(part, across * n, down * n) for n, part in enumerate(parts)])
+    return joined([shapes.painted_from(part, across * n, down * n) for n, part in enumerate(parts)])
 
 
 def chair(turn: float, by: Vector, slats: int = 4) -> Mesh:
@@ -146,14 +134,20 @@ def leaning(foot: npt.ArrayLike, over: npt.ArrayLike, beyond: float, radius: flo
     return rod(start + lift, rest + lift + beyond * along, radius)
 
 
-def profile(points: Outline, count: int = 120) -> Points:
+def strand(ends: shapes.Outline, sag: float, radius: float) -> Mesh:
+    """A wire between two points that hangs down by ``sag`` in its middle."""
+    share, (first, last) = np.linspace(0, 1, 24)[:, None], np.asarray(ends, float)
+    return shapes.tube(first + share * (last - first) + sag * 4 * share * (1 - share) * [0, 1, 0], radius, 8)
+
+
+def profile(points: shapes.Outline, count: int = 120) -> Points:
     """A curve through points ``(radius, height)`` of a body of revolution, given from the top down."""
     given = np.array(points, float)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(given, axis=0), axis=1))])
     return np.asarray(PchipInterpolator(length, given)(np.linspace(0, length[-1], count)))
 
 
-def vessel(points: Outline, wall: float, foot: Vector, floor: float = 0.006, sides: int = 96) -> Mesh:
+def vessel(points: shapes.Outline, wall: float, foot: Vector, floor: float = 0.006, sides: int = 96) -> Mesh:
     """An open vessel of an outline, its inside ``wall`` metres within and ``floor`` above ``foot``, where it stands."""
     outer = profile(points)
     low = outer[-1, 1]

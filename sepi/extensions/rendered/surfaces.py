@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +22,7 @@ _FINE = 8
 _AT_ONCE = 4096
 
 
-@dataclass(frozen=True)
-class FirstSurface:
+class FirstSurface(NamedTuple):
     """First surfaces on the rays through the middles of a view's pixels.
 
     Attributes
@@ -59,7 +58,9 @@ class Surfaces:
     def __init__(self, world: World, rig: Rig) -> None:
         self._rig = rig
         nothing = Mesh(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.uint32), np.zeros((3, 2), np.float32))
-        parts = [(-1, nothing), *((n, _in_periods(thing.mesh, thing.material)) for n, thing in enumerate(world.things))]
+        parts = [(-1, nothing)]
+        for number, (mesh, material, _) in enumerate(world.things):
+            parts.append((number, mesh._replace(uv=mesh.uv / np.array(period(material)))))
         parts += [(-1, rectangle(lamp.corner, lamp.across, lamp.down)) for lamp in world.light.lamps]
         self._thing = np.concatenate([np.full(len(mesh.faces), number) for number, mesh in parts])
         mesh = joined([mesh for _, mesh in parts])
@@ -76,11 +77,9 @@ class Surfaces:
         # all patterns (by identity) in one list of linear texels; of each thing: start, height and width
         patterns = [thing.material.pattern for thing in world.things]
         rasters = {id(pattern): raster_of(pattern) for pattern in patterns}
-        sizes = [raster[..., 0].size for raster in rasters.values()]
-        begins = dict(zip(rasters, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
+        begins = dict(zip(rasters, np.cumsum([0, *(raster[..., 0].size for raster in rasters.values())]), strict=False))
         self._texels: FloatArray = np.concatenate([srgb_decoded(raster).reshape(-1, 3) for raster in rasters.values()])
-        self._rasters = {key: (begins[key], *raster.shape[:2]) for key, raster in rasters.items()}
-        self._starts = np.array([self._rasters[id(pattern)] for pattern in patterns])
+        self._starts = np.array([(begins[id(one)], *rasters[id(one)].shape[:2]) for one in patterns])
         self.matte = np.array([thing.material.kind == "matte" for thing in world.things] + [False])
 
     def first(self, position: Position) -> FirstSurface:
@@ -150,11 +149,6 @@ class Surfaces:
             found[tuple(some.T)] = total / _FINE**2
         return found
 
-    def linear(self, pattern: Pattern) -> FloatArray:
-        """The linear raster of a pattern."""
-        at, height, width = self._rasters[id(pattern)]
-        return self._texels[at : at + height * width].reshape(height, width, 3)
-
 
 def raster_of(pattern: Pattern | Vector) -> FloatArray:
     """Raster of a pattern; one texel for a colour."""
@@ -164,7 +158,3 @@ def raster_of(pattern: Pattern | Vector) -> FloatArray:
 def period(material: Material) -> tuple[float, float]:
     """Metres after which a material's pattern repeats."""
     return material.pattern.size if isinstance(material.pattern, Pattern) else (1.0, 1.0)
-
-
-def _in_periods(mesh: Mesh, material: Material) -> Mesh:
-    return replace(mesh, uv=mesh.uv / np.array(period(material)))

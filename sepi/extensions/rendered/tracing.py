@@ -28,6 +28,8 @@ _BLOCK = 16
 SPREAD = 9
 # samples of the sky for each of a sun; reduces noise in pixels with several surfaces by a sixth
 _SKY_BESIDE_SUN = 0.3
+# largest number of pinholes into which a lens is divided
+_LENS_POINTS = 32
 # Vogel's spiral: points that fill a disc evenly
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 
@@ -62,8 +64,6 @@ class Tracer:
     rig : Rig
     lens : float
         Radius of the lens in metres; 0 for a pinhole. Disparity zero is in focus.
-    lens_points : int
-        Largest number of pinholes into which a lens is divided.
 
     Attributes
     ----------
@@ -73,9 +73,9 @@ class Tracer:
         All triangles of the world in one list.
     """
 
-    def __init__(self, world: World, rig: Rig, lens: float = 0.0, lens_points: int = 32) -> None:
+    def __init__(self, world: World, rig: Rig, lens: float = 0.0) -> None:
         self._mi = _mitsuba()
-        self.world, self.rig, self._lens, self._lens_points = world, rig, lens, lens_points if lens else 1
+        self.world, self.rig, self._lens = world, rig, lens
         self.surfaces = Surfaces(world, rig)
         # things with the same material share its textures
         surfaces = {id(thing.material): thing.material for thing in world.things}
@@ -94,9 +94,11 @@ class Tracer:
 
     def picture(self, position: Position, seed: int, samples: int) -> FloatArray:
         """Linear picture of a view from ``samples`` paths per pixel, 1 is white; shape (H, W, 3), float32."""
-        count, size = min(samples, self._lens_points), self.rig.size
+        count, size = min(samples, _LENS_POINTS if self._lens else 1), self.rig.size
         total = np.zeros((size, size, 3), np.float64)
-        for number, (right, down) in enumerate(_in_disc(self._lens, count)):
+        # points spread evenly over the lens
+        angle, radius = np.arange(count) * _GOLDEN_ANGLE, self._lens * np.sqrt((np.arange(count) + 0.5) / count)
+        for number, (right, down) in enumerate(zip(radius * np.cos(angle), radius * np.sin(angle), strict=True)):
             part = samples * (number + 1) // count - samples * number // count
             point = Position(position.right + right, position.down + down, position.turn)
             camera = self._side_by_side(point, np.zeros((1, 2), np.int64), size, part)
@@ -137,16 +139,14 @@ class Tracer:
         for number, (down, right) in enumerate(offsets.tolist()):
             camera["principal_point_offset_x"], camera["principal_point_offset_y"] = right, down
             windows[f"tile{number:04d}"] = create(camera)
-        return self._mi.load_dict(
-            {"type": "batch", **windows, "film": _film(len(corners) * side, side), "sampler": _sampler(paths)}
-        )
+        film = _film(len(corners) * side, side)
+        return self._mi.load_dict({"type": "batch", **windows, "film": film, "sampler": _sampler(paths)})
 
     def _seen(self, camera: Any, side: int, samples: int, seed: int) -> FloatArray:
-        paths = {"type": "path", "max_depth": self.world.paths.depth, "rr_depth": self.world.paths.roulette}
+        paths = {"type": "path", "max_depth": self.world.light.depth, "rr_depth": self.world.light.roulette}
         integrator = self._mi.load_dict({**paths, "block_size": min(side, _BLOCK)})
-        return np.array(
-            self._mi.render(self._scene, sensor=camera, integrator=integrator, spp=samples, seed=seed % 2**32)
-        )
+        seen = self._mi.render(self._scene, sensor=camera, integrator=integrator, spp=samples, seed=seed % 2**32)
+        return np.array(seen)
 
     def _shape(self, thing: Thing, surface: Any) -> Any:
         """Mitsuba's shape of a thing."""
@@ -190,7 +190,7 @@ class Tracer:
     def _texture(self, material: Material) -> dict[str, Any]:
         if not isinstance(material.pattern, Pattern):
             return _rgb(srgb_decoded(np.array(material.pattern)))
-        raster = self._mi.Bitmap(self.surfaces.linear(material.pattern))
+        raster = self._mi.Bitmap(srgb_decoded(material.pattern.raster))
         # without interpolation, for a fifth of the time: pixels are at least texels, and paths spread over them
         return {"type": "bitmap", "bitmap": raster, "raw": True, "format": "fp16", "filter_type": "nearest"}
 
@@ -219,10 +219,3 @@ def _sampler(samples: int) -> dict[str, Any]:
     """Sampler; few samples are independent, since an even spread repeats visibly from pixel to pixel."""
     spread = "stratified" if samples == 4 ** round(math.log(samples, 4)) else "multijitter"
     return {"type": spread if samples >= SPREAD else "independent", "sample_count": samples}
-
-
-def _in_disc(radius: float, count: int) -> npt.NDArray[np.float64]:
-    """Points spread evenly over a disc; only its middle without a radius; shape (N, 2)."""
-    angle = np.arange(count) * _GOLDEN_ANGLE
-    distance = radius * np.sqrt((np.arange(count) + 0.5) / count)
-    return np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1)

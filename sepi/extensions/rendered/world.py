@@ -9,21 +9,19 @@ have disparity zero, as in the HCI 4D benchmark. With the focal length ``f`` in 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
 
+Share = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 FloatArray = npt.NDArray[np.float32]
 Vector = Sequence[float] | npt.NDArray[np.float64]
 """Three numbers: a place, a direction, or a colour."""
-Kind = Literal["matte", "glossy", "mirror", "glass"]
-Metal = Literal["Ag", "Al", "Au", "Cr", "Cu"]
 
 
-@dataclass(frozen=True)
-class Mesh:
+class Mesh(NamedTuple):
     """Triangles.
 
     Attributes
@@ -44,8 +42,7 @@ class Mesh:
     smooth: bool = False
 
 
-@dataclass(frozen=True)
-class Pattern:
+class Pattern(NamedTuple):
     """Colours painted on a surface; the pattern repeats.
 
     Attributes
@@ -60,8 +57,7 @@ class Pattern:
     size: tuple[float, float] = (1.0, 1.0)
 
 
-@dataclass(frozen=True)
-class Material:
+class Material(NamedTuple):
     """Material of a surface.
 
     Attributes
@@ -79,14 +75,13 @@ class Material:
     """
 
     pattern: Pattern | Vector = (0.8, 0.8, 0.8)
-    kind: Kind = "matte"
+    kind: Literal["matte", "glossy", "mirror", "glass"] = "matte"
     roughness: float = 0.0
-    metal: Metal = "Al"
+    metal: Literal["Ag", "Al", "Au", "Cr", "Cu"] = "Al"
     pane: bool = False
 
 
-@dataclass(frozen=True)
-class Thing:
+class Thing(NamedTuple):
     """A mesh of one material.
 
     Attributes
@@ -105,8 +100,7 @@ class Thing:
 Things = Iterator[Thing]
 
 
-@dataclass(frozen=True)
-class Lamp:
+class Lamp(NamedTuple):
     """A rectangle that shines to the side from which ``across``, then ``down``, turn clockwise.
 
     Attributes
@@ -123,8 +117,7 @@ class Lamp:
     radiance: Vector
 
 
-@dataclass(frozen=True)
-class Sun:
+class Sun(NamedTuple):
     """Light from very far away.
 
     Attributes
@@ -139,8 +132,7 @@ class Sun:
     irradiance: Vector
 
 
-@dataclass(frozen=True)
-class Cameras:
+class Cameras(NamedTuple):
     """What the cameras see of a scene.
 
     Attributes
@@ -160,9 +152,8 @@ class Cameras:
     field_of_view: float = 40.0
 
 
-@dataclass(frozen=True)
-class Light:
-    """Light of a scene.
+class Light(NamedTuple):
+    """Light of a scene, and its paths.
 
     Attributes
     ----------
@@ -175,21 +166,6 @@ class Light:
         Factor from radiance to pictures, in which 1 is white.
     share : float
         Light relative to other scenes; less light has more noise.
-    """
-
-    sky: Vector | FloatArray = (0.0, 0.0, 0.0)
-    lamps: Sequence[Lamp] = ()
-    suns: Sequence[Sun] = ()
-    exposure: float = 1.0
-    share: float = 1.0
-
-
-@dataclass(frozen=True)
-class Paths:
-    """Paths of light.
-
-    Attributes
-    ----------
     depth : int
         Largest number of reflections and refractions.
     roulette : int
@@ -199,13 +175,17 @@ class Paths:
         them give no more noise (mean difference of two renderings) than all paths with ``roulette`` 2.
     """
 
+    sky: Vector | FloatArray = (0.0, 0.0, 0.0)
+    lamps: Sequence[Lamp] = ()
+    suns: Sequence[Sun] = ()
+    exposure: float = 1.0
+    share: float = 1.0
     depth: int = 6
     roulette: int = 2
     gloss: float = 1.0
 
 
-@dataclass(frozen=True)
-class World:
+class World(NamedTuple):
     """A scene.
 
     Attributes
@@ -214,13 +194,11 @@ class World:
         They must fill the pictures, since a ray that meets nothing has no disparity.
     cameras : Cameras
     light : Light
-    paths : Paths
     """
 
     things: Sequence[Thing]
     cameras: Cameras
     light: Light
-    paths: Paths = Paths()
 
 
 SENSOR_MM = 35.0
@@ -242,8 +220,7 @@ class Position(NamedTuple):
     turn: Vector = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class Rig:
+class Rig(NamedTuple):
     """Cameras of a scene.
 
     Attributes
@@ -279,9 +256,7 @@ class Rig:
     @property
     def positions(self) -> npt.NDArray[np.float64]:
         """Positions of the views from the centre view, ``(down, across)`` in view steps; shape (T, S, 2)."""
-        rows, columns = self.grid
-        down, across = np.arange(rows) - rows // 2, np.arange(columns) - columns // 2
-        return np.stack(np.broadcast_arrays(down[:, None], across[None, :]), axis=-1).astype(np.float64)
+        return np.moveaxis(np.indices(self.grid, float), 0, -1) - np.floor_divide(self.grid, 2)
 
     def axis(self, position: Position) -> tuple[float, float]:
         """Row and column of a camera's axis in its picture, which is shifted to converge at the focus distance."""

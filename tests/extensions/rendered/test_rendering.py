@@ -14,12 +14,12 @@ import sepi
 from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.extensions.rendered import patterns, shapes, tracing
-from sepi.extensions.rendered.exposure import NOISE, Exposure, exposed
+from sepi.extensions.rendered.exposure import READ, WHITE, Exposure, exposed
 from sepi.extensions.rendered.render_file import MASKS, Render, masks_in, read_render, seen_bits
 from sepi.extensions.rendered.rendering import render_world
 from sepi.extensions.rendered.sampling import pictured, planned
 from sepi.extensions.rendered.tracing import Tracer
-from sepi.extensions.rendered.world import Light, Material, Paths, Sun, Thing, World, rig_of
+from sepi.extensions.rendered.world import Light, Material, Sun, Thing, World, rig_of
 from sepi.extensions.rendered.worlds import RENDERED, world_of
 from sepi.scenes.folder import write_hci
 from sepi.workflow.rendered_scenes import NOISE_LEVELS
@@ -77,7 +77,7 @@ def test_truth_of_every_view_is_of_the_same_points(plain: Render) -> None:
 def test_points_have_one_colour_in_all_views(tmp_path: Path) -> None:
     """By the light of a sun alone, which leaves no noise of paths."""
     sun = Sun((0.3, 0.6, 1.0), (4.0, 4.0, 4.0))
-    sunny = room(light=Light(suns=[sun], exposure=0.7), paths=Paths(2))
+    sunny = room(light=Light(suns=[sun], exposure=0.7, depth=2))
     render = rendered(tmp_path, sunny, size=96, samples=4)
     light_field = exposed(render, Exposure())
     centre = light_field.views[light_field.reference_position].astype(float)
@@ -203,14 +203,11 @@ def test_noise_is_that_of_the_stated_sensor(plain: Render) -> None:
     linear = Exposure(gamma=1.0, bits=16)
     clean = exposed(plain, linear).views / 65535
     for level in NOISE_LEVELS[1:]:
-        sensor = NOISE[level]
         for light in (1.0, 0.1):
             dim = Render(**{**vars(plain), "light": light})
             noisy = exposed(dim, linear.model_copy(update={"noise": level})).views / 65535
             inside = (clean > 0.1) & (clean < 0.15)
-            expected = np.sqrt(
-                clean[inside].mean() / (sensor.white * light) + (sensor.read / sensor.white / light) ** 2
-            )
+            expected = np.sqrt(clean[inside].mean() / (WHITE[level] * light) + (READ / WHITE[level] / light) ** 2)
             # of what is not cut off at black and white
             if light == 1.0:
                 assert (noisy - clean)[inside].std() == pytest.approx(expected, rel=0.03)
@@ -306,9 +303,7 @@ def coarse_patterns(monkeypatch: pytest.MonkeyPatch) -> None:
     """Random fields that repeat after an eighth of a pattern, and few texels: as bright, in a fraction of the time."""
     field, decoded = patterns.field, tracing.srgb_decoded
 
-    def repeated(
-        seed: int, finest: float, coarsest: float, texels: int = patterns.TEXELS, stretch: float = 1.0
-    ) -> np.ndarray:
+    def repeated(seed: int, finest: float, coarsest: float, texels: int = 1024, stretch: float = 1.0) -> np.ndarray:
         return np.tile(field(seed, finest, coarsest, texels // 8, stretch), (8, 8))
 
     monkeypatch.setattr(patterns, "field", repeated)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import importlib
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from sepi.extensions.rendered.world import World
 from sepi.validation import require_known
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """A path-traced scene.
 
     Attributes

@@ -4,10 +4,6 @@ The table runs into the niche. The bust is the surface on which a distance is ze
 into each other, as a sculptor adds clay and takes it away. There ``y`` is up and the face looks along ``z``.
 """
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
 from skimage import measure
 
@@ -15,7 +11,7 @@ from sepi.extensions.rendered import patterns, shapes
 from sepi.extensions.rendered.patterns import noise
 from sepi.extensions.rendered.shapes import Points, box, moved, raster, thing
 from sepi.extensions.rendered.staging import fruit, profile, vessel
-from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Paths, Pattern, Things, Vector, World
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Pattern, Things, Vector, World
 
 TABLE, WALL = 0.33, 2.35
 
@@ -23,8 +19,8 @@ TABLE, WALL = 0.33, 2.35
 def world() -> World:
     """By a large window at the upper left, and what a bright room sends back."""
     lamp = Lamp((-2.5, -1.0, 0.3), (0, 0, 1.3), (0.6, -1.2, 0), (15.0, 14.2, 13.0))
-    light = Light(sky=(0.22, 0.23, 0.26), lamps=[lamp], exposure=1.35)
-    return World([*_things()], Cameras(1.15, 2.83, 2.1, -1.9, 31), light, Paths(4))
+    light = Light(sky=(0.22, 0.23, 0.26), lamps=[lamp], exposure=1.35, depth=4)
+    return World([*_things()], Cameras(1.15, 2.83, 2.1, -1.9, 31), light)
 
 
 def _things() -> Things:
@@ -64,7 +60,7 @@ def _wall(radius: float, spring: float) -> Mesh:
     out = inner - [0, TABLE]
     flat = np.stack([inner, [0, TABLE] + 2.5 * out / np.abs(out).max(1, keepdims=True)])
     mesh = shapes.sheet(np.concatenate([flat, np.full((*flat.shape[:2], 1), WALL)], -1), smooth=False)
-    return replace(mesh, uv=mesh.vertices[:, :2])
+    return mesh._replace(uv=mesh.vertices[:, :2])
 
 
 def _niche(radius: float, spring: float) -> Mesh:
@@ -99,7 +95,7 @@ def _urn(foot: Vector) -> Mesh:
     belly = np.clip(np.minimum(-points[:, 1] - 0.055, 0.215 + points[:, 1]) / 0.03, 0, 1)
     flute = 1 - 0.05 * belly * np.abs(np.cos(11 * np.arctan2(points[:, 2], points[:, 0])))
     points[:, [0, 2]] *= flute[:, None]
-    return replace(mesh, vertices=(points + np.array(foot)).astype(np.float32))
+    return mesh._replace(vertices=(points + np.array(foot)).astype(np.float32))
 
 
 def _amphora_paint() -> Pattern:
@@ -157,9 +153,8 @@ def _without(a: Points, b: Points, width: float) -> Points:
     return -_blend(-a, b, width)
 
 
-def _head(p: Points) -> Points:
+def _head(q: Points) -> Points:
     """Distance from the head, whose face looks along ``z``, ``y`` up; the ears are at height 0."""
-    q = np.stack([np.abs(p[..., 0]), p[..., 1], p[..., 2]], axis=-1)
     d = _ellipsoid(q, (0, 0.03, -0.012), (0.074, 0.088, 0.1))
     d = _blend(d, _ellipsoid(q, (0, -0.03, 0.03), (0.06, 0.085, 0.064)), 0.02)
     d = _blend(d, _ellipsoid(q, (0, -0.072, 0.035), (0.051, 0.042, 0.054)), 0.02)
@@ -178,16 +173,13 @@ def _head(p: Points) -> Points:
 
 def _eye(q: Points) -> Points:
     """The ball, and two lids that leave a slit."""
-    centre = (0.031, 0.001, 0.073)
-    ball = np.linalg.norm(q - np.array(centre), axis=-1) - 0.0125
-    lids = np.linalg.norm(q - np.array(centre), axis=-1) - 0.0145
-    width = (q[..., 0] - centre[0]) / 0.016
-    slit = np.abs(q[..., 1] - centre[1]) - 0.0052 * (1 - width**2)
-    return np.asarray(np.minimum(ball, np.maximum(lids, -slit)))
+    x, y, z = 0.031, 0.001, 0.073
+    away = np.linalg.norm(q - np.array([x, y, z]), axis=-1)
+    slit = np.abs(q[..., 1] - y) - 0.0052 * (1 - ((q[..., 0] - x) / 0.016) ** 2)
+    return np.asarray(np.minimum(away - 0.0125, np.maximum(away - 0.0145, -slit)))
 
 
-def _body(p: Points) -> Points:
-    q = np.stack([np.abs(p[..., 0]), p[..., 1], p[..., 2]], axis=-1)
+def _body(q: Points) -> Points:
     d = _capsule(q, (0, -0.06, -0.018), (0, -0.27, -0.035), 0.054, 0.06)
     d = _blend(d, _capsule(q, (0.016, -0.25, 0.03), (0.05, -0.06, -0.01), 0.012, 0.012), 0.02)
     d = _blend(d, _capsule(q, (0.02, -0.2, -0.05), (0.16, -0.275, -0.045), 0.05, 0.06), 0.05)
@@ -199,25 +191,22 @@ def _body(p: Points) -> Points:
 
 def _sculpture(p: Points) -> Points:
     x, y, z = p[..., 0], p[..., 1], p[..., 2]
+    q = np.stack([np.abs(x), y, z], axis=-1)
     # the head is far from what lies lower
     upper = y > -0.17
     d = np.full(y.shape, 1.0)
-    d[upper] = _head(p[upper]) - _hair(p[upper])
-    d = _blend(d, _body(p - np.array([0, 0.03, 0])), 0.022)
+    d[upper] = _head(q[upper]) - _hair(p[upper])
+    d = _blend(d, _body(q - np.array([0, 0.03, 0])), 0.022)
     fold = np.sin(75 * (y - 0.45 * x) + 5 * np.sin(14 * x + 3 * z))
     return np.asarray(d - np.clip((0.45 * x - 0.305 - y) / 0.008, 0, 1) * (0.006 + 0.005 * fold))
 
 
 def _hair(p: Points) -> Points:
-    """Height of the hair: it ends over the brow, before the ears and in the neck."""
+    """Height of the hair, in waves from the crown down: it ends over the brow, before the ears and in the neck."""
     hairline = np.interp(p[..., 2], [-0.03, 0.0, 0.035, 0.07], [-0.09, 0.012, 0.03, 0.066])
-    return np.asarray(np.clip((p[..., 1] - hairline) / 0.01, 0, 1) * (0.008 + 0.004 * _locks(p)))
-
-
-def _locks(p: Points) -> Points:
-    """Waves of hair that run from the crown down, -1..1."""
     rng = np.random.default_rng(5)
     waves = (40, 40, 60, 60, 110)
     warp = sum(np.sin(p @ (wave * rng.standard_normal(3)) + rng.uniform(0, 6)) * 40 / wave for wave in waves)
     around = np.arctan2(p[..., 0], p[..., 2] + 0.01)
-    return np.asarray(1 - 2 * np.abs(np.sin(10 * around + 30 * p[..., 1] + warp)))
+    locks = 1 - 2 * np.abs(np.sin(10 * around + 30 * p[..., 1] + warp))
+    return np.asarray(np.clip((p[..., 1] - hairline) / 0.01, 0, 1) * (0.008 + 0.004 * locks))

@@ -4,15 +4,13 @@ What they show is there: the table and its things, a bookcase behind the cameras
 which is a panorama and gives all the light.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 
 from sepi.extensions.rendered import patterns, shapes
 from sepi.extensions.rendered.shapes import ball, box, moved, thing, turned_body, wall
 from sepi.extensions.rendered.staging import fruit, profile, vessel
-from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Paths, Pattern, Things, Vector, World
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Pattern, Things, Vector, World
 
 TABLE, WALL = 0.3, 2.3
 CHROME, SILVER = Material(kind="mirror", metal="Cr"), Material(kind="mirror", metal="Ag")
@@ -32,15 +30,14 @@ _CUP = [(0.045, 0.07), (0.047, 0.068), (0.044, 0.04), (0.03, 0.01), (0.026, 0.0)
 def world() -> World:
     things = [*_console(), *_books((0.43, TABLE, 1.4), 31, [0.024, 0.03, 0.018]), *_bookcase()]
     things += [*_porthole((0.34, -0.3, WALL - 0.02)), *_candles()]
-    light = Light(sky=_room(), exposure=1.65)
-    return World(things, Cameras(1.0, WALL, 2.0, -1.8, 38), light, Paths(6, 4, 0.55))
+    light = Light(sky=_room(), exposure=1.65, depth=6, roulette=4, gloss=0.55)
+    return World(things, Cameras(1.0, WALL, 2.0, -1.8, 38), light)
 
 
 def _console() -> Things:
     foot, turn, width, height = _MIRROR
-    yield thing(
-        box((0, TABLE + 0.03, 1.65), (3.4, 0.06, 1.3)), patterns.tiles(1, 0.44, 8, (0.74, 0.58, 0.4), (0.4, 0.25, 0.16))
-    )
+    inlay = patterns.tiles(1, 0.44, 8, (0.74, 0.58, 0.4), (0.4, 0.25, 0.16))
+    yield thing(box((0, TABLE + 0.03, 1.65), (3.4, 0.06, 1.3)), inlay)
     yield thing(wall((-2.5, -2, WALL), 5, 3), _wallpaper())
     yield thing(moved(wall((-width / 2, -height, 0), width, height), turn, foot), SILVER)
     # a moulding of two steps

@@ -4,16 +4,12 @@ All cloth is a sheet bent by formula: a hanging one has folds that are gathered 
 hem, the table's falls from the rim in flutes that deepen.
 """
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
 
 from sepi.extensions.rendered import patterns
 from sepi.extensions.rendered.patterns import linen, noise, plaid
 from sepi.extensions.rendered.shapes import Points, ground, moved, raster, rectangle, sheet, thing, tube, wall
-from sepi.extensions.rendered.world import Cameras, Lamp, Light, Mesh, Paths, Things, Vector, World
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Mesh, Things, Vector, World
 
 FLOOR, TABLE = 1.0, 0.26
 
@@ -21,8 +17,8 @@ FLOOR, TABLE = 1.0, 0.26
 def world() -> World:
     """By daylight from a wide window on the left."""
     lamp = Lamp((-3.0, -1.2, 0.4), (0, 0, 1.6), (0.9, -1.3, 0), (13.0, 12.5, 11.8))
-    light = Light(sky=(0.26, 0.27, 0.29), lamps=[lamp], exposure=2.0)
-    return World([*_things()], Cameras(1.85, 3.5, 1.9, -1.7, 46), light, Paths(4))
+    light = Light(sky=(0.26, 0.27, 0.29), lamps=[lamp], exposure=2.0, depth=4)
+    return World([*_things()], Cameras(1.85, 3.5, 1.9, -1.7, 46), light)
 
 
 def _things() -> Things:
@@ -85,7 +81,7 @@ def _table_cloth(centre: Vector, radius: float) -> Mesh:
     points = raster(out * np.cos(turn), drop, -out * np.sin(turn))
     mesh = sheet(points + np.array(centre))
     laid = raster(length * np.cos(angle), length * np.sin(angle)).reshape(-1, 2)
-    return replace(mesh, uv=laid.astype(np.float32))
+    return mesh._replace(uv=laid.astype(np.float32))
 
 
 def _blanket(bar: Vector) -> Mesh:

@@ -3,14 +3,12 @@
 The lamp hangs above the picture on the left; what the room sends back is little beside it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sepi.extensions.rendered import patterns, shapes
 from sepi.extensions.rendered.shapes import ball, box, moved, raster, thing, tube, turned_body
 from sepi.extensions.rendered.staging import profile, vessel
-from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Paths, Things, Vector, World
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Things, Vector, World
 
 BENCH, WALL = 0.33, 1.95
 HUNG = WALL - 0.035
@@ -29,13 +27,11 @@ def world() -> World:
     """At night; the door behind stands ajar."""
     boards = Material(patterns.wood(1, 0.7, (0.58, 0.44, 0.31), (0.36, 0.25, 0.17)))
     beech = Material(patterns.wood(11, 0.3, (0.74, 0.56, 0.37), (0.52, 0.36, 0.22)))
+    top = patterns.wood(21, 0.9, (0.62, 0.47, 0.32), (0.36, 0.24, 0.15))
     red = Material(patterns.noise(31, (0.55, 0.13, 0.1), 0.05, 0.3, (3, 256)), "glossy", 0.15)
     things = [
         thing(_boards(), boards),
-        thing(
-            box((0, BENCH + 0.03, 1.52), (2.6, 0.06, 0.9)),
-            patterns.wood(21, 0.9, (0.62, 0.47, 0.32), (0.36, 0.24, 0.15)),
-        ),
+        thing(box((0, BENCH + 0.03, 1.52), (2.6, 0.06, 0.9)), top),
         thing(box((0, BENCH + 0.35, 1.5), (2.6, 0.6, 0.8)), boards),
         thing(box((0.46, -0.28, WALL - 0.09), (0.66, 0.022, 0.17)), beech),
         thing(box((-0.3, -0.05, HUNG), (0.62, 0.05, 0.03)), beech),
@@ -55,8 +51,8 @@ def world() -> World:
         *_brushes((-0.16, BENCH, 1.66), beech),
     ]
     lamp = Lamp((-0.65, -0.88, 1.12), (0, 0, 0.42), (0.7, 0, 0), (4.6, 3.8, 2.7))
-    light = Light(sky=(0.022, 0.025, 0.034), lamps=[lamp], exposure=4.5, share=0.1)
-    return World(things, Cameras(1.1, WALL, 1.8, -1.8, 44), light, Paths(5))
+    light = Light(sky=(0.022, 0.025, 0.034), lamps=[lamp], exposure=4.5, share=0.1, depth=5)
+    return World(things, Cameras(1.1, WALL, 1.8, -1.8, 44), light)
 
 
 def _boards() -> list[Mesh]:

@@ -4,15 +4,13 @@ What the floor mirrors lies as far below it as the things stand above, and moves
 view to view. The cameras look along the floor, where a polish mirrors most.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sepi.extensions.rendered import patterns, shapes
 from sepi.extensions.rendered.patterns import noise
 from sepi.extensions.rendered.shapes import ball, bevelled, box, ground, moved, rod, thing, turned_body, wall
 from sepi.extensions.rendered.staging import chair, lamp_towards, seen_from
-from sepi.extensions.rendered.world import Cameras, Light, Material, Paths, Pattern, Things, World
+from sepi.extensions.rendered.world import Cameras, Light, Material, Pattern, Things, World
 
 _WALL = 4.1
 
@@ -21,8 +19,8 @@ def world() -> World:
     """A hall without a ceiling, lit from the upper left."""
     lamp = lamp_towards((-2.6, -3.2, 0.8), (0.1, -0.3, 3.0), 1.7, (26.0, 24.0, 21.0))
     things = [*_hall(), *_curtain(), *_chairs(), *_pots(), *_agave()]
-    light = Light(sky=(0.75, 0.8, 0.88), lamps=[lamp], exposure=1.25)
-    hall = World(things, Cameras(1.81, 4.17, 2.0, -1.7, 36), light, Paths(7, 5, 0.39))
+    light = Light(sky=(0.75, 0.8, 0.88), lamps=[lamp], exposure=1.25, depth=7, roulette=5, gloss=0.39)
+    hall = World(things, Cameras(1.81, 4.17, 2.0, -1.7, 36), light)
     return seen_from(hall, (0.05, -0.95, 0.0), below=12)
 
 

@@ -4,43 +4,29 @@ Thousands of leaves, alike in size and colour, each with its own depth: what lie
 the wall. The shrubs grow by a seed: stems fork into branches, branches into twigs, and twigs bear leaves on both sides.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from sepi.extensions.rendered.patterns import noise, stone
-from sepi.extensions.rendered.shapes import (
-    Points,
-    about_vertical,
-    ball,
-    copies,
-    ground,
-    leaf,
-    thing,
-    tube,
-    wall,
-)
+from sepi.extensions.rendered.shapes import Points, about_vertical, ball, copies, ground, leaf, thing, tube, wall
 from sepi.extensions.rendered.staging import of_boards, seen_from
-from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Sun, Things, World
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Sun, Things, Vector, World
 
 _WALL = 3.1
 _UP = np.array([0.0, -1.0, 0.0])
 
 
-@dataclass
-class _Plant:
-    """What has grown: wood, and where leaves start and which way they go."""
+class _Part(NamedTuple):
+    """A stem, branch or twig, and where its leaves start and which way they go, ``(N, 3)``."""
 
-    wood: list[Mesh] = field(default_factory=list)
-    places: list[Points] = field(default_factory=list)
-    directions: list[Points] = field(default_factory=list)
+    wood: Mesh
+    places: Points
+    directions: Points
 
 
-@dataclass(frozen=True)
-class _Habit:
+class _Habit(NamedTuple):
     """How a plant grows: into how many parts each part forks, how long and thick they are, and its leaves."""
 
     forks: tuple[int, ...]
@@ -81,10 +67,10 @@ def _shrubs() -> Things:
     ]
     bark = Material(noise(11, (0.34, 0.26, 0.2), 0.06, 0.2, (3, 40), 0.2))
     for number, (plant, habit, green) in enumerate(plants):
-        yield thing(plant.wood, bark, thin=True)
+        yield thing([part.wood for part in plant], bark, thin=True)
         blades = noise(20 + 5 * number, green, 0.045, 0.5, (4, 200), 0.6)
         yield thing(_leaves(rng, plant, habit.leaf), blades)
-    places = np.concatenate(plants[0][0].places)[::14] + np.array([0, 0.012, 0])
+    places = np.concatenate([part.places for part in plants[0][0]])[::14] + np.array([0, 0.012, 0])
     berries = copies(ball((0, 0, 0), 0.008, fineness=10), about_vertical(np.zeros(len(places))), places)
     yield thing(berries, Material((0.62, 0.07, 0.05), "glossy", 0.15))
     # and fallen ones
@@ -93,14 +79,11 @@ def _shrubs() -> Things:
     yield thing(fallen, noise(41, (0.5, 0.33, 0.14), 0.06, 0.3, (4, 200), 0.6))
 
 
-def _grown(rng: np.random.Generator, habit: _Habit, foot: npt.ArrayLike, direction: Points) -> _Plant:
-    plant = _Plant()
-    for _ in range(habit.forks[0]):
-        _grow(rng, habit, plant, np.asarray(foot, float), direction, 0)
-    return plant
+def _grown(rng: np.random.Generator, habit: _Habit, foot: Vector, direction: Points) -> list[_Part]:
+    return [part for _ in range(habit.forks[0]) for part in _grow(rng, habit, np.array(foot), direction, 0)]
 
 
-def _grow(rng: np.random.Generator, habit: _Habit, plant: _Plant, start: Points, along: Points, level: int) -> None:
+def _grow(rng: np.random.Generator, habit: _Habit, start: Points, along: Points, level: int) -> Iterator[_Part]:
     """One part of a plant, and all that springs from it."""
     step = habit.lengths[level] * rng.uniform(0.75, 1.2) / 7
     # the only part of a bough goes where it is sent
@@ -114,22 +97,23 @@ def _grow(rng: np.random.Generator, habit: _Habit, plant: _Plant, start: Points,
     # nothing grows into the wall or the ground
     points[:, 2] = np.minimum(points[:, 2], _WALL - 0.08)
     points[:, 1] = np.minimum(points[:, 1], 0.02)
-    plant.wood.append(tube(points, np.linspace(thick, 0.5 * thick, 8), 8 if level < 2 else 5))
+    wood = tube(points, np.linspace(thick, 0.5 * thick, 8), 8 if level < 2 else 5)
     if level + 1 < len(habit.forks):
+        yield _Part(wood, np.empty((0, 3)), np.empty((0, 3)))
         for index in np.linspace(3, 7, habit.forks[level + 1]).round().astype(int):
-            _grow(rng, habit, plant, points[index], points[index] - points[index - 1], level + 1)
+            yield from _grow(rng, habit, points[index], points[index] - points[index - 1], level + 1)
         return
     shares = np.linspace(1.2, 7, habit.leaves)
     places = np.stack([np.interp(shares, np.arange(8), points[:, axis]) for axis in range(3)], axis=1)
     aside = _unit(np.cross(along, _unit(_UP + 0.5 * rng.standard_normal(3))))
     sides = np.where(np.arange(habit.leaves) % 2, 1.0, -1.0)[:, None] * aside
-    plant.places.append(places)
-    plant.directions.append(along + 1.2 * sides + 0.3 * rng.standard_normal(places.shape))
+    yield _Part(wood, places, along + 1.2 * sides + 0.3 * rng.standard_normal(places.shape))
 
 
-def _leaves(rng: np.random.Generator, plant: _Plant, blade: Mesh) -> Mesh:
+def _leaves(rng: np.random.Generator, plant: list[_Part], blade: Mesh) -> Mesh:
     """The leaves of a plant, their upper sides to the light as well as they can."""
-    places, directions = np.concatenate(plant.places), _unit(np.concatenate(plant.directions))
+    places = np.concatenate([part.places for part in plant])
+    directions = _unit(np.concatenate([part.directions for part in plant]))
     above = _UP + 0.4 * rng.standard_normal(directions.shape)
     down = -_unit(above - np.sum(above * directions, axis=1, keepdims=True) * directions)
     axes = np.stack([directions, down, np.cross(directions, down)], axis=1)

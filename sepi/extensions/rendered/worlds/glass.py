@@ -3,14 +3,12 @@
 Panes are thin, the vessels solid glass with an inner and an outer surface; pencils and a twig stand in some of them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sepi.extensions.rendered import patterns, shapes
 from sepi.extensions.rendered.shapes import ball, box, moved, thing, wall
 from sepi.extensions.rendered.staging import vessel
-from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Paths, Pattern, Things, Vector, World
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Pattern, Things, Vector, World
 
 COUNTER, WALL = 0.25, 1.75
 GLASS, PANE = Material(kind="glass"), Material(kind="glass", pane=True)
@@ -21,25 +19,17 @@ _POSTERS = [(-0.64, -0.42, (0.2, 0.42, 0.6)), (-0.19, -0.45, (0.75, 0.28, 0.18))
 _TUMBLER = [(0.037, 0.1), (0.0385, 0.1005), (0.0395, 0.099), (0.036, 0.05), (0.033, 0.004), (0.03, 0.0)]
 _BOTTLE = [(0.012, 0.27), (0.017, 0.269), (0.017, 0.255), (0.0135, 0.25), (0.0135, 0.2), (0.02, 0.18), (0.04, 0.15),
            (0.043, 0.12), (0.043, 0.01), (0.038, 0.0)]  # fmt: skip
-_JUG = [
-    (0.05, 0.2),
-    (0.053, 0.201),
-    (0.054, 0.198),
-    (0.042, 0.16),
-    (0.05, 0.11),
-    (0.068, 0.06),
-    (0.06, 0.01),
-    (0.05, 0.0),
-]
+_JUG = [(0.05, 0.2), (0.053, 0.201), (0.054, 0.198), (0.042, 0.16), (0.05, 0.11), (0.068, 0.06), (0.06, 0.01),
+        (0.05, 0.0)]  # fmt: skip
 _PENCILS = [(0.024, 0.0, 0.03), (-0.012, 0.021, -0.02), (-0.014, -0.02, 0.0)]
 
 
 def world() -> World:
     """In a bright kitchen: light from everywhere, most of it from the left."""
     lamp = Lamp((-2.4, -1.6, -0.6), (0, 0, 2.2), (1.4, -1.2, 0), (3.0, 2.9, 2.7))
-    light = Light(sky=(0.45, 0.46, 0.48), lamps=[lamp], exposure=1.75)
+    light = Light(sky=(0.45, 0.46, 0.48), lamps=[lamp], exposure=1.75, depth=10, roulette=6, gloss=0.66)
     things = [*_kitchen(), *_panes(), *_vessels(), *_twig((-0.24, COUNTER, 1.22))]
-    return World(things, Cameras(0.95, WALL, 2.1, -1.6, 33), light, Paths(10, 6, 0.66))
+    return World(things, Cameras(0.95, WALL, 2.1, -1.6, 33), light)
 
 
 def _kitchen() -> Things:

@@ -5,27 +5,11 @@ from a fraction of a pixel. The terrain is a height field that houses and trees 
 screen at the far end.
 """
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
 
-from sepi.extensions.rendered.patterns import bricks, field, noise
-from sepi.extensions.rendered.shapes import (
-    Points,
-    about_vertical,
-    ball,
-    box,
-    copies,
-    joined,
-    moved,
-    raster,
-    sheet,
-    thing,
-    turned_body,
-    wall,
-)
+from sepi.extensions.rendered import patterns, shapes
+from sepi.extensions.rendered.patterns import bricks, noise
+from sepi.extensions.rendered.shapes import Points, ball, box, joined, moved, raster, sheet, thing, turned_body, wall
 from sepi.extensions.rendered.staging import house, seen_from
 from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Pattern, Sun, Things, World
 
@@ -56,26 +40,26 @@ def _terrain() -> Things:
     x = np.linspace(-0.5, 0.5, 300)[None, :] * (z + 40)
     # the pattern lies on the ground as on a map
     flat = raster(x, z).reshape(-1, 2).astype(np.float32)
-    yield thing(replace(sheet(raster(x, -_height(x, z), z)), uv=flat), _fields())
+    yield thing(sheet(raster(x, -_height(x, z), z))._replace(uv=flat), _fields())
 
 
 def _fields() -> Pattern:
     """Fields of several crops in strips, with the grain of grass: 100 m a side."""
-    grain = field(1, 2.5, 40) + 0.6 * field(2, 20, 300)
+    grain = patterns.field(1, 2.5, 40) + 0.6 * patterns.field(2, 20, 300)
     colours = np.array([[0.3, 0.42, 0.17], [0.4, 0.47, 0.2], [0.55, 0.5, 0.25], [0.26, 0.36, 0.15]])
-    chosen = np.digitize(field(3, 90, 500), [-0.7, 0.1, 0.9])
+    chosen = np.digitize(patterns.field(3, 90, 500), [-0.7, 0.1, 0.9])
     crops = colours[chosen] * (1 + 0.16 * grain[..., None])
     return Pattern(crops.clip(0.03, 0.95).astype(np.float32), (100.0, 100.0))
 
 
 def _sky() -> Things:
     """Clouds on a screen, paler towards the horizon."""
-    clouds = np.clip(field(11, 24, 500, stretch=0.5) * 0.45 + 0.35, 0, 1)[..., None]
+    clouds = np.clip(patterns.field(11, 24, 500, stretch=0.5) * 0.45 + 0.35, 0, 1)[..., None]
     down = np.linspace(0, 1, len(clouds))[:, None, None]
     clear = (1 - down) * np.array([0.45, 0.62, 0.86]) + down * np.array([0.82, 0.87, 0.9])
     colours = clear + (0.75 - 0.35 * down) * clouds * (np.array([0.97, 0.96, 0.95]) - clear)
     screen = wall((-700, -700, _FAR), 1400, 700)
-    yield thing(replace(screen, uv=np.sign(screen.uv)), Pattern(colours.astype(np.float32), (1.0, 1.0)))
+    yield thing(screen._replace(uv=np.sign(screen.uv)), Pattern(colours.astype(np.float32), (1.0, 1.0)))
 
 
 def _village() -> Things:
@@ -111,9 +95,9 @@ def _trees() -> Things:
             keep &= np.hypot(x - right, z - far) > 8.5
         x, z = x[keep], z[keep]
         places = np.stack([x, -_height(x, z) + 0.4, z], axis=1)
-        axes = about_vertical(rng.uniform(0, 2 * np.pi, len(x)))
+        axes = shapes.about_vertical(rng.uniform(0, 2 * np.pi, len(x)))
         leaves = noise(50 + 5 * number, green, 0.07, 12.0, (3, 120))
-        yield thing(copies(shape, axes, places, rng.uniform(*heights, len(x))), leaves)
+        yield thing(shapes.copies(shape, axes, places, rng.uniform(*heights, len(x))), leaves)
 
 
 def _crown(seed: int) -> Mesh:

@@ -4,8 +4,6 @@ Walls and ceiling are painted in one colour, or nearly so, and all of them are s
 match but shading and borders. Daylight comes through a window on the left and from behind the cameras.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sepi.extensions.rendered.patterns import noise, printed, stone, tiles, wood

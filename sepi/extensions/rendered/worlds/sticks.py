@@ -4,8 +4,6 @@ Many depths meet in a small window, and thin things stand before them. Boxes and
 lists of places; sticks stand in a bucket, lean against the wall, or lie over the edges of boxes, placed by a seed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sepi.extensions.rendered.patterns import noise, printed, stripes, wood

@@ -4,15 +4,13 @@ One front faces the cameras far away, one stands nearer on the left with a side 
 right; a terrace with railings is nearest. A front is put together from bands and piers, so that its windows lie within.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from sepi.extensions.rendered.patterns import bricks, noise, stripes, tiles
 from sepi.extensions.rendered.shapes import box, ground, moved, raster, rectangle, sheet, thing, tube, turned_body, wall
-from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Paths, Sun, Things, Vector, World
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Sun, Things, Vector, World
 
 GROUND = 4.0
 _PANE = Material((0.1, 0.12, 0.14), "glossy")
@@ -20,8 +18,7 @@ _WHITE, _IRON = Material((0.86, 0.85, 0.8)), Material((0.13, 0.14, 0.15))
 _SILL = Material(noise(91, (0.74, 0.7, 0.62), 0.05, 2.0, (3, 256)))
 
 
-@dataclass(frozen=True)
-class Front:
+class Front(NamedTuple):
     """A front: where its lower left corner is, how it turns away, and what is on it (lengths in metres)."""
 
     corner: Vector
@@ -40,8 +37,8 @@ class Front:
 
 def world() -> World:
     """On a clear afternoon: the sun on two of the fronts, the third in the shade."""
-    light = Light(sky=(0.36, 0.44, 0.56), suns=[Sun((0.36, 0.72, 0.55), (2.0, 1.86, 1.62))], exposure=1.6)
-    return World([*_square()], Cameras(6.6, 26.0, 2.2, -1.5, 50), light, Paths(4))
+    light = Light(sky=(0.36, 0.44, 0.56), suns=[Sun((0.36, 0.72, 0.55), (2.0, 1.86, 1.62))], exposure=1.6, depth=4)
+    return World([*_square()], Cameras(6.6, 26.0, 2.2, -1.5, 50), light)
 
 
 def _square() -> Things:
@@ -55,7 +52,7 @@ def _square() -> Things:
     fronts = [
         Front((-8, GROUND, 25), 0, 9, 7, brick, 2, 2.05, (1.0, 1.8), awnings=red_white),
         left,
-        replace(left, corner=(-3.5, GROUND, 15), turn=-np.pi / 2, awnings=None, seed=3),
+        left._replace(corner=(-3.5, GROUND, 15), turn=-np.pi / 2, awnings=None, seed=3),
         Front((5.6, GROUND, 25.2), 1.63, 8, 7, stone, 4, 2.0, (0.95, 2.0), awnings=red_white, balconies=True),
     ]
     yield thing(ground((-30, GROUND, 2), 60, 40), tiles(31, 3.2, 8, (0.64, 0.61, 0.56), (0.52, 0.5, 0.47)))
@@ -90,7 +87,7 @@ def _front(front: Front) -> Things:
                     _slab((x + off - w / 4, high), (x + off + w / 4, low), 0.04, -0.05) for off in (-0.77 * w, 0.77 * w)
                 ]
             if front.balconies and floor:
-                iron += _railing((x - w / 2 - 0.15, low + 0.05), w + 0.3, 0.95, -0.3, 0.12, 0.012)
+                iron += _railing(x - w / 2 - 0.15, low + 0.05, w + 0.3, 0.95, -0.3, 0.12, 0.012)
                 sills.append(_slab((x - w / 2 - 0.2, low), (x + w / 2 + 0.2, low + 0.12), 0.1, -0.38))
     if front.awnings:
         for x in centres[-2::-2] + front.pitch / 2:
@@ -110,7 +107,7 @@ def _slab(low: tuple[float, float], high: tuple[float, float], depth: float, at:
     """A box between two corners of its front; what is painted on a front goes on from one slab to the next."""
     (x0, y0), (x1, y1) = low, high
     mesh = box(((x0 + x1) / 2, (y0 + y1) / 2, at + depth / 2), (x1 - x0, y1 - y0, depth))
-    return replace(mesh, uv=mesh.vertices[:, :2] + mesh.vertices[:, 2:])
+    return mesh._replace(uv=mesh.vertices[:, :2] + mesh.vertices[:, 2:])
 
 
 def _casement(x: float, w: float, high: float, low: float) -> list[Mesh]:
@@ -121,15 +118,12 @@ def _casement(x: float, w: float, high: float, low: float) -> list[Mesh]:
     return upright + [_slab((x - w / 2, y), (x + w / 2, y + 0.07), 0.06, 0.21) for y in levels]
 
 
-def _railing(
-    corner: tuple[float, float], length: float, height: float, at: float, pitch: float, radius: float
-) -> list[Mesh]:
-    """Upright bars between two rails; ``corner`` is the lower left one."""
-    x, y = corner
+def _railing(x: float, y: float, length: float, height: float, at: float, pitch: float, radius: float) -> list[Mesh]:
+    """Upright bars between two rails; ``x`` and ``y`` are of the lower left corner."""
     steps = np.linspace(0, length, int(length / pitch) + 1)
     bars = [tube([[x + s, y - height, at], [x + s, y, at]], radius, 8) for s in steps]
     rails = [_slab((x, y - off - 0.025), (x + length, y - off + 0.025), 0.04, at - 0.02) for off in (height, 0.12)]
-    return [replace(bar, smooth=False) for bar in bars] + rails
+    return [bar._replace(smooth=False) for bar in bars] + rails
 
 
 def _awning(x: float, width: float) -> list[Mesh]:
@@ -142,7 +136,7 @@ def _awning(x: float, width: float) -> list[Mesh]:
 
 def _terrace() -> Things:
     """The railing before the cameras, on a low wall."""
-    yield thing(_railing((-4.0, 2.8), 8.0, 1.0, 6.9, 0.125, 0.013), _IRON, thin=True)
+    yield thing(_railing(-4.0, 2.8, 8.0, 1.0, 6.9, 0.125, 0.013), _IRON, thin=True)
     yield thing([box((x, 2.28, 6.9), (0.09, 1.2, 0.09)) for x in (-2.6, 0.4, 3.4)], _IRON)
     yield thing(box((0, 3.38, 6.95), (10, 1.15, 0.35)), _SILL)
 
@@ -150,7 +144,7 @@ def _terrace() -> Things:
 def _parasol(foot: Vector, cloth: Material) -> Things:
     """Eight panels on a pole, over a table."""
     roof = turned_body([[0.02, 2.75], [1.5, 2.1], [1.5, 1.95]], foot, 8)
-    yield thing(replace(roof, smooth=False), cloth)
+    yield thing(roof._replace(smooth=False), cloth)
     yield thing(tube(np.array(foot) + np.array([[0, -2.75, 0], [0, 0, 0]]), 0.03), _WHITE, thin=True)
     table = turned_body([[0.001, 0.75], [0.5, 0.75], [0.5, 0.71], [0.05, 0.7], [0.05, 0.03], [0.3, 0.0]], foot)
     yield thing(table, _WHITE)

@@ -4,16 +4,14 @@ Wires of one to three pixels at 512 stand before things of every depth up to the
 zigzag wires, one each 3 cm; it starts at a post, so that a part of the yard is seen without it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 
 from sepi.extensions.rendered import shapes
 from sepi.extensions.rendered.patterns import bricks, noise, wood
 from sepi.extensions.rendered.shapes import Points, box, ground, moved, rod, thing, tube, wall
-from sepi.extensions.rendered.staging import crate, leaning, of_boards, seen_from
-from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Sun, Things, World
+from sepi.extensions.rendered.staging import crate, leaning, of_boards, seen_from, strand
+from sepi.extensions.rendered.world import Cameras, Light, Material, Sun, Things, World
 
 _WALL = 6.4
 # the fence: where its first post stands, how long it is, and how it is turned away from the picture's plane
@@ -97,7 +95,7 @@ def _fence() -> Things:
         for number in range(int(_LENGTH / _MESH))
     ]
     rows = ((0.08, 0.0), (0.75, 0.0), (1.43, 0.0), (1.54, 0.01), (1.66, 0.01))
-    tension = [_strand(_on_fence([0, _LENGTH], height), sag, 0.0022) for height, sag in rows]
+    tension = [strand(_on_fence([0, _LENGTH], height), sag, 0.0022) for height, sag in rows]
     yield thing(wires + tension, Material((0.6, 0.63, 0.65), "glossy", 0.25), thin=True)
     posts = [_on_fence(along, [0.0, 1.72]) for along in (0.0, 1.62)]
     yield thing([rod(foot, top, 0.021, 20) for foot, top in posts], Material((0.25, 0.38, 0.3), "glossy", 0.2))
@@ -109,14 +107,6 @@ def _on_fence(along: npt.ArrayLike, height: npt.ArrayLike, off: npt.ArrayLike = 
     return np.asarray(_POST + shapes.raster(along, height, off) @ axes)
 
 
-def _strand(ends: Points, sag: float, radius: float) -> Mesh:
-    """A wire between two points that hangs down by ``sag`` in its middle."""
-    share = np.linspace(0, 1, 24)[:, None]
-    path = ends[0] + share * (ends[1] - ends[0])
-    path[:, 1] += sag * 4 * share[:, 0] * (1 - share[:, 0])
-    return tube(path, radius, 8)
-
-
 def _cables() -> Things:
     spans = [
         ((-2.6, -2.35, 3.2), (3.0, -2.25, 4.6), 0.18, 0.007),
@@ -125,7 +115,7 @@ def _cables() -> Things:
         ((-3.2, -3.0, 6.1), (3.6, -2.6, 6.2), 0.25, 0.01),
         ((-1.1, -2.2, 1.9), (1.4, -1.98, 5.6), 0.12, 0.004),
     ]
-    cables = [_strand(np.array([first, last]), sag, radius) for first, last, sag, radius in spans]
+    cables = [strand((first, last), sag, radius) for first, last, sag, radius in spans]
     rng = np.random.default_rng(9)
     canes = []
     for x in np.linspace(-1.25, -0.1, 9):
