@@ -13,7 +13,7 @@ from pydantic import Field
 
 from sepi.camera import camera_from
 from sepi.extensions.rendered.patterns import srgb_encoded
-from sepi.extensions.rendered.render_file import Render, read_render
+from sepi.extensions.rendered.render_file import Render, masks_in, read_render
 from sepi.extensions.rendered.render_file import read_truth as read_truth
 from sepi.extensions.rendered.shapes import Points
 from sepi.extensions.rendered.world import Share
@@ -104,7 +104,7 @@ def exposed(render: Render, exposure: Exposure) -> LightField:
         source="rendered",
         disparity_range=_range_of(render.disparity),
         ground_truth=render.disparity[render.centre],
-        masks=render.masks_of(render.centre),
+        masks=masks_in(render.masks[render.centre]),
         camera=camera_from(**render.settings, shape=render.views.shape[2:4], crop_of=None),
     )
 

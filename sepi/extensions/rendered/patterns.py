@@ -159,8 +159,7 @@ def printed(seed: int, size: float, lines: int = 40, paper: Vector = (0.9, 0.89,
 
 def painted(colours: npt.ArrayLike, width: float, height: float | None = None) -> Pattern:
     """Colours as a pattern, kept off black and white; default height: the width."""
-    raster: FloatArray = np.clip(np.asarray(colours), 0.02, 0.98).astype(np.float32)
-    return Pattern(raster, (width, height or width))
+    return Pattern(np.clip(np.asarray(colours), 0.02, 0.98).astype(np.float32), (width, height or width))
 
 
 def _between(first: Vector, second: Vector, share: Field) -> Field:

@@ -143,10 +143,6 @@ class Render:
         """Grid position of the reference view."""
         return self.views.shape[0] // 2, self.views.shape[1] // 2
 
-    def masks_of(self, view: tuple[int, int]) -> dict[str, BoolMap]:
-        """The masks of a view by name."""
-        return masks_in(self.masks[view])
-
 
 def write_render(path: Path, render: Render) -> None:
     """Write a render, whole or not at all; equal content gives equal bytes."""

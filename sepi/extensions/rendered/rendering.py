@@ -153,7 +153,8 @@ def _stand(rig: Rig, options: RenderOptions) -> tuple[Points, Points]:
     shift, turns = rng.standard_normal((rows * columns, 2)), rng.standard_normal((rows * columns, 3))
     for values in (shift, turns):
         values[rows // 2 * columns + columns // 2] = 0
-    return rig.positions.reshape(-1, 2) + options.position_error * shift, np.radians(options.rotation_error) * turns
+    stand = np.array(list(np.ndindex(rows, columns)), float) - (rows // 2, columns // 2)
+    return stand + options.position_error * shift, np.radians(options.rotation_error) * turns
 
 
 def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files: Sequence[Path]) -> Render:

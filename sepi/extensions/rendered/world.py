@@ -253,11 +253,6 @@ class Rig(NamedTuple):
             "sensor_size_mm": SENSOR_MM,
         }
 
-    @property
-    def positions(self) -> npt.NDArray[np.float64]:
-        """Positions of the views from the centre view, ``(down, across)`` in view steps; shape (T, S, 2)."""
-        return np.moveaxis(np.indices(self.grid, float), 0, -1) - np.floor_divide(self.grid, 2)
-
     def axis(self, position: Position) -> tuple[float, float]:
         """Row and column of a camera's axis in its picture, which is shifted to converge at the focus distance."""
         shear = self.focal_px / (self.focus * self.size)

@@ -159,7 +159,7 @@ def test_masks_say_what_a_pixel_shows(tmp_path: Path) -> None:
     balls = [ball(-0.45, Material(kind="mirror")), ball(0.45, Material(kind="glass")), lacquer]
     world = room(bar(depth=1.5, width=0.06), *balls)
     render = rendered(tmp_path, world, size=96, samples=1)
-    masks = render.masks_of(render.centre)
+    masks = masks_in(render.masks[render.centre])
     assert list(masks) == list(MASKS)
     rig = rig_of(world, 96, (3, 3))
     d_bar, d_wall = rig.disparity(np.array([1.5, 3.0]))

@@ -149,10 +149,6 @@ def _blend(a: Points, b: Points, width: float) -> Points:
     return np.asarray(np.minimum(a, b) - over**2 * width / 4)
 
 
-def _without(a: Points, b: Points, width: float) -> Points:
-    return -_blend(-a, b, width)
-
-
 def _head(q: Points) -> Points:
     """Distance from the head, whose face looks along ``z``, ``y`` up; the ears are at height 0."""
     d = _ellipsoid(q, (0, 0.03, -0.012), (0.074, 0.088, 0.1))
@@ -160,12 +156,12 @@ def _head(q: Points) -> Points:
     d = _blend(d, _ellipsoid(q, (0, -0.072, 0.035), (0.051, 0.042, 0.054)), 0.02)
     d = _blend(d, _ellipsoid(q, (0, -0.1, 0.077), (0.021, 0.017, 0.018)), 0.02)
     d = _blend(d, _ellipsoid(q, (0.044, -0.022, 0.06), (0.02, 0.016, 0.02)), 0.025)
-    d = _without(d, _ellipsoid(q, (0.031, 0.001, 0.102), (0.021, 0.013, 0.022)), 0.014)
+    d = -_blend(-d, _ellipsoid(q, (0.031, 0.001, 0.102), (0.021, 0.013, 0.022)), 0.014)
     d = _blend(d, _capsule(q, (0.01, 0.021, 0.091), (0.05, 0.018, 0.07), 0.006, 0.005), 0.014)
     d = np.minimum(d, _eye(q))
     d = _blend(d, _capsule(q, (0, 0.014, 0.094), (0, -0.036, 0.116), 0.0065, 0.0095), 0.008)
     d = _blend(d, _ellipsoid(q, (0.0125, -0.041, 0.1), (0.008, 0.008, 0.01)), 0.005)
-    d = _without(d, _capsule(q, (0, -0.05, 0.103), (0, -0.06, 0.101), 0.003, 0.004), 0.006)
+    d = -_blend(-d, _capsule(q, (0, -0.05, 0.103), (0, -0.06, 0.101), 0.003, 0.004), 0.006)
     d = _blend(d, _capsule(q, (0.004, -0.066, 0.0975), (0.022, -0.0705, 0.088), 0.0055, 0.002), 0.004)
     d = _blend(d, _capsule(q, (0, -0.0785, 0.096), (0.018, -0.0735, 0.089), 0.0065, 0.002), 0.003)
     return _blend(d, _ellipsoid(q, (0.076, -0.008, -0.012), (0.011, 0.03, 0.018)), 0.006)

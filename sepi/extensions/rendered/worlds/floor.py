@@ -57,8 +57,7 @@ def _chairs() -> Things:
     yield thing(chair(-2.5, (0.35, 0, 3.1), 3), Material((0.6, 0.1, 0.07), "glossy", 0.08))
     x, z = 0.86, 3.5
     seat = turned_body(bevelled([[0, 0.62], [0.17, 0.62], [0.17, 0.58], [0, 0.58]], 0.006), (x, 0, z))
-    turns = np.arange(4) * np.pi / 2 + 0.5
-    sides = zip(np.cos(turns), np.sin(turns), strict=True)
+    sides = [(np.cos(turn), np.sin(turn)) for turn in np.arange(4) * np.pi / 2 + 0.5]
     legs = [rod((x + 0.19 * c, -0.013, z + 0.19 * s), (x + 0.1 * c, -0.59, z + 0.1 * s), 0.014) for c, s in sides]
     yield thing([seat, *legs], Material((0.12, 0.2, 0.26), "glossy", 0.15))
 
