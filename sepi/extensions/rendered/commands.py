@@ -52,7 +52,7 @@ def extended(command: SepiCommand) -> SepiCommand:
 
     @click.pass_context
     def scenes(context: click.Context, /, rendered: bool, **given: Any) -> None:
-        r"""Scenes of --rendered are path-traced, with plain walls, gloss, mirrors and glass.
+        """Scenes of --rendered are path-traced, with plain walls, gloss, mirrors and glass.
 
         They have 512 pixels unless --size says otherwise; a file NAME.h5 beside the folder has their light, and
         disparity, normals and masks of every view.
