@@ -3,7 +3,7 @@
 from sepi.registry import Extension
 
 EXTENSION = Extension(
-    flags={"scenes --rendered": f"{__name__}.scenes_flags"},
+    flags={"scenes --rendered": f"{__name__}.commands"},
     datasets={"rendered": f"{__name__}.dataset"},
     rules=[__name__],
 )

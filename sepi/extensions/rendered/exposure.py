@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import zlib
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -14,28 +13,19 @@ from pydantic import Field
 
 from sepi.camera import camera_from
 from sepi.extensions.rendered.patterns import srgb_encoded
-from sepi.extensions.rendered.render_file import Render, read_render
+from sepi.extensions.rendered.render_file import Render, masks_in, read_render
 from sepi.extensions.rendered.render_file import read_truth as read_truth
+from sepi.extensions.rendered.shapes import Points
+from sepi.extensions.rendered.world import Share
 from sepi.lightfield import DisparityRange, LightField
-from sepi.validation.models import CheckedModel, validated
+from sepi.validation.models import CheckedModel, Positive, validated
 from sepi.workflow.rendered_scenes import NoiseLevel, exposed_name
 
-
-@dataclass(frozen=True)
-class Electrons:
-    """A sensor: electrons of a white pixel, and standard deviation of the read noise in electrons."""
-
-    white: float
-    read: float
-
-
-NOISE: dict[NoiseLevel, Electrons | None] = {
-    "off": None,
-    # standard deviations of 3 and 9 of 255 in grey of 18 %
-    "low": Electrons(2000.0, 4.0),
-    "high": Electrons(250.0, 4.0),
-}
-"""Noise level to sensor; None without noise."""
+# standard deviations of 3 and 9 of 255 in grey of 18 %
+WHITE: dict[NoiseLevel, float] = {"low": 2000.0, "high": 250.0}
+"""Noise level to electrons of a white pixel."""
+READ = 4.0
+"""Standard deviation of the read noise in electrons."""
 
 
 class Exposure(CheckedModel):
@@ -46,18 +36,12 @@ class Exposure(CheckedModel):
     )
     noise_seed: int = Field(1, ge=1, lt=2**31, description="of the noise, and of what differs from view to view")
     vignetting: float = Field(0.0, ge=0, le=1, description="part of the light that the corners lack")
-    exposure_spread: float = Field(
-        0.0,
-        ge=0,
-        allow_inf_nan=False,
-        description="standard deviation of the exposures of views but the reference view, in stops",
+    exposure_spread: Share = Field(
+        0.0, description="standard deviation of the exposures of views but the reference view, in stops"
     )
     bits: Literal[8, 16] = Field(8, description="of each value")
-    gamma: float | None = Field(
-        None,
-        gt=0,
-        allow_inf_nan=False,
-        description="exponent of the curve from light to values is 1 / gamma; 1: linear; null: sRGB",
+    gamma: Positive | None = Field(
+        None, description="exponent of the curve from light to values is 1 / gamma; 1: linear; null: sRGB"
     )
 
 
@@ -104,53 +88,36 @@ def exposed(render: Render, exposure: Exposure) -> LightField:
     views = np.empty(render.views.shape, np.uint8 if exposure.bits == 8 else np.uint16)
     # seeded by scene, level and seed, so that no two pictures share their noise
     key = zlib.crc32(f"{render.name} {exposure.noise}".encode())
-    factors = np.exp2(
-        exposure.exposure_spread * np.random.default_rng([exposure.noise_seed, key]).standard_normal((rows, columns))
-    )
+    rng = np.random.default_rng([exposure.noise_seed, key])
+    factors = np.exp2(exposure.exposure_spread * rng.standard_normal((rows, columns)))
     factors[render.centre] = 1
-    shade = _vignette(render.views.shape[2:4], exposure.vignetting)
+    down, across = (np.linspace(-1, 1, length) for length in render.views.shape[2:4])
+    # falling with the squared distance from the middle
+    shade = (1 - exposure.vignetting * (down[:, None] ** 2 + across[None, :] ** 2) / 2)[..., None]
     for t, s in np.ndindex(rows, columns):
         light = np.maximum(render.views[t, s].astype(np.float64), 0) * (factors[t, s] * shade)
         rng = np.random.default_rng([exposure.noise_seed, key, t * columns + s])
-        views[t, s] = _values(_noisy(light, exposure, render.light, rng), exposure)
+        views[t, s] = _taken(light, exposure, render.light, rng)
     return LightField(
         views=views,
         name=exposed_name(render.name, exposure.noise, exposure.noise_seed),
         source="rendered",
         disparity_range=_range_of(render.disparity),
         ground_truth=render.disparity[render.centre],
-        masks=render.masks_of(render.centre),
+        masks=masks_in(render.masks[render.centre]),
         camera=camera_from(**render.settings, shape=render.views.shape[2:4], crop_of=None),
     )
 
 
-def _noisy(
-    light: npt.NDArray[np.float64], exposure: Exposure, share: float, rng: np.random.Generator
-) -> npt.NDArray[np.float64]:
-    """Light with photon noise and read noise."""
-    sensor = NOISE[exposure.noise]
-    if sensor is None:
-        return light
-    white = sensor.white * share
-    # a full well is white
-    electrons = rng.poisson(np.minimum(light, 1) * white) + sensor.read * rng.standard_normal(light.shape)
-    return electrons / white
-
-
-def _values(light: npt.NDArray[np.float64], exposure: Exposure) -> npt.NDArray[np.float64]:
-    """Pixel values before rounding."""
+def _taken(light: Points, exposure: Exposure, share: float, rng: np.random.Generator) -> Points:
+    """Pixel values before their type: with photon noise and read noise, cut off at white, through the curve."""
+    if exposure.noise in WHITE:
+        white = WHITE[exposure.noise] * share
+        # a full well is white
+        light = (rng.poisson(np.minimum(light, 1) * white) + READ * rng.standard_normal(light.shape)) / white
     light = np.clip(light, 0, 1)
-    curve = (
-        np.float64(srgb_encoded(light.astype(np.float32))) if exposure.gamma is None else light ** (1 / exposure.gamma)
-    )
-    values: npt.NDArray[np.float64] = np.round(curve * (2**exposure.bits - 1))
-    return values
-
-
-def _vignette(shape: tuple[int, int], strength: float) -> npt.NDArray[np.float64]:
-    """Share of the light that arrives, falling with the squared distance from the middle; shape (H, W, 1)."""
-    down, across = (np.linspace(-1, 1, length) for length in shape)
-    return (1 - strength * (down[:, None] ** 2 + across[None, :] ** 2) / 2)[..., None]
+    curve = srgb_encoded(light.astype(np.float32)) if exposure.gamma is None else light ** (1 / exposure.gamma)
+    return np.asarray(np.round(np.float64(curve) * (2**exposure.bits - 1)))
 
 
 def _range_of(disparity: npt.NDArray[np.float32]) -> DisparityRange:

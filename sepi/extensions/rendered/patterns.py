@@ -13,6 +13,7 @@ import numpy.typing as npt
 from scipy import fft
 
 from sepi.extensions.rendered.world import FloatArray, Pattern, Vector
+from sepi.lightfield import BoolMap
 from sepi.process.threads import threads_used
 
 TEXELS = 1024
@@ -54,19 +55,16 @@ def _amplitude(finest: float, coarsest: float, texels: int, stretch: float) -> F
 
 
 def noise(
-    seed: int,
-    colour: Vector,
-    contrast: float,
-    size: float,
-    *,
-    finest: float = 4.0,
-    coarsest: float = 256.0,
-    chroma: float = 0.3,
+    seed: int, colour: Vector, contrast: float, size: float, waves: tuple[float, float] = (4, 256), chroma: float = 0.3
 ) -> Pattern:
-    """Noise about a colour: ``contrast`` is the deviation of the brightness, ``chroma`` the share of colour in it."""
-    found = field(seed, finest, coarsest)[..., None]
+    """Noise about a colour.
+
+    ``contrast`` is the deviation of the brightness, ``waves`` the finest and the coarsest wavelength in texels, and
+    ``chroma`` the share of colour.
+    """
+    found = field(seed, *waves)[..., None]
     if chroma:
-        colours = [field(seed + 1 + channel, finest, coarsest) for channel in range(3)]
+        colours = [field(seed + 1 + channel, *waves) for channel in range(3)]
         found = found + chroma * np.stack(colours, axis=-1)
     return painted(np.array(colour) + contrast * found, size)
 
@@ -76,14 +74,14 @@ def wood(seed: int, size: float, light: Vector = (0.72, 0.52, 0.34), dark: Vecto
     grain = field(seed, 3, 90, stretch=14) + 0.7 * field(seed + 1, 40, 400, stretch=5)
     rings = 0.5 + 0.5 * np.sin(5 * grain)
     share = np.clip(0.65 * rings + 0.35 * (0.5 + 0.3 * field(seed + 2, 2, 16, stretch=20)), 0, 1)
-    return painted(_between(np.array(light), np.array(dark), share), size)
+    return painted(_between(light, dark, share), size)
 
 
 def stone(seed: int, size: float, light: Vector = (0.82, 0.8, 0.77), dark: Vector = (0.4, 0.38, 0.4)) -> Pattern:
     """Veins through clouds."""
     clouds = 0.5 + 0.2 * field(seed, 4, 300)
     veins = np.exp(-18 * np.abs(field(seed + 1, 60, 500) + 0.25 * field(seed + 2, 4, 60)))
-    return painted(_between(np.array(light), np.array(dark), np.clip(0.4 * clouds + 0.7 * veins, 0, 1)), size)
+    return painted(_between(light, dark, np.clip(0.4 * clouds + 0.7 * veins, 0, 1)), size)
 
 
 def bricks(seed: int, size: float, rows: int = 10, colour: Vector = (0.6, 0.32, 0.24)) -> Pattern:
@@ -98,23 +96,24 @@ def bricks(seed: int, size: float, rows: int = 10, colour: Vector = (0.6, 0.32, 
     return painted(np.where((to_joint > 0.06)[..., None], face, mortar), size)
 
 
-def tiles(
-    seed: int, size: float, count: int = 8, light: Vector = (0.85, 0.84, 0.8), dark: Vector = (0.2, 0.24, 0.3)
-) -> Pattern:
+def tiles(seed: int, size: float, count: int, light: Vector, dark: Vector) -> Pattern:
     """Squares of two colours in turn, with joints; an even count a side."""
-    y, x = np.mgrid[:TEXELS, :TEXELS] * (count / TEXELS)
-    odd = (np.floor(y) + np.floor(x)) % 2
-    colour = _between(np.array(light), np.array(dark), odd) + 0.03 * field(seed, 4, 200)[..., None]
-    joint = np.minimum(np.abs(y - np.round(y)), np.abs(x - np.round(x))) < 0.02
-    return painted(np.where(joint[..., None], 0.5, colour), size)
+    odd, joint = checks(count, 0.02)
+    colour = _between(light, dark, odd[..., 0]) + 0.03 * field(seed, 4, 200)[..., None]
+    return painted(np.where(joint, 0.5, colour), size)
+
+
+def checks(count: int, joint: float) -> tuple[Field, BoolMap]:
+    """Which of ``count`` squares a side are odd (1, else 0), and the joints between; both ``(TEXELS, TEXELS, 1)``."""
+    y, x = np.mgrid[:TEXELS, :TEXELS, :1][:2] * (count / TEXELS)
+    beside = np.minimum(np.abs(y - np.round(y)), np.abs(x - np.round(x)))
+    return (np.floor(y) + np.floor(x)) % 2, beside < joint
 
 
 def stripes(size: float, colours: list[Vector], across: bool = True) -> Pattern:
     """Equal stripes in turn; ``across``: side by side, else one below the other."""
-    position = np.arange(TEXELS) * len(colours) // TEXELS
-    row = np.array(colours)[position]
-    raster = np.broadcast_to(row[None, :] if across else row[:, None], (TEXELS, TEXELS, 3))
-    return painted(raster, size)
+    row = np.array(colours)[np.arange(TEXELS) * len(colours) // TEXELS]
+    return painted(np.broadcast_to(row if across else row[:, None], (TEXELS, TEXELS, 3)), size)
 
 
 def weave(seed: int, size: float, colour: Vector, contrast: float = 0.1, threads: int = 128) -> Pattern:
@@ -139,7 +138,7 @@ def plaid(seed: int, size: float, ground: Vector, bands: Vector, count: int = 4,
     band = ((position > 0.2) & (position < 0.55)) * 0.8 + ((position > 0.75) & (position < 0.8)) * 1.0
     share = 0.5 * depth * (band[:, None] + band[None, :])
     cloth = linen(seed, size, ground).raster / np.array(ground, np.float32)
-    return painted(_between(np.array(ground), np.array(bands), share) * cloth, size)
+    return painted(_between(ground, bands, share) * cloth, size)
 
 
 def printed(seed: int, size: float, lines: int = 40, paper: Vector = (0.9, 0.89, 0.85), ink: float = 0.12) -> Pattern:
@@ -155,29 +154,24 @@ def printed(seed: int, size: float, lines: int = 40, paper: Vector = (0.9, 0.89,
             top, left = line * 2 * cell + cell // 3, column * cell
             part = page[top : top + glyph.shape[0], left : left + glyph.shape[1]]
             part[:] = glyph[: part.shape[0], : part.shape[1]]
-    return painted(_between(np.array(paper), np.full(3, ink), page), size)
+    return painted(_between(paper, (ink, ink, ink), page), size)
 
 
 def painted(colours: npt.ArrayLike, width: float, height: float | None = None) -> Pattern:
     """Colours as a pattern, kept off black and white; default height: the width."""
-    raster: FloatArray = np.clip(np.asarray(colours), 0.02, 0.98).astype(np.float32)
-    return Pattern(raster, (width, height or width))
+    return Pattern(np.clip(np.asarray(colours), 0.02, 0.98).astype(np.float32), (width, height or width))
 
 
-def _between(first: npt.NDArray[np.float64], second: npt.NDArray[np.float64], share: Field) -> Field:
-    mixed: Field = first + share[..., None] * (second - first)
-    return mixed
+def _between(first: Vector, second: Vector, share: Field) -> Field:
+    return np.asarray(first + share[..., None] * np.subtract(second, first))
 
 
 def srgb_encoded(values: FloatArray) -> FloatArray:
     """Values in sRGB of linear ones, both 0..1."""
-    found: FloatArray = np.where(
-        values <= 0.0031308, 12.92 * values, 1.055 * np.maximum(values, 1e-9) ** (1 / 2.4) - 0.055
-    )
-    return found
+    curve = 1.055 * np.maximum(values, 1e-9) ** (1 / 2.4) - 0.055
+    return np.asarray(np.where(values <= 0.0031308, 12.92 * values, curve), values.dtype)
 
 
 def srgb_decoded(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Linear values of sRGB ones, both 0..1."""
-    found: npt.NDArray[Any] = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
-    return found
+    return np.asarray(np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4))

@@ -14,15 +14,14 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.extensions.rendered.surfaces import FirstSurface
-from sepi.extensions.rendered.world import FloatArray, Pattern, Thing
+from sepi.extensions.rendered.surfaces import FirstSurface, raster_of
+from sepi.extensions.rendered.world import FloatArray, Thing
 from sepi.io.hdf5 import attribute, create_hdf5, fixed_text, open_hdf5, read_dataset
 from sepi.kernels import reprojection as kernels
 from sepi.lightfield import BoolMap, FloatMap
@@ -47,20 +46,13 @@ _SAME = 0.05
 
 def albedo_of(things: Sequence[Thing], seen: FirstSurface) -> FloatArray:
     """Colours of a view's surfaces without light, sRGB; shape (H, W, 3)."""
-    colours, uv = np.zeros((seen.thing.size, 3), np.float32), seen.uv.reshape(-1, 2)
-    # sorted by thing, instead of a pass over the picture for each
-    order = np.argsort(seen.thing.astype(np.int16), axis=None, kind="stable")
-    ends = np.searchsorted(seen.thing.ravel()[order], np.arange(-1, len(things)), side="right")
-    for thing, (first, last) in zip(things, pairwise(ends), strict=True):
-        pattern, here = thing.material.pattern, order[first:last]
-        if isinstance(pattern, Pattern):
-            height, width = pattern.raster.shape[:2]
-            across, down = (uv[here] % 1).T
-            row, column = (down * height).astype(np.int64) % height, (across * width).astype(np.int64) % width
-            colours[here] = pattern.raster[row, column]
-        else:
-            colours[here] = pattern
-    return colours.reshape(*seen.thing.shape, 3)
+    colours = np.zeros((*seen.thing.shape, 3), np.float32)
+    for number in np.unique(seen.thing[seen.thing >= 0]).tolist():
+        raster, here = raster_of(things[number].material.pattern), seen.thing == number
+        size = np.array(raster.shape[:2], np.int64)
+        row, column = ((seen.uv[here][:, ::-1] % 1 * size).astype(np.int64) % size).T
+        colours[here] = raster[row, column]
+    return colours
 
 
 def surface_bits(things: Sequence[Thing], seen: FirstSurface, disparity: FloatMap) -> Bits:
@@ -69,15 +61,10 @@ def surface_bits(things: Sequence[Thing], seen: FirstSurface, disparity: FloatMa
     thin = np.array([thing.thin for thing in things] + [False])[seen.thing]
     plain = textureless(albedo_of(things, seen))
     solid = (kinds == "matte") | (kinds == "glossy")
-    masks = {
-        "textured": solid & ~plain,
-        "textureless": solid & plain,
-        **{kind: kinds == kind for kind in ("glossy", "mirror", "glass")},
-        "thin": thin,
-        "discontinuities": edges_of(disparity).region,
-    }
-    bits: Bits = np.bitwise_or.reduce([mask.astype(np.uint16) * _BIT[name] for name, mask in masks.items()])
-    return bits
+    masks = {"textured": solid & ~plain, "textureless": solid & plain, "thin": thin}
+    masks |= {kind: kinds == kind for kind in ("glossy", "mirror", "glass")}
+    masks["discontinuities"] = edges_of(disparity).region
+    return np.asarray(np.bitwise_or.reduce([mask.astype(np.uint16) * _BIT[name] for name, mask in masks.items()]))
 
 
 def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64]) -> Bits:
@@ -98,10 +85,9 @@ def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64]) -> Bi
     return bits
 
 
-def mask(bits: Bits, name: str) -> BoolMap:
-    """One of a view's masks."""
-    found: BoolMap = (bits & _BIT[name]) != 0
-    return found
+def masks_in(bits: Bits) -> dict[str, BoolMap]:
+    """A view's masks by name."""
+    return {name: np.asarray(bits & _BIT[name], bool) for name in MASKS}
 
 
 _ARRAYS = ("views", "disparity", "normal", "masks", "positions", "turns")
@@ -155,21 +141,16 @@ class Render:
     @property
     def centre(self) -> tuple[int, int]:
         """Grid position of the reference view."""
-        rows, columns = self.views.shape[:2]
-        return rows // 2, columns // 2
-
-    def masks_of(self, view: tuple[int, int]) -> dict[str, BoolMap]:
-        """The masks of a view by name."""
-        return {name: mask(self.masks[view], name) for name in MASKS}
+        return self.views.shape[0] // 2, self.views.shape[1] // 2
 
 
 def write_render(path: Path, render: Render) -> None:
     """Write a render, whole or not at all; equal content gives equal bytes."""
     with create_hdf5(path) as file:
         for name in _ARRAYS:
-            values = getattr(render, name)
-            # compression is worth while for masks only
-            file.create_dataset(name, data=values, **({"compression": "gzip"} if name == "masks" else {}))
+            # worth while for masks only
+            compression = "gzip" if name == "masks" else None
+            file.create_dataset(name, data=getattr(render, name), compression=compression)
             if name in _AXES:
                 file[name].attrs["axes"] = _AXES[name]
         file["masks"].attrs["names"] = [fixed_text(name) for name in MASKS]
@@ -197,7 +178,6 @@ def read_render(path: Path) -> Render:
 def read_truth(path: Path) -> tuple[FloatMap, dict[str, BoolMap]]:
     """Disparity and masks of a render's reference view, read without its pictures."""
     with open_hdf5(path, "render of a scene") as file:
-        rows, columns = file["disparity"].shape[:2]
-        centre = (rows // 2, columns // 2)
+        centre = tuple(count // 2 for count in file["disparity"].shape[:2])
         bits = read_dataset(path, file["masks"], centre)
-        return read_dataset(path, file["disparity"], centre), {name: mask(bits, name) for name in MASKS}
+        return read_dataset(path, file["disparity"], centre), masks_in(bits)

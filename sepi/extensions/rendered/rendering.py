@@ -9,38 +9,28 @@ import pickle
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
-from zipfile import BadZipFile
+from typing import Annotated, Any
+from zipfile import is_zipfile
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
 from sepi.extensions.rendered.render_file import Render, seen_bits, surface_bits, write_render
-from sepi.extensions.rendered.sampling import Plan, pictured, planned, with_shared_light
-from sepi.extensions.rendered.tracing import Position, Tracer
-from sepi.extensions.rendered.world import FloatArray, Rig, World, rig_of
+from sepi.extensions.rendered.sampling import pictured, planned, with_shared_light
+from sepi.extensions.rendered.shapes import Points
+from sepi.extensions.rendered.tracing import Tracer
+from sepi.extensions.rendered.world import FloatArray, Rig, Share, World, rig_of
 from sepi.io.files import atomic_path
 from sepi.io.provenance import package_version
 from sepi.process.threads import threads_used, use_threads
 from sepi.stage import no_progress
-from sepi.validation.models import CheckedModel
+from sepi.validation.models import CheckedModel, Positive
 
-_Share = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Arrays = dict[str, npt.NDArray[Any]]
 _Rows = Annotated[int, Field(ge=1, le=33)]
-
-# arrays of a view that are kept until all views are finished
-_TYPES = {
-    "views": np.float32,
-    "albedo": np.float32,
-    "disparity": np.float32,
-    "normal": np.float16,
-    "masks": np.uint16,
-    "upright": np.float32,
-    "things": np.int16,
-    "whole": np.bool_,
-}
 
 
 class RenderOptions(CheckedModel):
@@ -49,16 +39,14 @@ class RenderOptions(CheckedModel):
     size: int = Field(512, ge=32, le=4096, description="height and width of a view in pixels; disparities stay")
     grid: tuple[_Rows, _Rows] = Field((9, 9), description="rows and columns of views")
     samples: int = Field(64, ge=1, le=65536, description="paths of light for each pixel; few leave their own noise")
-    baseline: float = Field(
-        1.0, gt=0, allow_inf_nan=False, description="distance of views, and so disparity, as part of the scene's own"
-    )
-    lens: _Share = Field(
+    baseline: Positive = Field(1.0, description="distance of views, and so disparity, as part of the scene's own")
+    lens: Share = Field(
         0.0, description="radius of the lens in view steps; 0: a pinhole. Disparity d is a disc 2 lens |d| pixels wide"
     )
-    position_error: _Share = Field(
+    position_error: Share = Field(
         0.0, description="standard deviation of where views but the reference view stand, in view steps"
     )
-    rotation_error: _Share = Field(
+    rotation_error: Share = Field(
         0.0, description="standard deviation of how they are turned about each axis, in degrees"
     )
     seed: int = Field(0, ge=0, lt=2**31, description="of the light's paths and of these errors")
@@ -99,11 +87,17 @@ def render_world(
     """
     rig = rig_of(world, options.size, options.grid, options.baseline)
     count = math.prod(options.grid)
-    parts = _parts(path)
+    # the folder of finished views
+    parts = path.with_name(f"{path.name}.parts")
     digest = hashlib.sha256(pickle.dumps(world)).hexdigest()
-    _take_over(parts, json.dumps({**made_by(name, options), "world": digest}, sort_keys=True))
+    record, note = json.dumps({**made_by(name, options), "world": digest}, sort_keys=True), parts / "made_by.json"
+    if not (note.is_file() and note.read_text(encoding="utf-8") == record):
+        shutil.rmtree(parts, ignore_errors=True)
+        with atomic_path(note) as temporary:
+            temporary.write_text(record, encoding="utf-8")
     files = [parts / f"view_{number:03d}.npz" for number in range(count)]
-    missing = [number for number, file in enumerate(files) if not _is_whole(file)]
+    # those that are not there, or cut off
+    missing = [number for number, file in enumerate(files) if not is_zipfile(file)]
     for done, (number, values) in enumerate(_views(world, rig, options, missing), count - len(missing) + 1):
         with atomic_path(files[number]) as temporary, temporary.open("wb") as stream:
             np.savez(stream, allow_pickle=False, **values)
@@ -113,23 +107,7 @@ def render_world(
     progress(1.0)
 
 
-def _parts(path: Path) -> Path:
-    """The folder of finished views."""
-    return path.with_name(f"{path.name}.parts")
-
-
-class _View(NamedTuple):
-    """A view before its picture: ground truth by name, position, and plan of samples."""
-
-    truth: dict[str, npt.NDArray[Any]]
-    position: Position
-    seed: int
-    plan: Plan | None
-
-
-def _views(
-    world: World, rig: Rig, options: RenderOptions, numbers: Sequence[int]
-) -> Iterator[tuple[int, dict[str, npt.NDArray[np.generic]]]]:
+def _views(world: World, rig: Rig, options: RenderOptions, numbers: Sequence[int]) -> Iterator[tuple[int, Arrays]]:
     """Picture and ground truth of each of these views.
 
     A thread prepares the next view while the renderer works, since the preparation uses one core only.
@@ -138,103 +116,65 @@ def _views(
         return
     tracer = Tracer(world, rig, options.lens * rig.baseline)
     with ThreadPoolExecutor(1, initializer=use_threads, initargs=(threads_used(),)) as beside:
-        coming = beside.submit(_looked_at, world, tracer, rig, options, numbers[0])
+        coming = beside.submit(_looked_at, tracer, options, numbers[0])
         for number, following in zip(numbers, [*numbers[1:], None], strict=True):
-            view = coming.result()
+            truth, picture = coming.result()
             if following is not None:
-                coming = beside.submit(_looked_at, world, tracer, rig, options, following)
-            found = {**view.truth, "views": _picture(tracer, options, view)}
-            yield number, {part: values.astype(_TYPES[part]) for part, values in found.items()}
+                coming = beside.submit(_looked_at, tracer, options, following)
+            yield number, {**truth, "views": picture()}
 
 
-def _looked_at(world: World, tracer: Tracer, rig: Rig, options: RenderOptions, number: int) -> _View:
-    """A view before its picture."""
-    positions, turns = _stand(rig, options)
-    (down, across), (x, y, z) = positions.reshape(-1, 2)[number].tolist(), turns.reshape(-1, 3)[number].tolist()
+def _looked_at(tracer: Tracer, options: RenderOptions, number: int) -> tuple[Arrays, Callable[[], FloatArray]]:
+    """Ground truth of a view by name, and what makes its picture."""
+    (down, across), turn = (values[number].tolist() for values in _stand(tracer.rig, options))
     # one seed per view, far from others: a view's tiles use several in a row
     seed = int(np.random.SeedSequence([options.seed, number]).generate_state(1)[0])
-    at = tracer.position(down, across, (x, y, z))
-    seen = tracer.first_surface(at)
-    disparity = rig.disparity(seen.depth).astype(np.float32)
-    straight = tracer.first_surface(tracer.position(down, across)) if any((x, y, z)) else seen
-    count = math.prod(options.grid)
-    plan = None
-    if options.shares_light:
-        plan = planned(tracer, at, seen, disparity, options.samples, count, seed, world.paths.gloss)
-    truth = {
-        "albedo": plan.albedo if plan else np.zeros((*disparity.shape, 3)),
-        "whole": plan.whole if plan else np.zeros(disparity.shape),
-        "things": seen.thing,
+    at = tracer.position(down, across, turn)
+    seen = tracer.surfaces.first(at)
+    disparity = tracer.rig.disparity(seen.depth).astype(np.float32)
+    straight = tracer.surfaces.first(tracer.position(down, across)) if any(turn) else seen
+    truth: Arrays = {
         "disparity": disparity,
-        "normal": seen.normal,
-        "masks": surface_bits(world.things, seen, disparity),
+        "normal": seen.normal.astype(np.float16),
+        "masks": surface_bits(tracer.world.things, seen, disparity),
         # occlusion masks need a view without a turn
-        "upright": rig.disparity(straight.depth),
+        "upright": tracer.rig.disparity(straight.depth).astype(np.float32),
     }
-    return _View(truth, at, seed, plan)
+    if not options.shares_light:
+        return truth, partial(tracer.picture, at, seed, options.samples)
+    plan = planned(tracer, at, seen, options.samples, seed)
+    truth |= {"albedo": plan.albedo, "things": seen.thing.astype(np.int16), "whole": plan.whole}
+    return truth, partial(pictured, plan)
 
 
-def _picture(tracer: Tracer, options: RenderOptions, view: _View) -> FloatArray:
-    """Picture of a view, shape (H, W, 3)."""
-    return pictured(tracer, view.plan) if view.plan else tracer.picture(view.position, view.seed, options.samples)
-
-
-def _stand(rig: Rig, options: RenderOptions) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Positions and turns of the views; those of the reference view are exact."""
-    rng = np.random.default_rng(options.seed)
-    positions = rig.positions
-    shift, turns = rng.standard_normal(positions.shape), rng.standard_normal((*positions.shape[:2], 3))
-    centre = positions.shape[0] // 2, positions.shape[1] // 2
-    shift[centre], turns[centre] = 0, 0
-    return positions + options.position_error * shift, np.radians(options.rotation_error) * turns
+def _stand(rig: Rig, options: RenderOptions) -> tuple[Points, Points]:
+    """Positions ``(N, 2)`` and turns ``(N, 3)`` of the views; those of the reference view are exact."""
+    rng, (rows, columns) = np.random.default_rng(options.seed), rig.grid
+    shift, turns = rng.standard_normal((rows * columns, 2)), rng.standard_normal((rows * columns, 3))
+    for values in (shift, turns):
+        values[rows // 2 * columns + columns // 2] = 0
+    stand = np.array(list(np.ndindex(rows, columns)), float) - (rows // 2, columns // 2)
+    return stand + options.position_error * shift, np.radians(options.rotation_error) * turns
 
 
 def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files: Sequence[Path]) -> Render:
     """The render of all views, with their occlusion masks."""
-    positions, turns = _stand(rig, options)
-    views: dict[str, npt.NDArray[Any]] = {}
+    views: Arrays = {}
     for number, file in enumerate(files):
         with np.load(file) as values:
-            for part, kind in _TYPES.items():
+            for part in values:
                 if number == 0:
-                    views[part] = np.empty((len(files), *values[part].shape), kind)
+                    views[part] = np.empty((len(files), *values[part].shape), values[part].dtype)
                 views[part][number] = values[part]
-    upright, albedo, things, whole = (views.pop(part) for part in ("upright", "albedo", "things", "whole"))
-    stands, turned = positions.reshape(-1, 2), turns.reshape(-1, 3).any(axis=1)
+    upright, (positions, turns) = views.pop("upright"), _stand(rig, options)
     if options.shares_light:
-        views["views"] = with_shared_light(views["views"], albedo, upright, things, whole, stands)
+        albedo, things, whole = (views.pop(part) for part in ("albedo", "things", "whole"))
+        views["views"] = with_shared_light(views["views"], albedo, things, whole, upright, positions)
     # the limit of half precision lies far beyond white
     views["views"] = np.minimum(views["views"], 60000.0).astype(np.float16)
     # unknown for turned views
-    views["masks"][~turned] |= seen_bits(upright, stands)[~turned]
-    return Render(
-        name=name,
-        **{part: values.reshape(*options.grid, *values.shape[1:]) for part, values in views.items()},
-        positions=positions,
-        turns=turns,
-        settings=rig.settings,
-        light=world.light.share,
-        made_by=made_by(name, options),
-    )
-
-
-def _take_over(parts: Path, made_by: str) -> None:
-    """Make the folder of views; keep an existing one with the same scene and options."""
-    note = parts / "made_by.json"
-    if note.is_file() and note.read_text(encoding="utf-8") == made_by:
-        return
-    shutil.rmtree(parts, ignore_errors=True)
-    parts.mkdir(parents=True)
-    with atomic_path(note) as temporary:
-        temporary.write_text(made_by, encoding="utf-8")
-
-
-def _is_whole(file: Path) -> bool:
-    """Whether a view's file is complete."""
-    if not file.is_file():
-        return False
-    try:
-        with np.load(file) as values:
-            return set(_TYPES) == set(values.files)
-    except (OSError, ValueError, BadZipFile):
-        return False
+    straight = ~turns.any(axis=1)
+    views["masks"][straight] |= seen_bits(upright, positions)[straight]
+    views |= {"positions": positions, "turns": turns}
+    arrays = {part: values.reshape(*options.grid, *values.shape[1:]) for part, values in views.items()}
+    return Render(name, settings=rig.settings, light=world.light.share, made_by=made_by(name, options), **arrays)

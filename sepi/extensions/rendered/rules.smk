@@ -29,7 +29,7 @@ rule render:
         "rendered/{wildcards.world}: rendering"
     shell:
         command(
-            "sepi.extensions.rendered.command {wildcards.world:q} {params.flags} --threads {threads} "
+            "sepi.extensions.rendered.commands {wildcards.world:q} {params.flags} --threads {threads} "
             "--output {output:q} 2> {log:q}"
         )
 

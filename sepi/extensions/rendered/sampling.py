@@ -10,15 +10,18 @@ specular surfaces (gloss, mirrors and glass), which look different from view to 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
+from sepi.extensions.rendered.shapes import Points
 from sepi.extensions.rendered.surfaces import FirstSurface
-from sepi.extensions.rendered.tracing import SPREAD, Position, Tiles, Tracer
-from sepi.extensions.rendered.world import FloatArray
+from sepi.extensions.rendered.tracing import SPREAD, Pixels, Tracer
+from sepi.extensions.rendered.world import FloatArray, Position
 from sepi.kernels import reprojection as kernels
 from sepi.lightfield import BoolMap, FloatMap
 
@@ -34,50 +37,44 @@ _BEND = 0.005
 _DARKEST = 1e-3
 
 
-def shared_samples(samples: int, views: int) -> int:
-    """Paths of a pixel on a matte surface; over all views about three times ``samples``."""
-    return min(samples, math.ceil(3 * samples / views))
+class Pass(NamedTuple):
+    """Paths of some pixels of a view.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (N, T, T, 2), int64
+        Rows and columns of the pixels of square tiles.
+    taken, paths : int
+        Number of their earlier paths, and of these.
+    pictures : callable
+        Traces the paths, and returns linear pictures of the tiles, shape (N, T, T, 3).
+    """
+
+    pixels: Pixels
+    taken: int
+    paths: int
+    pictures: Callable[[], FloatArray]
 
 
-def mixed_samples(samples: int, few: int) -> int:
-    """Paths of a pixel with several surfaces: so many that those after the first ``few`` are spread evenly."""
-    return max(samples // 6, min(samples, few + SPREAD))
-
-
-def gloss_samples(samples: int, part: float) -> int:
-    """Paths of a glossy pixel, for a share ``part`` of all: so many that they are spread evenly."""
-    return max(round(part * samples), min(samples, SPREAD))
-
-
-@dataclass(frozen=True)
-class Plan:
+class Plan(NamedTuple):
     """Plan of a view's samples.
 
     Attributes
     ----------
-    tiles : list of (Tiles, int)
-        Tiles in order, with the number of earlier paths of their pixels.
+    passes : list of Pass
+        In order.
     albedo : ndarray, shape (H, W, 3), float32
         Linear albedo; 0 where unknown.
     whole : ndarray, shape (H, W), bool
         Pixels of known albedo that show one matte, nearly flat surface.
     """
 
-    tiles: list[tuple[Tiles, int]]
+    passes: list[Pass]
     albedo: FloatArray
     whole: BoolMap
 
 
-def planned(
-    tracer: Tracer,
-    position: Position,
-    seen: FirstSurface,
-    disparity: FloatMap,
-    samples: int,
-    views: int,
-    seed: int,
-    gloss: float = 1.0,
-) -> Plan:
+def planned(tracer: Tracer, position: Position, seen: FirstSurface, samples: int, seed: int) -> Plan:
     """The plan of a view's samples.
 
     Parameters
@@ -87,55 +84,41 @@ def planned(
         Position of the view, without a turn.
     seen : FirstSurface
         Surfaces seen from there.
-    disparity : ndarray, shape (H, W), float32
-        Disparity of these, pixels per view step.
     samples : int
         Largest number of paths of a pixel.
-    views : int
-        Number of views that share light.
     seed : int
         First seed of the paths; some that follow are used, too.
-    gloss : float, optional
-        Share of ``samples`` that glossy pixels need (:class:`sepi.extensions.rendered.world.World`).
     """
     # things narrower than a pixel may lie between the rays through middles
-    beside = tracer.things(position, _FINE)
-    matte = _of_pixels(tracer.surfaces.matte(beside))
-    same = _of_pixels(beside == seen.thing[:, None, :, None])
-    whole = (matte == _FINE**2) & (same == _FINE**2) & _flat(disparity, seen.thing)
-    albedo = np.zeros((*whole.shape, 3), np.float32)
-    albedo[whole] = tracer.albedo(position, seen.face[whole], np.argwhere(whole))
+    beside = tracer.surfaces.things(position, _FINE)
+    matte = tracer.surfaces.matte[beside].sum(axis=(1, 3))
+    same = (beside == seen.thing[:, None, :, None]).all(axis=(1, 3))
+    disparity = tracer.rig.disparity(seen.depth).astype(np.float32)
+    whole = (matte == _FINE**2) & same & _flat(disparity, seen.thing)
+    albedo = tracer.surfaces.albedo(position, seen.face, whole)
     whole &= albedo.min(axis=-1) > _DARKEST
     albedo[~whole] = 0
-    few, differs = shared_samples(samples, views), 2 * matte < _FINE**2
-    kinds = (
-        (~differs, 0, few),
-        (~differs & ~whole, few, mixed_samples(samples, few) - few),
-        (differs, 0, max(few, gloss_samples(samples, gloss))),
-    )
-    squares = [(tiles, taken, paths) for asked, taken, paths in kinds if paths > 0 for tiles in _tiles(asked, paths)]
-    tiles = [
-        (tracer.tiles(position, pixels, paths, seed + 4096 * number), taken)
-        for number, (pixels, taken, paths) in enumerate(squares)
-    ]
-    return Plan(tiles, albedo, whole)
+    differs = 2 * matte < _FINE**2
+    # on a matte surface, over all views about three times the samples
+    few = min(samples, math.ceil(3 * samples / math.prod(tracer.rig.grid)))
+    # with several surfaces, so many that those after the first few are spread evenly; as on gloss
+    mixed = max(samples // 6, min(samples, few + SPREAD))
+    glossy = max(few, round(tracer.world.light.gloss * samples), min(samples, SPREAD))
+    kinds = ((~differs, 0, few), (~differs & ~whole, few, mixed - few), (differs, 0, glossy))
+    passes: list[Pass] = []
+    for asked, taken, paths in kinds:
+        for pixels in _tiles(asked, paths) if paths > 0 else ():
+            pictures = tracer.tiles(position, pixels, paths, seed + 4096 * len(passes))
+            passes.append(Pass(pixels, taken, paths, pictures))
+    return Plan(passes, albedo, whole)
 
 
-def _of_pixels(rays: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
-    """Number of true values among each pixel's rays, ``(H, F, W, F)``; shape (H, W)."""
-    fine, found = rays.shape[1], np.zeros(rays.shape[::2], np.uint8)
-    for n in range(fine**2):
-        found += rays[:, n // fine, :, n % fine]
-    return found
-
-
-def pictured(tracer: Tracer, plan: Plan) -> FloatArray:
+def pictured(plan: Plan) -> FloatArray:
     """The picture of a view, linear, 1 is white; shape (H, W, 3), float32."""
     picture = np.zeros_like(plan.albedo)
-    for tiles, taken in plan.tiles:
-        rows, columns = tiles.pixels[..., 0], tiles.pixels[..., 1]
-        more = tiles.paths * tracer.seen(tiles)
-        picture[rows, columns] = (taken * picture[rows, columns] + more) / np.float32(taken + tiles.paths)
+    for pixels, taken, paths, pictures in plan.passes:
+        where = pixels[..., 0], pixels[..., 1]
+        picture[where] = (taken * picture[where] + paths * pictures()) / np.float32(taken + paths)
     return picture
 
 
@@ -183,6 +166,7 @@ def _flat(disparity: FloatMap, things: npt.NDArray[np.int64]) -> BoolMap:
     return found[1:-1, 1:-1]
 
 
+Things = npt.NDArray[np.int16]
 # largest difference between disparities of one point, pixels per view step
 _ONE_POINT = 0.02
 # half width in pixels of the window of nearby pixels
@@ -194,12 +178,7 @@ _BESIDE = 2
 
 
 def with_shared_light(
-    pictures: FloatArray,
-    albedo: FloatArray,
-    disparities: FloatArray,
-    things: npt.NDArray[np.int16],
-    whole: BoolMap,
-    positions: npt.NDArray[np.float64],
+    pictures: FloatArray, albedo: FloatArray, things: Things, whole: BoolMap, disparities: FloatArray, positions: Points
 ) -> FloatArray:
     """The pictures of all views with shared light on matte surfaces.
 
@@ -209,12 +188,12 @@ def with_shared_light(
         Path-traced pictures, linear.
     albedo : ndarray, shape (N, H, W, 3), float32
         Albedo of matte surfaces; 0 where unknown.
-    disparities : ndarray, shape (N, H, W), float32
-        Pixels per view step.
     things : ndarray, shape (N, H, W), int16
         Number of each pixel's thing.
     whole : ndarray, shape (N, H, W), bool
         Pixels that show, with their neighbours, one matte surface.
+    disparities : ndarray, shape (N, H, W), float32
+        Pixels per view step.
     positions : ndarray, shape (N, 2), float64
         Positions of the views, ``(down, across)`` in view steps.
 
@@ -236,23 +215,20 @@ def with_shared_light(
     return shown
 
 
-def limit_bent(things: npt.NDArray[np.int16], whole: BoolMap, shown: FloatArray) -> None:
+def limit_bent(things: Things, whole: BoolMap, shown: FloatArray) -> None:
     """Limit pixels (H, W, 3) that are not whole, within one thing, to the range of nearby whole ones."""
-    height, width = whole.shape
     bent = ~whole & (cv2.erode(things, np.ones((3, 3))) == cv2.dilate(things, np.ones((3, 3))))
-    around = ((_BESIDE, _BESIDE), (_BESIDE, _BESIDE))
+    side, around = 2 * _BESIDE + 1, ((_BESIDE, _BESIDE), (_BESIDE, _BESIDE))
     surface, light = np.pad(np.where(whole, things, -1), around, constant_values=-1), np.pad(shown, (*around, (0, 0)))
-    low, high = np.full_like(shown, np.inf), np.full_like(shown, -np.inf)
-    for y, x in np.ndindex(2 * _BESIDE + 1, 2 * _BESIDE + 1):
-        beside = slice(y, y + height), slice(x, x + width)
-        same = (surface[beside] == things)[..., None]
-        np.minimum(low, light[beside], out=low, where=same)
-        np.maximum(high, light[beside], out=high, where=same)
-    known = bent[..., None] & (low <= high)
-    shown[known] = np.clip(shown, low, high)[known]
+    same = sliding_window_view(surface, (side, side))[bent] == things[bent][:, None, None]
+    beside = sliding_window_view(light, (side, side), (0, 1))[bent]
+    low = np.where(same[:, None], beside, np.float32(np.inf)).min(axis=(2, 3))
+    high = np.where(same[:, None], beside, np.float32(-np.inf)).max(axis=(2, 3))
+    known = same.any(axis=(1, 2))[:, None]
+    shown[bent] = np.where(known, np.clip(shown[bent], low, high), shown[bent])
 
 
-def alike_light(light: FloatArray, variance: FloatArray, surface: npt.NDArray[np.int16]) -> FloatArray:
+def alike_light(light: FloatArray, variance: FloatArray, surface: Things) -> FloatArray:
     """Mean light over the pixels near each whole one whose 3x3 patches differ by noise only.
 
     Parameters

@@ -10,12 +10,25 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from sepi.extensions.rendered.world import FloatArray, Mesh, Vector
+from sepi.extensions.rendered.world import FloatArray, Material, Mesh, Pattern, Thing, Vector
 
 Points = npt.NDArray[np.float64]
+Outline = Points | Sequence[Sequence[float]]
+Parts = Mesh | Sequence[Mesh]
 
 # angles round a body; the seam of its pattern lies behind
 _ROUND = (-np.pi / 2, 3 * np.pi / 2)
+
+
+def thing(parts: Parts, surface: Material | Pattern | Vector, *, thin: bool = False) -> Thing:
+    """A thing of one mesh or several, matte unless its surface is a material."""
+    material = surface if isinstance(surface, Material) else Material(surface)
+    return Thing(joined(parts), material, thin)
+
+
+def raster(*coordinates: npt.ArrayLike) -> Points:
+    """Points on the last axis from coordinates that are broadcast."""
+    return np.stack(np.broadcast_arrays(*coordinates), axis=-1)
 
 
 def sheet(points: Points, *, smooth: bool = True) -> Mesh:
@@ -32,7 +45,7 @@ def sheet(points: Points, *, smooth: bool = True) -> Mesh:
     across = np.linalg.norm(np.diff(points, axis=1), axis=2).mean(0)
     down = np.linalg.norm(np.diff(points, axis=0), axis=2).mean(1)
     u, v = (np.concatenate([[0.0], np.cumsum(steps)]) for steps in (across, down))
-    uv = np.stack(np.broadcast_arrays(u[None, :], v[:, None]), axis=-1).reshape(-1, 2)
+    uv = raster(u[None, :], v[:, None]).reshape(-1, 2)
     corner = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
     faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
@@ -42,6 +55,16 @@ def sheet(points: Points, *, smooth: bool = True) -> Mesh:
 def rectangle(corner: Vector, across: Vector, down: Vector) -> Mesh:
     """A flat rectangle, or parallelogram, from one corner along two edges."""
     return _rectangles(*(np.array([values], float) for values in (corner, across, down)))
+
+
+def wall(corner: Vector, width: float, height: float) -> Mesh:
+    """An upright rectangle that faces the camera, from its upper left corner."""
+    return rectangle(corner, (width, 0, 0), (0, height, 0))
+
+
+def ground(corner: Vector, width: float, depth: float) -> Mesh:
+    """A level rectangle, from its corner at the left that is near."""
+    return rectangle(corner, (width, 0, 0), (0, 0, depth))
 
 
 def _rectangles(corners: Points, across: Points, down: Points) -> Mesh:
@@ -57,24 +80,13 @@ def _rectangles(corners: Points, across: Points, down: Points) -> Mesh:
 
 def box(centre: Vector, size: Vector, turn: Vector = (0, 0, 0)) -> Mesh:
     """A box, turned by angles about its own x, y and z axes, in radians."""
-    w, h, d = size
-    x, y, z = (-w / 2, -h / 2, -d / 2)
-    sides = np.array(
-        [
-            [(x, y, z), (w, 0, 0), (0, h, 0)],
-            [(-x, y, -z), (-w, 0, 0), (0, h, 0)],
-            [(x, y, -z), (0, 0, -d), (0, h, 0)],
-            [(-x, y, z), (0, 0, d), (0, h, 0)],
-            [(x, y, -z), (w, 0, 0), (0, 0, -d)],
-            [(x, -y, z), (w, 0, 0), (0, 0, d)],
-        ]
-    )
-    return moved(_rectangles(*np.moveaxis(sides, 1, 0)), turn, centre)
+    right, down, away = np.diag(np.asarray(size, float))
+    corners = np.array([[-1, -1, -1], [1, -1, 1], [-1, -1, 1], [1, -1, -1], [-1, -1, 1], [-1, 1, -1]]) * size / 2
+    across, below = [right, -right, -away, away, right, right], [down, down, down, down, -away, away]
+    return moved(_rectangles(corners, np.array(across), np.array(below)), turn, centre)
 
 
-def ball(
-    centre: Vector, radius: float, relief: Callable[[Points], npt.NDArray[np.float64]] | None = None, fineness: int = 96
-) -> Mesh:
+def ball(centre: Vector, radius: float, relief: Callable[[Points], Points] | None = None, fineness: int = 96) -> Mesh:
     """A ball, each point of which is moved outwards by a part of the radius.
 
     Parameters
@@ -88,19 +100,16 @@ def ball(
     """
     polar = np.linspace(0, np.pi, fineness)[:, None]
     turn = np.linspace(*_ROUND, 2 * fineness)[None, :]
-    direction = np.stack(
-        np.broadcast_arrays(np.sin(polar) * np.cos(turn), -np.cos(polar), -np.sin(polar) * np.sin(turn)), axis=-1
-    )
+    direction = raster(np.sin(polar) * np.cos(turn), -np.cos(polar), -np.sin(polar) * np.sin(turn))
     height = 1.0 if relief is None else 1 + relief(direction)[..., None]
     mesh = sheet(np.array(centre) + radius * height * direction)
-    uv = np.stack(np.broadcast_arrays(turn * radius, polar * radius), axis=-1).reshape(-1, 2)
-    return _mesh(mesh.vertices, mesh.faces, uv, True)
+    return _mesh(mesh.vertices, mesh.faces, raster(turn * radius, polar * radius).reshape(-1, 2), True)
 
 
-def tube(path: Points, radius: float | npt.NDArray[np.float64], sides: int = 12) -> Mesh:
+def tube(path: Outline, radius: float | npt.NDArray[np.float64], sides: int = 12) -> Mesh:
     """A tube along a line of points ``(N, 3)``, of one radius or one for each point; its ends are open."""
-    path = np.asarray(path, float)
-    along = np.gradient(path, axis=0)
+    points = np.asarray(path, float)
+    along = np.gradient(points, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     # parallel transport, so that the tube does not twist
     normal = np.cross(along[0], np.eye(3)[np.argmin(np.abs(along[0]))])
@@ -113,7 +122,7 @@ def tube(path: Points, radius: float | npt.NDArray[np.float64], sides: int = 12)
     second = np.cross(along, first)
     angle = np.linspace(0, 2 * np.pi, sides + 1)[None, :, None]
     ring = np.cos(angle) * first[:, None] + np.sin(angle) * second[:, None]
-    return sheet(path[:, None] + np.broadcast_to(radius, len(path))[:, None, None] * ring)
+    return sheet(points[:, None] + np.broadcast_to(radius, len(points))[:, None, None] * ring)
 
 
 def rod(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 12) -> Mesh:
@@ -128,15 +137,15 @@ def rod(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 12
     return tube(first + along[:, None] / length * (last - first), widths, sides)
 
 
-def bevelled(outline: Points, by: float) -> Points:
+def bevelled(outline: Outline, by: float) -> Points:
     """An outline ``(N, 2)`` with its corners cut off, so that smooth bodies have sharp edges."""
-    outline = np.asarray(outline, float)
-    points = [outline[0]]
-    for before, corner, after in zip(outline[:-2], outline[1:-1], outline[2:], strict=True):
+    first, *corners, last = np.asarray(outline, float)
+    points = [first]
+    for before, corner, after in zip([first, *corners[:-1]], corners, [*corners[1:], last], strict=True):
         for other in (before, after):
             part = by / max(float(np.linalg.norm(other - corner)), 3 * by)
             points.append(corner + part * (other - corner))
-    return np.array([*points, outline[-1]])
+    return np.array([*points, last])
 
 
 def painted_from(mesh: Mesh, across: float, down: float) -> Mesh:
@@ -144,7 +153,7 @@ def painted_from(mesh: Mesh, across: float, down: float) -> Mesh:
     return _mesh(mesh.vertices, mesh.faces, mesh.uv + np.array([across, down]), mesh.smooth)
 
 
-def turned_body(profile: Points, centre: Vector, sides: int = 96) -> Mesh:
+def turned_body(profile: Outline, centre: Vector, sides: int = 96) -> Mesh:
     """A body of revolution about the vertical through ``centre``: vases, bottles, columns.
 
     Parameters
@@ -154,15 +163,13 @@ def turned_body(profile: Points, centre: Vector, sides: int = 96) -> Mesh:
     centre : (float, float, float)
     sides : int
     """
-    profile = np.asarray(profile, float)
+    radius, height = np.hsplit(np.asarray(profile, float), 2)
     angle = np.linspace(*_ROUND, sides + 1)[None, :]
-    points = np.stack(
-        np.broadcast_arrays(profile[:, :1] * np.cos(angle), -profile[:, 1:], -profile[:, :1] * np.sin(angle)), axis=-1
-    )
+    points = raster(radius * np.cos(angle), -height, -radius * np.sin(angle))
     return sheet(points + np.array(centre))
 
 
-def plate(outline: Points, thickness: float) -> Mesh:
+def plate(outline: Outline, thickness: float) -> Mesh:
     """A flat body of a star-shaped outline, such as a leaf or a disc.
 
     Parameters
@@ -171,19 +178,14 @@ def plate(outline: Points, thickness: float) -> Mesh:
         Points ``(x, y)`` in order, in metres; the body lies about ``z = 0``. With no thickness it has one side.
     thickness : float
     """
-    outline = np.asarray(outline, float)
-    middle = outline.mean(0)
-    count = len(outline)
-    rim = np.concatenate([outline, middle[None]])
-    other = np.roll(np.arange(count), -1)
-    fan = np.stack([np.full(count, count), np.arange(count), other], axis=1)
+    corners = np.asarray(outline, float)
+    count, rim = len(corners), np.concatenate([corners, corners.mean(0)[None]])
+    fan = np.stack([np.full(count, count), np.arange(count), np.roll(np.arange(count), -1)], axis=1)
+    faces = [np.c_[rim, np.full(count + 1, z)] for z in (0 - thickness / 2, thickness / 2)]
+    front, back = (_mesh(faces[n], fan[:, :: 1 - 2 * n], rim - corners.min(0), False) for n in (0, 1))
     if thickness == 0:
-        return _mesh(np.concatenate([rim, np.zeros((count + 1, 1))], 1), fan, rim - outline.min(0), False)
-    front, back = (np.concatenate([rim, np.full((count + 1, 1), z)], 1) for z in (-thickness / 2, thickness / 2))
-    closed = np.concatenate([outline, outline[:1]])
-    wall = np.stack([np.concatenate([closed, np.full((count + 1, 1), z)], 1) for z in (-thickness / 2, thickness / 2)])
-    uv = rim - outline.min(0)
-    return joined([_mesh(front, fan, uv, False), _mesh(back, fan[:, ::-1], uv, False), sheet(wall, smooth=False)])
+        return front
+    return joined([front, back, sheet(np.stack(faces)[:, [*range(count), 0]], smooth=False)])
 
 
 def leaf(length: float, width: float, bend: float, fold: float = 0.3, rows: int = 6) -> Mesh:
@@ -202,8 +204,8 @@ def leaf(length: float, width: float, bend: float, fold: float = 0.3, rows: int 
     part = np.linspace(0, 1, rows)
     angle = bend * part
     step = length / (rows - 1)
-    along = step * np.concatenate([[0], np.cumsum((np.cos(angle[1:]) + np.cos(angle[:-1])) / 2)])
-    down = step * np.concatenate([[0], np.cumsum((np.sin(angle[1:]) + np.sin(angle[:-1])) / 2)])
+    way = np.stack([np.cos(angle), np.sin(angle)])
+    along, down = step * np.pad(np.cumsum((way[:, 1:] + way[:, :-1]) / 2, axis=1), ((0, 0), (1, 0)))
     half = width / 2 * np.sin(np.pi * np.clip(part, 0.03, 0.995) ** 0.75) ** 0.8
     side = np.array([-1.0, 0.0, 1.0])
     off = half[:, None] * side
@@ -211,10 +213,10 @@ def leaf(length: float, width: float, bend: float, fold: float = 0.3, rows: int 
     return sheet(np.stack([along[:, None] + rise * np.sin(angle)[:, None], down[:, None] - rise, off], axis=-1))
 
 
-def moved(mesh: Mesh, turn: Vector = (0, 0, 0), by: Vector = (0, 0, 0), scale: float = 1.0) -> Mesh:
-    """The mesh scaled, turned about the x, then y, then z axis by angles in radians, and shifted."""
-    vertices = scale * np.asarray(mesh.vertices, float) @ rotation(turn).T + np.array(by)
-    return _mesh(vertices, mesh.faces, scale * mesh.uv, mesh.smooth)
+def moved(parts: Parts, turn: Vector = (0, 0, 0), by: Vector = (0, 0, 0)) -> Mesh:
+    """A mesh of parts, turned about the x, then y, then z axis by angles in radians, and shifted."""
+    mesh = joined(parts)
+    return _mesh(np.asarray(mesh.vertices, float) @ rotation(turn).T + by, mesh.faces, mesh.uv, mesh.smooth)
 
 
 def rotation(turn: Vector) -> Points:
@@ -229,15 +231,14 @@ def rotation(turn: Vector) -> Points:
     return found
 
 
-def joined(meshes: Sequence[Mesh]) -> Mesh:
+def joined(meshes: Parts) -> Mesh:
     """Several meshes as one; all of them smooth, or none."""
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    return _mesh(
-        np.concatenate([mesh.vertices for mesh in meshes]),
-        np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)]),
-        np.concatenate([mesh.uv for mesh in meshes]),
-        all(mesh.smooth for mesh in meshes),
-    )
+    if isinstance(meshes, Mesh):
+        return meshes
+    vertices, faces, uv, smooth = zip(*meshes, strict=True)
+    starts = np.cumsum([0, *map(len, vertices[:-1])])
+    shifted = [part + start for part, start in zip(faces, starts, strict=True)]
+    return _mesh(np.concatenate(vertices), np.concatenate(shifted), np.concatenate(uv), all(smooth))
 
 
 def copies(mesh: Mesh, axes: Points, places: Points, scales: npt.ArrayLike = 1.0) -> Mesh:
@@ -261,10 +262,7 @@ def copies(mesh: Mesh, axes: Points, places: Points, scales: npt.ArrayLike = 1.0
 
 def about_vertical(turns: npt.ArrayLike) -> Points:
     """Axes ``(N, 3, 3)`` of upright :func:`copies`, turned by angles ``(N,)`` in radians."""
-    turns = np.asarray(turns, float)
-    cos, sin, zero = np.cos(turns), np.sin(turns), np.zeros_like(turns)
-    rows = ((cos, zero, sin), (zero, zero + 1, zero), (-sin, zero, cos))
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return np.stack([rotation((0.0, turn, 0.0)) for turn in np.ravel(turns)])
 
 
 def normals(mesh: Mesh) -> FloatArray:
@@ -275,11 +273,9 @@ def normals(mesh: Mesh) -> FloatArray:
     _, same = np.unique(np.round(mesh.vertices, 6), axis=0, return_inverse=True)
     same = same.ravel()
     total = np.zeros((same.max() + 1, 3))
-    for corner in range(3):
-        np.add.at(total, same[mesh.faces[:, corner]], facing)
+    np.add.at(total, same[mesh.faces.T], facing)
     length = np.linalg.norm(total, axis=1, keepdims=True)
-    found: FloatArray = (total / np.where(length > 0, length, 1))[same].astype(np.float32)
-    return found
+    return np.asarray((total / np.where(length > 0, length, 1))[same], np.float32)
 
 
 def _mesh(vertices: npt.ArrayLike, faces: npt.ArrayLike, uv: npt.ArrayLike, smooth: bool) -> Mesh:

@@ -1,16 +1,16 @@
-"""Furniture of scenes (books, crates, chairs, tables, vessels, fruit), and a world seen from any place in it."""
+"""What scenes hold (books, furniture, vessels, fruit, houses, wires), and a world seen from any place in it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from sepi.extensions.rendered.shapes import Points, ball, box, joined, moved, painted_from, plate, rod, turned_body
-from sepi.extensions.rendered.world import Lamp, Material, Mesh, Thing, Vector, World
+from sepi.extensions.rendered import shapes
+from sepi.extensions.rendered.shapes import Points, ball, box, joined, moved, plate, rod, thing, turned_body
+from sepi.extensions.rendered.world import Lamp, Material, Mesh, Things, Vector, World
 
 
 def seen_from(world: World, eye: Vector, below: float = 0.0, rightwards: float = 0.0) -> World:
@@ -30,24 +30,17 @@ def seen_from(world: World, eye: Vector, below: float = 0.0, rightwards: float =
     right = np.array([np.cos(yaw), 0, -np.sin(yaw)])
     axes = np.stack([right, np.cross(forward, right), forward])
 
-    def turned(vector: Vector) -> Vector:
-        x, y, z = (axes @ np.array(vector)).tolist()
-        return x, y, z
-
-    def shifted(point: Vector) -> Vector:
-        return turned((point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]))
-
-    def mesh(old: Mesh) -> Mesh:
-        vertices = (old.vertices.astype(np.float64) - np.array(eye)) @ axes.T
-        return replace(old, vertices=vertices.astype(np.float32))
+    def turned(mesh: Mesh) -> Mesh:
+        vertices = (mesh.vertices.astype(np.float64) - np.array(eye)) @ axes.T
+        return mesh._replace(vertices=vertices.astype(np.float32))
 
     lamps = [
-        replace(lamp, corner=shifted(lamp.corner), across=turned(lamp.across), down=turned(lamp.down))
+        Lamp(axes @ np.subtract(lamp.corner, eye), axes @ lamp.across, axes @ lamp.down, lamp.radiance)
         for lamp in world.light.lamps
     ]
-    suns = [replace(sun, direction=turned(sun.direction)) for sun in world.light.suns]
-    things = [replace(thing, mesh=mesh(thing.mesh)) for thing in world.things]
-    return replace(world, things=things, light=replace(world.light, lamps=lamps, suns=suns))
+    suns = [sun._replace(direction=axes @ sun.direction) for sun in world.light.suns]
+    things = [one._replace(mesh=turned(one.mesh)) for one in world.things]
+    return world._replace(things=things, light=world.light._replace(lamps=lamps, suns=suns))
 
 
 def lamp_towards(middle: Vector, target: Vector, size: float, radiance: Vector) -> Lamp:
@@ -57,22 +50,19 @@ def lamp_towards(middle: Vector, target: Vector, size: float, radiance: Vector) 
     down = np.array([0.0, 1.0, 0.0]) - facing[1] * facing
     down *= size / np.linalg.norm(down)
     across = np.cross(down, facing)
-    corner, first, second = (edge.tolist() for edge in (np.array(middle) - across / 2 - down / 2, across, down))
-    return Lamp(tuple(corner), tuple(first), tuple(second), radiance)
+    return Lamp(np.array(middle) - across / 2 - down / 2, across, down, radiance)
 
 
-def book(size: Vector, cover: Material, paper: Material, turn: Vector, by: Vector) -> list[Thing]:
+def book(size: Vector, cover: Material, paper: Material, turn: Vector, by: Vector) -> Things:
     """A closed book of width, thickness and depth that lies on y=0 with its back to the left."""
     w, h, d = size
     board = min(0.003, h / 6)
     middle = -h / 2
-    covers = [
-        box((0, -h + board / 2, 0), (w, board, d)),
-        box((0, -board / 2, 0), (w, board, d)),
-        box((-w / 2 + board / 2, middle, 0), (board, h - 2 * board, d)),
-    ]
+    covers = [box((0, y, 0), (w, board, d)) for y in (-h + board / 2, -board / 2)]
+    covers.append(box((-w / 2 + board / 2, middle, 0), (board, h - 2 * board, d)))
     pages = box((0, middle, 0), (w - 2.5 * board, h - 2 * board, d - 3 * board))
-    return [Thing(moved(joined(covers), turn, by), cover), Thing(moved(pages, turn, by), paper)]
+    yield thing(moved(covers, turn, by), cover)
+    yield thing(moved(pages, turn, by), paper)
 
 
 def crate(size: Vector, rows: int, turn: float, by: Vector) -> Mesh:
@@ -88,7 +78,7 @@ def crate(size: Vector, rows: int, turn: float, by: Vector) -> Mesh:
 
 def of_boards(parts: Sequence[Mesh], across: float = 0.137, down: float = 0.091) -> Mesh:
     """Boards as one mesh, the pattern of each these metres further than that of the one before."""
-    return joined([painted_from(part, across * n, down * n) for n, part in enumerate(parts)])
+    return joined([shapes.painted_from(part, across * n, down * n) for n, part in enumerate(parts)])
 
 
 def chair(turn: float, by: Vector, slats: int = 4) -> Mesh:
@@ -120,7 +110,7 @@ def table(size: Vector, turn: float, by: Vector) -> Mesh:
 
 def house(wide: float, deep: float, tall: float, rise: float) -> tuple[Mesh, Mesh, Mesh]:
     """Walls with gables, roof and chimney, and windows, of a house that stands on y=0."""
-    gable = np.array([[-deep / 2, -tall], [0, -tall - rise], [deep / 2, -tall]])
+    gable = [[-deep / 2, -tall], [0, -tall - rise], [deep / 2, -tall]]
     ends = [moved(plate(gable, 0.0), (0, np.pi / 2, 0), (side * (wide / 2 - 0.01), 0, 0)) for side in (-1, 1)]
     body = joined([box((0, -tall / 2, 0), (wide, tall, deep)), *ends])
     slope, over = np.hypot(deep / 2, rise), 0.5
@@ -144,15 +134,20 @@ def leaning(foot: npt.ArrayLike, over: npt.ArrayLike, beyond: float, radius: flo
     return rod(start + lift, rest + lift + beyond * along, radius)
 
 
-def profile(points: list[tuple[float, float]], count: int = 120) -> Points:
+def strand(ends: shapes.Outline, sag: float, radius: float) -> Mesh:
+    """A wire between two points that hangs down by ``sag`` in its middle."""
+    share, (first, last) = np.linspace(0, 1, 24)[:, None], np.asarray(ends, float)
+    return shapes.tube(first + share * (last - first) + sag * 4 * share * (1 - share) * [0, 1, 0], radius, 8)
+
+
+def profile(points: shapes.Outline, count: int = 120) -> Points:
     """A curve through points ``(radius, height)`` of a body of revolution, given from the top down."""
     given = np.array(points, float)
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(given, axis=0), axis=1))])
-    found: Points = PchipInterpolator(length, given)(np.linspace(0, length[-1], count))
-    return found
+    return np.asarray(PchipInterpolator(length, given)(np.linspace(0, length[-1], count)))
 
 
-def vessel(points: list[tuple[float, float]], wall: float, foot: Vector, floor: float = 0.006, sides: int = 96) -> Mesh:
+def vessel(points: shapes.Outline, wall: float, foot: Vector, floor: float = 0.006, sides: int = 96) -> Mesh:
     """An open vessel of an outline, its inside ``wall`` metres within and ``floor`` above ``foot``, where it stands."""
     outer = profile(points)
     low = outer[-1, 1]
@@ -169,7 +164,7 @@ def fruit(centre: Vector, radius: float, seed: int) -> Mesh:
 
     def relief(direction: Points) -> Points:
         dimple = np.exp(-(((np.arccos(np.clip(np.abs(direction[..., 1]), 0, 1))) / 0.25) ** 2))
-        found: Points = direction @ lean - 0.12 * dimple + 0.03 * np.cos(5 * direction[..., 0] + 3 * direction[..., 2])
-        return found
+        waves = 0.03 * np.cos(5 * direction[..., 0] + 3 * direction[..., 2])
+        return np.asarray(direction @ lean - 0.12 * dimple + waves)
 
     return ball(centre, radius, relief, 40)

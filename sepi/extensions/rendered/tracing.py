@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import importlib.util
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,72 +18,23 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.extensions.rendered.patterns import srgb_decoded
 from sepi.extensions.rendered.shapes import normals, rotation
-from sepi.extensions.rendered.surfaces import FirstSurface, Surfaces, period
-from sepi.extensions.rendered.world import FloatArray, Lamp, Light, Material, Pattern, Rig, Thing, Vector, World
+from sepi.extensions.rendered.surfaces import NEAR, Surfaces, period
+from sepi.extensions.rendered.world import FloatArray, Lamp, Material, Pattern, Position, Rig, Thing, Vector, World
 from sepi.process.threads import threads_used
 
-# metres at which rays begin; much less would lose digits of their directions
-_NEAR = 0.1
-# Mitsuba's names for the position of a camera's square
-_OFFSETS = ("principal_point_offset_x", "principal_point_offset_y")
 # side of Mitsuba's blocks; by default, it depends on the number of threads, and so would the seeds
 _BLOCK = 16
 # least number of samples of a pixel for which an even spread pays
 SPREAD = 9
 # samples of the sky for each of a sun; reduces noise in pixels with several surfaces by a sixth
 _SKY_BESIDE_SUN = 0.3
+# largest number of pinholes into which a lens is divided
+_LENS_POINTS = 32
 # Vogel's spiral: points that fill a disc evenly
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 
 
 Pixels = npt.NDArray[np.int64]
-
-
-class Tiles(NamedTuple):
-    """Square tiles of a picture.
-
-    Attributes
-    ----------
-    pixels : ndarray, shape (N, T, T, 2), int64
-        Rows and columns of their pixels.
-    paths : int
-        Number of paths of each pixel.
-    seed : int
-        First seed of the paths; some that follow are used, too.
-    cameras : list
-        Cameras of the tiles.
-    """
-
-    pixels: Pixels
-    paths: int
-    seed: int
-    cameras: list[Any]
-
-
-@dataclass(frozen=True)
-class Position:
-    """Pose of a view relative to the reference camera.
-
-    Attributes
-    ----------
-    right, down : float
-        Position, metres.
-    shear_right, shear_down : float
-        Shift of the picture to converge at the focus distance, as a share of its width.
-    turn : (float, float, float)
-        Rotation about ``x``, ``y`` and ``z``, radians.
-    """
-
-    right: float
-    down: float
-    shear_right: float
-    shear_down: float
-    turn: Vector = (0.0, 0.0, 0.0)
-
-    @property
-    def rotation(self) -> npt.NDArray[np.float64]:
-        """Rotation matrix from the camera to the world, shape (3, 3)."""
-        return rotation(self.turn)
 
 
 def require_mitsuba() -> None:
@@ -113,171 +64,96 @@ class Tracer:
     rig : Rig
     lens : float
         Radius of the lens in metres; 0 for a pinhole. Disparity zero is in focus.
-    lens_points : int
-        Largest number of pinholes into which a lens is divided.
 
     Attributes
     ----------
+    world, rig
+        As given.
     surfaces : Surfaces
         All triangles of the world in one list.
     """
 
-    def __init__(self, world: World, rig: Rig, lens: float = 0.0, lens_points: int = 32) -> None:
+    def __init__(self, world: World, rig: Rig, lens: float = 0.0) -> None:
         self._mi = _mitsuba()
-        self._rig, self._lens, self._lens_points = rig, lens, lens_points if lens else 1
-        light, paths = world.light, world.paths
-        self._exposure, self._bounces = light.exposure, {"max_depth": paths.depth, "rr_depth": paths.roulette}
-        self.surfaces = Surfaces(world)
-        parts: dict[str, Any] = {}
+        self.world, self.rig, self._lens = world, rig, lens
+        self.surfaces = Surfaces(world, rig)
         # things with the same material share its textures
         surfaces = {id(thing.material): thing.material for thing in world.things}
         loaded = {key: self._mi.load_dict(self._surface(material)) for key, material in surfaces.items()}
-        for number, thing in enumerate(world.things):
-            parts[f"thing{number}"] = self._shape(thing, loaded[id(thing.material)])
-        for number, lamp in enumerate(light.lamps):
-            parts[f"lamp{number}"] = self._lamp(lamp)
-        for number, sun in enumerate(light.suns):
-            irradiance = {"type": "rgb", "value": list(sun.irradiance)}
-            parts[f"sun{number}"] = {"type": "directional", "direction": list(sun.direction), "irradiance": irradiance}
-        self._scene = self._mi.load_dict({"type": "scene", **parts, **self._sky(light)})
+        things = [self._shape(thing, loaded[id(thing.material)]) for thing in world.things]
+        parts = {f"thing{number}": thing for number, thing in enumerate(things)}
+        parts |= {f"lamp{number}": self._lamp(lamp) for number, lamp in enumerate(world.light.lamps)}
+        for number, sun in enumerate(world.light.suns):
+            direction = np.asarray(sun.direction).tolist()
+            parts[f"sun{number}"] = {"type": "directional", "direction": direction, "irradiance": _rgb(sun.irradiance)}
+        self._scene = self._mi.load_dict({"type": "scene", **parts, **self._sky()})
 
     def position(self, down: float, across: float, turn: Vector = (0.0, 0.0, 0.0)) -> Position:
         """The camera of the view ``(down, across)`` view steps from the centre."""
-        step = self._rig.baseline
-        return self._at(across * step, down * step, turn)
-
-    def _at(self, right: float, down: float, turn: Vector) -> Position:
-        shear = self._rig.focal_px / (self._rig.focus * self._rig.size)
-        return Position(right, down, right * shear, down * shear, turn)
+        return Position(across * self.rig.baseline, down * self.rig.baseline, turn)
 
     def picture(self, position: Position, seed: int, samples: int) -> FloatArray:
         """Linear picture of a view from ``samples`` paths per pixel, 1 is white; shape (H, W, 3), float32."""
-        count = min(samples, self._lens_points)
-        total = np.zeros((self._rig.size, self._rig.size, 3), np.float64)
-        for number, (right, down) in enumerate(_in_disc(self._lens, count)):
+        count, size = min(samples, _LENS_POINTS if self._lens else 1), self.rig.size
+        total = np.zeros((size, size, 3), np.float64)
+        # points spread evenly over the lens
+        angle, radius = np.arange(count) * _GOLDEN_ANGLE, self._lens * np.sqrt((np.arange(count) + 0.5) / count)
+        for number, (right, down) in enumerate(zip(radius * np.cos(angle), radius * np.sin(angle), strict=True)):
             part = samples * (number + 1) // count - samples * number // count
-            point = self._at(position.right + right, position.down + down, position.turn)
-            camera = self._mi.load_dict({**self._whole(point), **_sampler(part)})
-            total += part * self._seen(self._paths(_BLOCK), camera, part, (seed + number) % 2**32)
-        return (self._exposure / samples * total).astype(np.float32)
+            point = Position(position.right + right, position.down + down, position.turn)
+            camera = self._side_by_side(point, np.zeros((1, 2), np.int64), size, part)
+            total += part * self._seen(camera, size, part, seed + number)
+        return (self.world.light.exposure / samples * total).astype(np.float32)
 
-    def tiles(self, position: Position, pixels: Pixels, paths: int, seed: int) -> Tiles:
-        """Cameras for square tiles of :meth:`picture`, given their pixels ``(N, T, T, 2)``."""
-        return Tiles(pixels, paths, seed, [self._side_by_side(position, some, paths) for some in _some(pixels)])
+    def tiles(self, position: Position, pixels: Pixels, paths: int, seed: int) -> Callable[[], FloatArray]:
+        """Prepare pictures of square tiles, given their pixels ``(N, T, T, 2)``.
 
-    def seen(self, tiles: Tiles) -> FloatArray:
-        """Linear pictures of tiles, 1 is white; shape (N, T, T, 3)."""
-        side = tiles.pixels.shape[1]
-        integrator = self._paths(min(side, _BLOCK))
-        found = [
-            self._seen(integrator, cameras, tiles.paths, (tiles.seed + number) % 2**32).reshape(side, -1, side, 3)
-            for number, cameras in enumerate(tiles.cameras)
-        ]
-        return np.float32(self._exposure) * np.concatenate(found, axis=1).transpose(1, 0, 2, 3)
+        They are linear, 1 is white, of shape (N, T, T, 3); ``seed`` is the first of several in a row.
+        """
+        corners, side = pixels[:, 0, 0], pixels.shape[1]
+        # groups small enough for single precision to distinguish their rays
+        groups = np.split(corners, range(max(4096 // side, 1), len(corners), max(4096 // side, 1)))
+        cameras = [self._side_by_side(position, group, side, paths) for group in groups]
 
-    def first_surface(self, position: Position) -> FirstSurface:
-        """First surfaces on the rays through the middles of the pixels."""
-        straight = self.directions(position)
-        return self.surfaces.first(
-            self._faces(position, 1), straight @ position.rotation.T, (position.right, position.down, 0.0)
-        )
+        def pictures() -> FloatArray:
+            found = [self._seen(camera, side, paths, seed + number) for number, camera in enumerate(cameras)]
+            apart = np.concatenate([picture.reshape(side, -1, side, 3) for picture in found], axis=1)
+            return np.float32(self.world.light.exposure) * apart.transpose(1, 0, 2, 3)
 
-    def things(self, position: Position, fine: int) -> npt.NDArray[np.int64]:
-        """First things on F by F rays of each pixel, -1 for none; shape (H, F, W, F)."""
-        size = self._rig.size
-        return self.surfaces.thing[self._faces(position, fine)].reshape(size, fine, size, fine)
+        return pictures
 
-    def _faces(self, position: Position, fine: int) -> npt.NDArray[np.int32]:
-        """First triangles of :attr:`surfaces` on F by F rays of each pixel; shape (H F, W F)."""
-        size, shears = fine * self._rig.size, (position.shear_down, position.shear_right)
-        return self.surfaces.met(
-            np.array([position.right, position.down, 0.0]),
-            position.rotation,
-            np.array([fine * self._rig.focal_px, *((0.5 + shear) * size for shear in shears)]),
-            size,
-            _NEAR,
-        )
-
-    def albedo(self, position: Position, faces: npt.NDArray[np.int32], pixels: npt.NDArray[np.int64]) -> FloatArray:
-        """Mean albedo of pixels, each of which shows one triangle, for a view without a turn; shape (N, 3)."""
-        focal, size = self._rig.focal_px, self._rig.size
-        axis = [(0.5 + shear) * size for shear in (position.shear_down, position.shear_right)]
-        return self.surfaces.albedo(faces, pixels, np.array([position.right, position.down, *axis, focal]))
-
-    def _side_by_side(self, position: Position, pixels: Pixels, paths: int) -> Any:
-        """Cameras of all tiles, side by side in one picture."""
-        count, side = pixels.shape[:2]
+    def _side_by_side(self, position: Position, corners: npt.NDArray[np.int64], side: int, paths: int) -> Any:
+        """Cameras of square tiles, side by side in one picture, given their first pixels ``(N, 2)``."""
+        transform = self._mi.ScalarTransform4f
+        turn = transform(np.vstack([np.c_[rotation(position.turn), np.zeros(3)], [0, 0, 0, 1]]))
+        stand = transform().translate([position.right, position.down, 0.0])
         # one set of properties, changed for each camera: a dictionary for each would take three times as long
         camera, create = self._mi.Properties("perspective"), self._mi.PluginManager.instance().create_object
-        for name, value in {**self._camera(position, side), **self._film(side)}.items():
-            camera[name] = self._mi.load_dict(value) if isinstance(value, dict) else value
+        camera["fov"] = float(2 * np.degrees(np.arctan(side / (2 * self.rig.focal_px))))
+        camera["to_world"] = stand @ turn @ transform().look_at([0, 0, 0], [0, 0, 1], [0, -1, 0])
+        camera["near_clip"], camera["far_clip"] = NEAR, 1000.0
+        camera["film"] = self._mi.load_dict(_film(side, side))
         windows = {}
-        right, down = self._offsets(position, pixels[:, 0, 0, 0], pixels[:, 0, 0, 1], side)
-        for number, (x, y) in enumerate(zip(right.tolist(), down.tolist(), strict=True)):
-            camera[_OFFSETS[0]], camera[_OFFSETS[1]] = x, y
+        # Mitsuba moves the window, not the picture
+        offsets = (corners + side / 2 - self.rig.axis(position)) / side
+        for number, (down, right) in enumerate(offsets.tolist()):
+            camera["principal_point_offset_x"], camera["principal_point_offset_y"] = right, down
             windows[f"tile{number:04d}"] = create(camera)
-        return self._mi.load_dict({"type": "batch", **windows, **self._film(side, count), **_sampler(paths)})
+        film = _film(len(corners) * side, side)
+        return self._mi.load_dict({"type": "batch", **windows, "film": film, "sampler": _sampler(paths)})
 
-    def _whole(self, position: Position) -> dict[str, Any]:
-        """The camera of a whole picture."""
-        size = self._rig.size
-        none = np.zeros(1, np.int64)
-        offsets = (float(values[0]) for values in self._offsets(position, none, none, size))
-        place = {**self._camera(position, size), **dict(zip(_OFFSETS, offsets, strict=True))}
-        return {"type": "perspective", **place, **self._film(size)}
-
-    def _seen(self, integrator: Any, camera: Any, samples: int, seed: int) -> FloatArray:
-        return np.array(self._mi.render(self._scene, sensor=camera, integrator=integrator, spp=samples, seed=seed))
-
-    def _paths(self, block: int) -> Any:
-        return self._mi.load_dict({"type": "path", **self._bounces, "block_size": block})
-
-    def _film(self, height: int, count: int = 1) -> dict[str, Any]:
-        values = {"width": count * height, "height": height, "rfilter": {"type": "box"}}
-        return {"film": {"type": "hdrfilm", "pixel_format": "rgb", "component_format": "float32", **values}}
-
-    def _camera(self, position: Position, side: int) -> dict[str, Any]:
-        """Camera of a square of the picture."""
-        transform = self._mi.ScalarTransform4f
-        turn = transform(np.vstack([np.c_[position.rotation, np.zeros(3)], [0, 0, 0, 1]]))
-        stand = transform().translate([position.right, position.down, 0.0])
-        return {
-            "fov": float(2 * np.degrees(np.arctan(side / (2 * self._rig.focal_px)))),
-            "to_world": stand @ turn @ transform().look_at([0, 0, 0], [0, 0, 1], [0, -1, 0]),
-            "near_clip": _NEAR,
-            "far_clip": 1000.0,
-        }
-
-    def _offsets(
-        self, position: Position, top: npt.NDArray[np.int64], left: npt.NDArray[np.int64], side: int
-    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """Offsets of squares to the right and down; Mitsuba moves the window, not the picture."""
-        shears = ((left, position.shear_right), (top, position.shear_down))
-        right, down = ((first + side / 2 - (0.5 + shear) * self._rig.size) / side for first, shear in shears)
-        return right, down
-
-    def directions(self, position: Position) -> npt.NDArray[np.float64]:
-        """Directions of the rays through the pixels' middles in the camera's axes, with z = 1; shape (H, W, 3)."""
-        middles = np.arange(self._rig.size) + 0.5 - self._rig.size / 2
-        right = (middles - position.shear_right * self._rig.size) / self._rig.focal_px
-        down = (middles - position.shear_down * self._rig.size) / self._rig.focal_px
-        x, y = np.broadcast_arrays(right[None, :], down[:, None])
-        return np.stack([x, y, np.ones_like(x)], axis=-1)
+    def _seen(self, camera: Any, side: int, samples: int, seed: int) -> FloatArray:
+        paths = {"type": "path", "max_depth": self.world.light.depth, "rr_depth": self.world.light.roulette}
+        integrator = self._mi.load_dict({**paths, "block_size": min(side, _BLOCK)})
+        seen = self._mi.render(self._scene, sensor=camera, integrator=integrator, spp=samples, seed=seed % 2**32)
+        return np.array(seen)
 
     def _shape(self, thing: Thing, surface: Any) -> Any:
         """Mitsuba's shape of a thing."""
-        mesh = thing.mesh
-        properties = self._mi.Properties()
-        properties["bsdf"] = surface
-        properties["face_normals"] = not mesh.smooth
-        shape = self._mi.Mesh(
-            "thing",
-            len(mesh.vertices),
-            len(mesh.faces),
-            props=properties,
-            has_vertex_normals=mesh.smooth,
-            has_vertex_texcoords=True,
-        )
+        mesh, properties = thing.mesh, self._mi.Properties()
+        properties["bsdf"], properties["face_normals"] = surface, not mesh.smooth
+        layers = {"has_vertex_normals": mesh.smooth, "has_vertex_texcoords": True}
+        shape = self._mi.Mesh("thing", len(mesh.vertices), len(mesh.faces), props=properties, **layers)
         values = self._mi.traverse(shape)
         values["vertex_positions"] = np.ravel(mesh.vertices)
         values["faces"] = np.ravel(mesh.faces)
@@ -289,16 +165,12 @@ class Tracer:
 
     def _lamp(self, lamp: Lamp) -> dict[str, Any]:
         """Mitsuba's rectangle (-1 to 1 in x and y, shining towards z), moved to the lamp's corner and edges."""
-        corner, across, down = (np.array(values, float) for values in (lamp.corner, lamp.across, lamp.down))
-        facing = np.cross(across, down)
+        corner, across, down = (np.asarray(values, float) for values in (lamp.corner, lamp.across, lamp.down))
+        facing, matrix = np.cross(across, down), np.eye(4)
         columns = [across / 2, down / 2, facing / np.linalg.norm(facing), corner + across / 2 + down / 2]
-        matrix = np.vstack([np.stack(columns, axis=1), [0, 0, 0, 1]])
-        radiance = {"type": "rgb", "value": list(lamp.radiance)}
-        return {
-            "type": "rectangle",
-            "to_world": self._mi.ScalarTransform4f(matrix),
-            "emitter": {"type": "area", "radiance": radiance},
-        }
+        matrix[:3] = np.stack(columns, axis=1)
+        emitter = {"type": "area", "radiance": _rgb(lamp.radiance)}
+        return {"type": "rectangle", "to_world": self._mi.ScalarTransform4f(matrix), "emitter": emitter}
 
     def _surface(self, material: Material) -> dict[str, Any]:
         """Mitsuba's description of a material."""
@@ -317,37 +189,33 @@ class Tracer:
 
     def _texture(self, material: Material) -> dict[str, Any]:
         if not isinstance(material.pattern, Pattern):
-            return {"type": "rgb", "value": srgb_decoded(np.array(material.pattern)).tolist()}
-        raster = self._mi.Bitmap(self.surfaces.linear(material.pattern))
+            return _rgb(srgb_decoded(np.array(material.pattern)))
+        raster = self._mi.Bitmap(srgb_decoded(material.pattern.raster))
         # without interpolation, for a fifth of the time: pixels are at least texels, and paths spread over them
         return {"type": "bitmap", "bitmap": raster, "raw": True, "format": "fp16", "filter_type": "nearest"}
 
-    def _sky(self, light: Light) -> dict[str, Any]:
+    def _sky(self) -> dict[str, Any]:
+        sky = self.world.light.sky
         # each path samples one light at a time, and a sun contributes more than the sky
-        asked = {"sampling_weight": _SKY_BESIDE_SUN if light.suns else 1.0}
-        if not isinstance(light.sky, np.ndarray):
-            radiance = {"type": "rgb", "value": list(light.sky)}
-            return {"sky": {"type": "constant", "radiance": radiance, **asked}} if any(light.sky) else {}
+        asked = {"sampling_weight": _SKY_BESIDE_SUN if self.world.light.suns else 1.0}
+        if np.ndim(sky) == 1:
+            return {"sky": {"type": "constant", "radiance": _rgb(sky), **asked}} if np.any(sky) else {}
         # Mitsuba's panoramas have y up
         upright = self._mi.ScalarTransform4f().rotate([0, 0, 1], 180.0)
-        bitmap = self._mi.Bitmap(light.sky.astype(np.float32))
+        bitmap = self._mi.Bitmap(np.asarray(sky, np.float32))
         return {"sky": {"type": "envmap", "bitmap": bitmap, "to_world": upright, **asked}}
+
+
+def _rgb(values: npt.ArrayLike) -> dict[str, Any]:
+    return {"type": "rgb", "value": np.asarray(values, float).tolist()}
+
+
+def _film(width: int, height: int) -> dict[str, Any]:
+    values = {"width": width, "height": height, "rfilter": {"type": "box"}}
+    return {"type": "hdrfilm", "pixel_format": "rgb", "component_format": "float32", **values}
 
 
 def _sampler(samples: int) -> dict[str, Any]:
     """Sampler; few samples are independent, since an even spread repeats visibly from pixel to pixel."""
     spread = "stratified" if samples == 4 ** round(math.log(samples, 4)) else "multijitter"
-    return {"sampler": {"type": spread if samples >= SPREAD else "independent", "sample_count": samples}}
-
-
-def _in_disc(radius: float, count: int) -> npt.NDArray[np.float64]:
-    """Points spread evenly over a disc; only its middle without a radius; shape (N, 2)."""
-    angle = np.arange(count) * _GOLDEN_ANGLE
-    distance = radius * np.sqrt((np.arange(count) + 0.5) / count)
-    return np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1)
-
-
-def _some(tiles: Pixels) -> list[Pixels]:
-    """Groups of tiles, small enough for single precision to distinguish their rays."""
-    count = max(4096 // tiles.shape[1], 1)
-    return [tiles[first : first + count] for first in range(0, len(tiles), count)]
+    return {"type": spread if samples >= SPREAD else "independent", "sample_count": samples}

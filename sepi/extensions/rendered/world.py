@@ -8,23 +8,20 @@ have disparity zero, as in the HCI 4D benchmark. With the focal length ``f`` in 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
 
-from sepi.camera import Camera, camera_from
-
+Share = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 FloatArray = npt.NDArray[np.float32]
-Vector = tuple[float, float, float]
-Kind = Literal["matte", "glossy", "mirror", "glass"]
-Metal = Literal["Ag", "Al", "Au", "Cr", "Cu"]
+Vector = Sequence[float] | npt.NDArray[np.float64]
+"""Three numbers: a place, a direction, or a colour."""
 
 
-@dataclass(frozen=True)
-class Mesh:
+class Mesh(NamedTuple):
     """Triangles.
 
     Attributes
@@ -45,8 +42,7 @@ class Mesh:
     smooth: bool = False
 
 
-@dataclass(frozen=True)
-class Pattern:
+class Pattern(NamedTuple):
     """Colours painted on a surface; the pattern repeats.
 
     Attributes
@@ -61,8 +57,7 @@ class Pattern:
     size: tuple[float, float] = (1.0, 1.0)
 
 
-@dataclass(frozen=True)
-class Material:
+class Material(NamedTuple):
     """Material of a surface.
 
     Attributes
@@ -80,14 +75,13 @@ class Material:
     """
 
     pattern: Pattern | Vector = (0.8, 0.8, 0.8)
-    kind: Kind = "matte"
+    kind: Literal["matte", "glossy", "mirror", "glass"] = "matte"
     roughness: float = 0.0
-    metal: Metal = "Al"
+    metal: Literal["Ag", "Al", "Au", "Cr", "Cu"] = "Al"
     pane: bool = False
 
 
-@dataclass(frozen=True)
-class Thing:
+class Thing(NamedTuple):
     """A mesh of one material.
 
     Attributes
@@ -103,8 +97,10 @@ class Thing:
     thin: bool = False
 
 
-@dataclass(frozen=True)
-class Lamp:
+Things = Iterator[Thing]
+
+
+class Lamp(NamedTuple):
     """A rectangle that shines to the side from which ``across``, then ``down``, turn clockwise.
 
     Attributes
@@ -121,8 +117,7 @@ class Lamp:
     radiance: Vector
 
 
-@dataclass(frozen=True)
-class Sun:
+class Sun(NamedTuple):
     """Light from very far away.
 
     Attributes
@@ -137,8 +132,7 @@ class Sun:
     irradiance: Vector
 
 
-@dataclass(frozen=True)
-class Cameras:
+class Cameras(NamedTuple):
     """What the cameras see of a scene.
 
     Attributes
@@ -158,9 +152,8 @@ class Cameras:
     field_of_view: float = 40.0
 
 
-@dataclass(frozen=True)
-class Light:
-    """Light of a scene.
+class Light(NamedTuple):
+    """Light of a scene, and its paths.
 
     Attributes
     ----------
@@ -173,21 +166,6 @@ class Light:
         Factor from radiance to pictures, in which 1 is white.
     share : float
         Light relative to other scenes; less light has more noise.
-    """
-
-    sky: Vector | FloatArray = (0.0, 0.0, 0.0)
-    lamps: Sequence[Lamp] = ()
-    suns: Sequence[Sun] = ()
-    exposure: float = 1.0
-    share: float = 1.0
-
-
-@dataclass(frozen=True)
-class Paths:
-    """Paths of light.
-
-    Attributes
-    ----------
     depth : int
         Largest number of reflections and refractions.
     roulette : int
@@ -197,13 +175,17 @@ class Paths:
         them give no more noise (mean difference of two renderings) than all paths with ``roulette`` 2.
     """
 
+    sky: Vector | FloatArray = (0.0, 0.0, 0.0)
+    lamps: Sequence[Lamp] = ()
+    suns: Sequence[Sun] = ()
+    exposure: float = 1.0
+    share: float = 1.0
     depth: int = 6
     roulette: int = 2
     gloss: float = 1.0
 
 
-@dataclass(frozen=True)
-class World:
+class World(NamedTuple):
     """A scene.
 
     Attributes
@@ -212,20 +194,33 @@ class World:
         They must fill the pictures, since a ray that meets nothing has no disparity.
     cameras : Cameras
     light : Light
-    paths : Paths
     """
 
     things: Sequence[Thing]
     cameras: Cameras
     light: Light
-    paths: Paths = Paths()
 
 
 SENSOR_MM = 35.0
 
 
-@dataclass(frozen=True)
-class Rig:
+class Position(NamedTuple):
+    """Pose of a view relative to the reference camera.
+
+    Attributes
+    ----------
+    right, down : float
+        Position, metres.
+    turn : (float, float, float)
+        Rotation about ``x``, ``y`` and ``z``, radians.
+    """
+
+    right: float
+    down: float
+    turn: Vector = (0.0, 0.0, 0.0)
+
+
+class Rig(NamedTuple):
     """Cameras of a scene.
 
     Attributes
@@ -249,11 +244,6 @@ class Rig:
     focus: float
 
     @property
-    def camera(self) -> Camera:
-        """Camera of the light field."""
-        return camera_from(**self.settings, shape=(self.size, self.size), crop_of=None)
-
-    @property
     def settings(self) -> dict[str, float]:
         """Values for the benchmark's ``parameters.cfg``."""
         return {
@@ -263,12 +253,10 @@ class Rig:
             "sensor_size_mm": SENSOR_MM,
         }
 
-    @property
-    def positions(self) -> npt.NDArray[np.float64]:
-        """Positions of the views from the centre view, ``(down, across)`` in view steps; shape (T, S, 2)."""
-        rows, columns = self.grid
-        down, across = np.arange(rows) - rows // 2, np.arange(columns) - columns // 2
-        return np.stack(np.broadcast_arrays(down[:, None], across[None, :]), axis=-1).astype(np.float64)
+    def axis(self, position: Position) -> tuple[float, float]:
+        """Row and column of a camera's axis in its picture, which is shifted to converge at the focus distance."""
+        shear = self.focal_px / (self.focus * self.size)
+        return (0.5 + position.down * shear) * self.size, (0.5 + position.right * shear) * self.size
 
     def disparity(self, depth: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Disparity in pixels per view step of depths along the viewing direction in metres."""

@@ -5,12 +5,12 @@ import numpy as np
 from sepi.extensions.rendered import shapes
 from sepi.extensions.rendered.patterns import noise
 from sepi.extensions.rendered.rendering import RenderOptions
-from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Paths, Thing, World
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Thing, World
 
 WALL, FLOOR = 3.0, 0.6
 RED = Material((0.6, 0.2, 0.2))
 # no finer than ten pixels, so that it can be interpolated
-PAINT = noise(1, (0.5, 0.45, 0.4), 0.12, 2.4, finest=80)
+PAINT = noise(1, (0.5, 0.45, 0.4), 0.12, 2.4, (80, 256))
 
 
 def taking(size: int = 64, views: int = 3, samples: int = 4, **values: object) -> RenderOptions:
@@ -18,14 +18,14 @@ def taking(size: int = 64, views: int = 3, samples: int = 4, **values: object) -
 
 
 CAMERAS = Cameras(1.2, WALL, 2.0, -1.5)
-EVEN = Light((1.0, 1.0, 1.0), exposure=0.7)
+EVEN = Light((1.0, 1.0, 1.0), exposure=0.7, depth=8)
 
 
-def room(*things: Thing, light: Light = EVEN, paths: Paths | None = None) -> World:
+def room(*things: Thing, light: Light = EVEN) -> World:
     """A wall at ``WALL`` and a floor ``FLOOR`` below the camera, and things before them, under an even sky."""
     wall = Thing(shapes.rectangle((-4, -4, WALL), (8, 0, 0), (0, 8, 0)), Material(PAINT))
     floor = Thing(shapes.rectangle((-4, FLOOR, 0.3), (8, 0, 0), (0, 0, 3)), Material(PAINT))
-    return World([wall, floor, *things], CAMERAS, light, paths or Paths(8))
+    return World([wall, floor, *things], CAMERAS, light)
 
 
 def bar(depth: float = 1.5, width: float = 0.1, material: Material = RED) -> Thing:

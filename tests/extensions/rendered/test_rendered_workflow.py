@@ -102,15 +102,7 @@ def test_a_render_becomes_a_light_field_and_apart_from_it_its_truth(tmp_path: Pa
 def test_a_scene_is_rendered_again_for_the_renderer_and_itself_alone() -> None:
     """It takes minutes: neither another scene, nor what is told of scenes, nor noise may ask for that."""
     found = imported_modules("sepi.extensions.rendered.rendering", "sepi.extensions.rendered.worlds.sticks")
-    assert {
-        "sepi.extensions.rendered.rendering",
-        "sepi.extensions.rendered.tracing",
-        "sepi.extensions.rendered.worlds.sticks",
-    } <= found
-    assert not found & {
-        "sepi.extensions.rendered.worlds.room",
-        "sepi.extensions.rendered.worlds",
-        "sepi.extensions.rendered.exposure",
-        "sepi.process.command",
-    }
+    assert {f"sepi.extensions.rendered.{name}" for name in ("rendering", "tracing", "worlds.sticks")} <= found
+    others = {f"sepi.extensions.rendered.{name}" for name in ("worlds.room", "worlds", "exposure")}
+    assert not found & {*others, "sepi.process.command"}
     assert not any("rendered" in name for name in imported_modules(*ingest_modules("sepi.scenes")))

@@ -1,6 +1,7 @@
 """Path-traced scenes: pictures, truth and masks must agree, or every score made from them is wrong."""
 
 import importlib.util
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,13 @@ import sepi
 from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.extensions.rendered import patterns, shapes, tracing
-from sepi.extensions.rendered.exposure import NOISE, Exposure, exposed
-from sepi.extensions.rendered.render_file import MASKS, Render, mask, read_render, seen_bits
+from sepi.extensions.rendered.exposure import READ, WHITE, Exposure, exposed
+from sepi.extensions.rendered.render_file import MASKS, Render, masks_in, read_render, seen_bits
 from sepi.extensions.rendered.rendering import render_world
 from sepi.extensions.rendered.sampling import pictured, planned
+from sepi.extensions.rendered.surfaces import FirstSurface, raster_of
 from sepi.extensions.rendered.tracing import Tracer
-from sepi.extensions.rendered.world import Light, Material, Paths, Sun, Thing, World, rig_of
+from sepi.extensions.rendered.world import Light, Material, Sun, Thing, World, rig_of
 from sepi.extensions.rendered.worlds import RENDERED, world_of
 from sepi.scenes.folder import write_hci
 from sepi.workflow.rendered_scenes import NOISE_LEVELS
@@ -77,7 +79,7 @@ def test_truth_of_every_view_is_of_the_same_points(plain: Render) -> None:
 def test_points_have_one_colour_in_all_views(tmp_path: Path) -> None:
     """By the light of a sun alone, which leaves no noise of paths."""
     sun = Sun((0.3, 0.6, 1.0), (4.0, 4.0, 4.0))
-    sunny = room(light=Light(suns=[sun], exposure=0.7), paths=Paths(2))
+    sunny = room(light=Light(suns=[sun], exposure=0.7, depth=2))
     render = rendered(tmp_path, sunny, size=96, samples=4)
     light_field = exposed(render, Exposure())
     centre = light_field.views[light_field.reference_position].astype(float)
@@ -126,15 +128,14 @@ def test_paths_are_traced_where_views_differ() -> None:
     rig = rig_of(world, size, (9, 9))
     tracer = Tracer(world, rig)
     at = tracer.position(0, 0)
-    seen = tracer.first_surface(at)
-    disparity = rig.disparity(seen.depth).astype(np.float32)
-    plan = planned(tracer, at, seen, disparity, samples, 81, 0)
+    seen = tracer.surfaces.first(at)
+    plan = planned(tracer, at, seen, samples, 0)
     taken = np.zeros((size, size), int)
-    for tiles, before in plan.tiles:
-        rows, columns = tiles.pixels[..., 0], tiles.pixels[..., 1]
-        assert (taken[rows, columns] <= samples + before).all()
-        taken[rows, columns] = before + tiles.paths
-    shown, mirror = pictured(tracer, plan), seen.thing == 2
+    for pixels, before, paths, _ in plan.passes:
+        where = pixels[..., 0], pixels[..., 1]
+        assert (taken[where] <= samples + before).all()
+        taken[where] = before + paths
+    shown, mirror = pictured(plan), seen.thing == 2
     # a tile of another kind may hold some of the mirror's border
     inside = ndimage.minimum_filter(mirror, 3)
     assert set(np.unique(taken[inside])) == {samples}
@@ -158,7 +159,7 @@ def test_masks_say_what_a_pixel_shows(tmp_path: Path) -> None:
     balls = [ball(-0.45, Material(kind="mirror")), ball(0.45, Material(kind="glass")), lacquer]
     world = room(bar(depth=1.5, width=0.06), *balls)
     render = rendered(tmp_path, world, size=96, samples=1)
-    masks = render.masks_of(render.centre)
+    masks = masks_in(render.masks[render.centre])
     assert list(masks) == list(MASKS)
     rig = rig_of(world, 96, (3, 3))
     d_bar, d_wall = rig.disparity(np.array([1.5, 3.0]))
@@ -192,11 +193,11 @@ def test_what_one_view_alone_sees_is_told() -> None:
     bits = seen_bits(disparities, positions)[0]
     for name in ("occluded", "alone"):
         # all of them, whether a mirror would swap right and left or not
-        assert mask(bits, name)[1].nonzero()[0].tolist() == [4, 5, 6, 7]
+        assert masks_in(bits)[name][1].nonzero()[0].tolist() == [4, 5, 6, 7]
     # what lies outside the other picture is hidden by nothing, and seen by nobody else
     shifted = seen_bits(np.ones((2, 4, 12), np.float32), positions)[0]
-    assert not mask(shifted, "occluded").any()
-    assert mask(shifted, "alone")[1].nonzero()[0].tolist() == [0, 1]
+    assert not masks_in(shifted)["occluded"].any()
+    assert masks_in(shifted)["alone"][1].nonzero()[0].tolist() == [0, 1]
 
 
 def test_noise_is_that_of_the_stated_sensor(plain: Render) -> None:
@@ -204,14 +205,11 @@ def test_noise_is_that_of_the_stated_sensor(plain: Render) -> None:
     linear = Exposure(gamma=1.0, bits=16)
     clean = exposed(plain, linear).views / 65535
     for level in NOISE_LEVELS[1:]:
-        sensor = NOISE[level]
         for light in (1.0, 0.1):
             dim = Render(**{**vars(plain), "light": light})
             noisy = exposed(dim, linear.model_copy(update={"noise": level})).views / 65535
             inside = (clean > 0.1) & (clean < 0.15)
-            expected = np.sqrt(
-                clean[inside].mean() / (sensor.white * light) + (sensor.read / sensor.white / light) ** 2
-            )
+            expected = np.sqrt(clean[inside].mean() / (WHITE[level] * light) + (READ / WHITE[level] / light) ** 2)
             # of what is not cut off at black and white
             if light == 1.0:
                 assert (noisy - clean)[inside].std() == pytest.approx(expected, rel=0.03)
@@ -307,9 +305,7 @@ def coarse_patterns(monkeypatch: pytest.MonkeyPatch) -> None:
     """Random fields that repeat after an eighth of a pattern, and few texels: as bright, in a fraction of the time."""
     field, decoded = patterns.field, tracing.srgb_decoded
 
-    def repeated(
-        seed: int, finest: float, coarsest: float, texels: int = patterns.TEXELS, stretch: float = 1.0
-    ) -> np.ndarray:
+    def repeated(seed: int, finest: float, coarsest: float, texels: int = 1024, stretch: float = 1.0) -> np.ndarray:
         return np.tile(field(seed, finest, coarsest, texels // 8, stretch), (8, 8))
 
     monkeypatch.setattr(patterns, "field", repeated)
@@ -318,22 +314,40 @@ def coarse_patterns(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
+def regular_waves(world: World, seen: FirstSurface) -> Iterator[float]:
+    """Cycles per pixel at 512 of the strongest wave of each regular pattern that fills a hundredth of the picture."""
+    for number in np.flatnonzero(np.bincount(seen.thing.ravel()) > 0.01 * seen.thing.size):
+        raster = raster_of(world.things[number].material.pattern).mean(axis=2)
+        power = np.abs(np.fft.fft2(raster - raster.mean())) ** 2
+        # grain has thousands of waves; half of a wave's power lies at the opposite one
+        if power.max() > 0.04 * power.sum() > 0:
+            rows, columns = (np.fft.fftfreq(n, 1 / n) for n in power.shape)
+            row, column = np.unravel_index(power.argmax(), power.shape)
+            phase = seen.uv.astype(float) @ [columns[column], rows[row]]
+            steps = np.diff(phase, axis=1)[:-1], np.diff(phase, axis=0)[:, :-1]
+            face, here = seen.face, seen.thing[:-1, :-1] == number
+            here &= (face[:-1, :-1] == face[1:, :-1]) & (face[:-1, :-1] == face[:-1, 1:])
+            if here.any():
+                yield float(np.median(np.hypot(*steps)[here])) * len(face) / 512
+
+
 @pytest.mark.usefixtures("coarse_patterns")
 @pytest.mark.parametrize("name", RENDERED)
 def test_every_ray_of_a_scene_meets_something(name: str) -> None:
-    """At the corners of a 9x9 grid, too; disparities stay in what the scene says."""
+    """At the corners of a 9x9 grid, too; disparities stay in what the scene says, and regular texture below moire."""
     world = world_of(name)
-    rig = rig_of(world, 64, (9, 9))
+    rig = rig_of(world, 128, (9, 9))
     tracer = Tracer(world, rig)
     near, far = world.cameras.at_near, world.cameras.at_far
     slack = 0.1 * (near - far)
-    for corner in ((0, 0), (-4, -4), (4, 4)):
-        seen = tracer.first_surface(tracer.position(*corner))
+    for corner in ((-4, -4), (4, 4), (0, 0)):
+        seen = tracer.surfaces.first(tracer.position(*corner))
         assert np.isfinite(seen.depth).all()
         disparity = rig.disparity(seen.depth)
         assert far - slack <= disparity.min()
         # corners of so small pictures look far down
         assert disparity.max() <= near + slack or corner != (0, 0)
+    assert RENDERED[name].fine or max(regular_waves(world, seen), default=0) <= 0.4
     light = tracer.picture(tracer.position(0, 0), 0, 16)
     assert 0.02 < np.median(light) < 0.6
     assert (light.max(axis=2) > 1).mean() < 0.08

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_worlds import ball, bar, room, taking
 
-from sepi.extensions.rendered.render_file import read_render
+from sepi.extensions.rendered.render_file import masks_in, read_render
 from sepi.extensions.rendered.rendering import render_world
 from sepi.extensions.rendered.sampling import alike_light
 from sepi.extensions.rendered.tracing import Tracer
@@ -96,7 +96,7 @@ def test_noise_falls_and_the_picture_stays(tmp_path: object) -> None:
     tracer = Tracer(world, rig)
     at = tracer.position(0, 0)
     truth, raw = tracer.picture(at, 1, 256), tracer.picture(at, 12, 16)
-    masks = render.masks_of(render.centre)
+    masks = masks_in(render.masks[render.centre])
     shown = render.views[render.centre].astype(np.float32)
     walls = (masks["textured"] | masks["textureless"]) & ~masks["discontinuities"] & ~masks["mirror"]
 

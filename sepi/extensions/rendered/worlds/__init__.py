@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import importlib
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from sepi.extensions.rendered.world import World
 from sepi.validation import require_known
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """A path-traced scene.
 
     Attributes
@@ -21,11 +20,14 @@ class Entry:
         Difficulty that it poses.
     for_choosing : bool
         Whether parameters may be chosen on it; other scenes are held out to evaluate the choice.
+    fine : bool
+        Whether it is meant to have regular texture of more than 0.4 cycles per pixel at 512 pixels.
     """
 
     description: str
     tests: str
     for_choosing: bool
+    fine: bool = False
 
 
 RENDERED: dict[str, Entry] = {
@@ -36,11 +38,12 @@ RENDERED: dict[str, Entry] = {
     "floor": Entry("chairs and pots on a polished floor", "reflections that move against the surface", True),
     "chrome": Entry("a plane mirror, chrome and brass", "surfaces that show nothing but others", False),
     "glass": Entry("panes, a bottle and tumblers before posters", "two depths in each pixel", False),
-    "cloth": Entry("curtains and a table cloth", "folds, faint texture, soft shading", True),
+    "cloth": Entry("curtains and a table cloth", "folds, faint texture, soft shading", True, fine=True),
     "bust": Entry("a stone head and vases", "strong curvature, outlines that turn away", True),
-    "windows": Entry("house fronts with rows of windows and awnings", "repetition by whole periods", False),
-    "landscape": Entry("hills, houses and trees far away", "disparities within a pixel", True),
+    "windows": Entry("house fronts with rows of windows and awnings", "repetition by whole periods", False, fine=True),
+    "landscape": Entry("hills, houses and trees far away", "disparities within a pixel", True, fine=True),
     "dim": Entry("a workshop by the light of one lamp", "a tenth of the light: noise in the shadows", False),
+    "houses": Entry("houses and wires before a bare sky", "stripes and checks of 3 to 12 pixels", True),
 }
 """The path-traced scenes in their order."""
 

@@ -4,17 +4,17 @@ What they show is there: the table and its things, a bookcase behind the cameras
 which is a panorama and gives all the light.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 
-from sepi.extensions.rendered import patterns, shapes, staging
-from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Paths, Pattern, Thing, Vector, World
+from sepi.extensions.rendered import patterns, shapes
+from sepi.extensions.rendered.shapes import ball, box, moved, thing, turned_body, wall
+from sepi.extensions.rendered.staging import fruit, profile, vessel
+from sepi.extensions.rendered.world import Cameras, Light, Material, Mesh, Pattern, Things, Vector, World
 
 TABLE, WALL = 0.3, 2.3
 CHROME, SILVER = Material(kind="mirror", metal="Cr"), Material(kind="mirror", metal="Ag")
-_QUINCE = Material(patterns.noise(21, (0.66, 0.62, 0.24), 0.03, 0.12, finest=3))
+_QUINCE = Material(patterns.noise(21, (0.66, 0.62, 0.24), 0.03, 0.12, (3, 256)))
 GILT = Material(kind="mirror", metal="Au", roughness=0.22)
 # place of the mirror, its turn (leaning, to the left), width and height
 _MIRROR = ((-0.18, TABLE - 0.035, 1.95), (-0.04, 0.13, 0.0), 0.46, 0.6)
@@ -28,83 +28,79 @@ _CUP = [(0.045, 0.07), (0.047, 0.068), (0.044, 0.04), (0.03, 0.01), (0.026, 0.0)
 
 
 def world() -> World:
-    inlay = Material(patterns.tiles(1, 0.44, 8, (0.74, 0.58, 0.4), (0.4, 0.25, 0.16)))
-    lacquer = Material(patterns.noise(11, (0.5, 0.07, 0.05), 0.05, 0.2, finest=3, coarsest=60), "glossy")
-    things = [
-        Thing(shapes.box((0, TABLE + 0.03, 1.65), (3.4, 0.06, 1.3)), inlay),
-        Thing(shapes.rectangle((-2.5, -2, WALL), (5, 0, 0), (0, 3, 0)), Material(_wallpaper())),
-        Thing(_plane(), SILVER),
-        Thing(_frame(), GILT),
-        *(Thing(shapes.ball((x, TABLE - radius, z), radius), CHROME) for x, z, radius in _BALLS),
-        Thing(staging.vessel(_VASE, 0.004, (0.44, TABLE, 1.78)), Material(kind="mirror", metal="Au", roughness=0.07)),
-        Thing(shapes.box((-0.42, TABLE - 0.05, 1.42), (0.24, 0.1, 0.17), (0, 0.35, 0)), lacquer),
-        Thing(shapes.box((-0.42, TABLE - 0.112, 1.42), (0.25, 0.02, 0.18), (0, 0.35, 0)), lacquer),
-        Thing(staging.vessel(_CUP, 0.003, (0.3, TABLE, 1.47)), Material(_china(), "glossy")),
-        *(Thing(staging.fruit((x, TABLE - 0.033, z), 0.036, n), _QUINCE) for n, (x, z) in enumerate(_QUINCES)),
-        *_books((0.43, TABLE, 1.4), 31, [0.024, 0.03, 0.018]),
-        *_bookcase(),
-        *_porthole((0.34, -0.3, WALL - 0.02)),
-    ]
-    for x, z in ((0.26, 1.92), (0.17, 2.02)):
-        things.append(Thing(shapes.turned_body(staging.profile(_STICK), (x, TABLE, z)), CHROME))
-        candle = [(0.0005, 0.42), (0.008, 0.418), (0.0105, 0.41), (0.0105, 0.25)]
-        things.append(Thing(shapes.turned_body(staging.profile(candle), (x, TABLE, z)), Material((0.9, 0.86, 0.76))))
-    light = Light(sky=_room(), exposure=1.65)
-    return World(things, Cameras(1.0, WALL, 2.0, -1.8, 38), light, Paths(6, 4, 0.55))
+    things = [*_console(), *_books((0.43, TABLE, 1.4), 31, [0.024, 0.03, 0.018]), *_bookcase()]
+    things += [*_porthole((0.34, -0.3, WALL - 0.02)), *_candles()]
+    light = Light(sky=_room(), exposure=1.65, depth=6, roulette=4, gloss=0.55)
+    return World(things, Cameras(1.0, WALL, 2.0, -1.8, 38), light)
 
 
-def _plane() -> Mesh:
+def _console() -> Things:
     foot, turn, width, height = _MIRROR
-    return shapes.moved(shapes.rectangle((-width / 2, -height, 0), (width, 0, 0), (0, height, 0)), turn, foot)
-
-
-def _frame() -> Mesh:
-    """A moulding of two steps round the mirror."""
-    foot, turn, width, height = _MIRROR
+    inlay = patterns.tiles(1, 0.44, 8, (0.74, 0.58, 0.4), (0.4, 0.25, 0.16))
+    yield thing(box((0, TABLE + 0.03, 1.65), (3.4, 0.06, 1.3)), inlay)
+    yield thing(wall((-2.5, -2, WALL), 5, 3), _wallpaper())
+    yield thing(moved(wall((-width / 2, -height, 0), width, height), turn, foot), SILVER)
+    # a moulding of two steps
     bars = []
     for bar, depth, out in ((0.05, 0.03, 0.02), (0.018, 0.045, 0.0)):
-        for x in (-width / 2 - out, width / 2 + out):
-            bars.append(shapes.box((x, -height / 2, 0), (bar, height + bar, depth)))
-        for y in (-height - out, out):
-            bars.append(shapes.box((0, y, 0), (width + bar, bar, depth)))
-    return shapes.moved(shapes.joined(bars), turn, foot)
+        bars += [box((x, -height / 2, 0), (bar, height + bar, depth)) for x in (-width / 2 - out, width / 2 + out)]
+        bars += [box((0, y, 0), (width + bar, bar, depth)) for y in (-height - out, out)]
+    yield thing(moved(bars, turn, foot), GILT)
+    for x, z, radius in _BALLS:
+        yield thing(ball((x, TABLE - radius, z), radius), CHROME)
+    yield thing(vessel(_VASE, 0.004, (0.44, TABLE, 1.78)), Material(kind="mirror", metal="Au", roughness=0.07))
+    lacquer = Material(patterns.noise(11, (0.5, 0.07, 0.05), 0.05, 0.2, (3, 60)), "glossy")
+    yield thing(box((-0.42, TABLE - 0.05, 1.42), (0.24, 0.1, 0.17), (0, 0.35, 0)), lacquer)
+    yield thing(box((-0.42, TABLE - 0.112, 1.42), (0.25, 0.02, 0.18), (0, 0.35, 0)), lacquer)
+    yield thing(vessel(_CUP, 0.003, (0.3, TABLE, 1.47)), Material(_china(), "glossy"))
+    for number, (x, z) in enumerate(_QUINCES):
+        yield thing(fruit((x, TABLE - 0.033, z), 0.036, number), _QUINCE)
 
 
-def _porthole(centre: Vector) -> list[Thing]:
+def _candles() -> Things:
+    candle = [(0.0005, 0.42), (0.008, 0.418), (0.0105, 0.41), (0.0105, 0.25)]
+    for x, z in ((0.26, 1.92), (0.17, 2.02)):
+        yield thing(turned_body(profile(_STICK), (x, TABLE, z)), CHROME)
+        yield thing(turned_body(profile(candle), (x, TABLE, z)), (0.9, 0.86, 0.76))
+
+
+def _porthole(centre: Vector) -> Things:
     """A round mirror that bulges, on the wall."""
-    cap = staging.profile([(0.0005, 0.035), (0.05, 0.03), (0.1, 0.014), (0.13, 0.0)])
-    bulge = shapes.moved(shapes.turned_body(cap, (0, 0, 0)), (np.pi / 2, 0, 0), centre)
+    cap = profile([(0.0005, 0.035), (0.05, 0.03), (0.1, 0.014), (0.13, 0.0)])
+    yield thing(moved(turned_body(cap, (0, 0, 0)), (np.pi / 2, 0, 0), centre), SILVER)
     turn = np.linspace(0, 2 * np.pi, 97)
     ring = np.array(centre) + 0.135 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], 1)
-    return [Thing(bulge, SILVER), Thing(shapes.tube(ring, 0.016), GILT)]
+    yield thing(shapes.tube(ring, 0.016), GILT)
 
 
-def _books(foot: Vector, seed: int, heights: list[float]) -> list[Thing]:
+def _books(foot: Vector, seed: int, heights: list[float]) -> Things:
     """A pile that lies on the table."""
-    rng, y, found = np.random.default_rng(seed), foot[1], []
+    rng, y = np.random.default_rng(seed), foot[1]
     for number, height in enumerate(heights):
-        colour = patterns.noise(seed + 4 * number, tuple(rng.uniform(0.15, 0.5, 3)), 0.04, 0.15, finest=3)
-        body = shapes.box((foot[0], y - height / 2, foot[2]), (0.2, height, 0.14), (0, rng.uniform(-0.4, 0.4), 0))
-        found.append(Thing(body, Material(colour)))
+        colour = patterns.noise(seed + 4 * number, rng.uniform(0.15, 0.5, 3), 0.04, 0.15, (3, 256))
+        yield thing(
+            box((foot[0], y - height / 2, foot[2]), (0.2, height, 0.14), (0, rng.uniform(-0.4, 0.4), 0)), colour
+        )
         y -= height
-    return found
 
 
-def _bookcase() -> list[Thing]:
+def _bookcase() -> Things:
     """Behind the cameras: only mirrors show it."""
-    rng, spines = np.random.default_rng(5), []
-    colours = [(0.5, 0.16, 0.12), (0.16, 0.3, 0.24), (0.18, 0.2, 0.36), (0.62, 0.52, 0.34)]
-    groups: list[list[Mesh]] = [[] for _ in colours]
+    rng, shelves = np.random.default_rng(5), []
+    books: list[list[Mesh]] = [[], [], [], []]
     for shelf in (-1.0, -0.6, -0.2, 0.2, 0.6):
-        spines.append(shapes.box((-0.9, shelf + 0.02, -1.7), (3.2, 0.03, 0.3)))
+        shelves.append(box((-0.9, shelf + 0.02, -1.7), (3.2, 0.03, 0.3)))
         x = -2.5
         while x < 0.7:
             width, height = rng.uniform(0.02, 0.06), rng.uniform(0.2, 0.34)
-            groups[rng.integers(4)].append(shapes.box((x, shelf - height / 2, -1.7), (width, height, 0.22)))
+            books[rng.integers(4)].append(box((x, shelf - height / 2, -1.7), (width, height, 0.22)))
             x += width + 0.003 + 0.1 * (rng.random() < 0.06)
     oak = Material(patterns.wood(41, 0.6))
-    found = [Thing(shapes.joined(spines), oak), Thing(shapes.box((-0.9, -0.2, -1.86), (3.2, 1.9, 0.02)), oak)]
-    return found + [Thing(shapes.joined(g), Material(c)) for g, c in zip(groups, colours, strict=True)]
+    yield thing(shelves, oak)
+    yield thing(box((-0.9, -0.2, -1.86), (3.2, 1.9, 0.02)), oak)
+    colours = [(0.5, 0.16, 0.12), (0.16, 0.3, 0.24), (0.18, 0.2, 0.36), (0.62, 0.52, 0.34)]
+    for spines, colour in zip(books, colours, strict=True):
+        yield thing(spines, colour)
 
 
 def _wallpaper() -> Pattern:

@@ -4,60 +4,46 @@ All cloth is a sheet bent by formula: a hanging one has folds that are gathered 
 hem, the table's falls from the rim in flutes that deepen.
 """
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
-import numpy.typing as npt
 
-from sepi.extensions.rendered import patterns, shapes
-from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Paths, Thing, Vector, World
+from sepi.extensions.rendered import patterns
+from sepi.extensions.rendered.patterns import linen, noise, plaid
+from sepi.extensions.rendered.shapes import Points, ground, moved, raster, rectangle, sheet, thing, tube, wall
+from sepi.extensions.rendered.world import Cameras, Lamp, Light, Mesh, Things, Vector, World
 
-Array = npt.NDArray[np.float64]
 FLOOR, TABLE = 1.0, 0.26
 
 
 def world() -> World:
     """By daylight from a wide window on the left."""
-    blue = Material(patterns.linen(1, 1.0, (0.56, 0.63, 0.68), 0.05))
-    cream = Material(patterns.plaid(11, 0.9, (0.84, 0.8, 0.7), (0.72, 0.6, 0.5), 5, 0.35))
-    wool = Material(patterns.plaid(21, 0.8, (0.55, 0.5, 0.34), (0.3, 0.36, 0.3), 4, 0.8))
-    velvet = Material(patterns.noise(31, (0.55, 0.2, 0.17), 0.022, 0.7, finest=4, coarsest=80))
-    sheets = [(0.86, 0.84, 0.8), (0.62, 0.68, 0.6), (0.78, 0.66, 0.56), (0.86, 0.85, 0.83)]
-    planks = Material(patterns.wood(41, 1.1, (0.56, 0.42, 0.29), (0.38, 0.26, 0.17)))
-    beech = Material(patterns.wood(51, 0.4))
-    rug = Material(patterns.weave(61, 0.9, (0.5, 0.42, 0.4), 0.14))
     lamp = Lamp((-3.0, -1.2, 0.4), (0, 0, 1.6), (0.9, -1.3, 0), (13.0, 12.5, 11.8))
-    things = [
-        Thing(_curtain(), blue),
-        Thing(shapes.rectangle((-3, -2.5, 3.55), (6, 0, 0), (0, 4, 0)), Material((0.8, 0.78, 0.72))),
-        Thing(shapes.rectangle((-3, FLOOR, 0.5), (6, 0, 0), (0, 0, 3.2)), planks),
-        Thing(shapes.rectangle((-0.95, FLOOR - 0.012, 1.6), (2.0, 0, 0.1), (-0.07, 0, 1.35)), rug),
-        Thing(_table_cloth((0.16, TABLE, 2.6), 0.46), cream),
-        Thing(_tied((0.83, 0.4, 1.98)), velvet),
-        Thing(_blanket((-0.72, -0.1, 2.45)), wool),
-        Thing(_rack((-0.72, -0.1, 2.45)), beech),
-        *(
-            Thing(
-                _folded((0.32 + 0.008 * (n % 2), TABLE - 0.032 - 0.06 * n, 2.58), n),
-                Material(patterns.linen(70 + 3 * n, 0.6, c)),
-            )
-            for n, c in enumerate(sheets)
-        ),
-        Thing(_crumpled((-0.07, TABLE - 0.003, 2.42)), Material(patterns.linen(91, 0.6, (0.8, 0.74, 0.72), 0.05))),
-    ]
-    light = Light(sky=(0.26, 0.27, 0.29), lamps=[lamp], exposure=2.0)
-    return World(things, Cameras(1.85, 3.5, 1.9, -1.7, 46), light, Paths(4))
+    light = Light(sky=(0.26, 0.27, 0.29), lamps=[lamp], exposure=2.0, depth=4)
+    return World([*_things()], Cameras(1.85, 3.5, 1.9, -1.7, 46), light)
 
 
-def _waves(along: Array, seed: int, period: float) -> Array:
+def _things() -> Things:
+    rug = rectangle((-0.95, FLOOR - 0.012, 1.6), (2.0, 0, 0.1), (-0.07, 0, 1.35))
+    yield thing(_curtain(), linen(1, 1.0, (0.56, 0.63, 0.68), 0.05))
+    yield thing(wall((-3, -2.5, 3.55), 6, 4), (0.8, 0.78, 0.72))
+    yield thing(ground((-3, FLOOR, 0.5), 6, 3.2), patterns.wood(41, 1.1, (0.56, 0.42, 0.29), (0.38, 0.26, 0.17)))
+    yield thing(rug, patterns.weave(61, 0.9, (0.5, 0.42, 0.4), 0.14))
+    yield thing(_table_cloth((0.16, TABLE, 2.6), 0.46), plaid(11, 0.9, (0.84, 0.8, 0.7), (0.72, 0.6, 0.5), 5, 0.35))
+    yield thing(_tied((0.83, 0.4, 1.98)), noise(31, (0.55, 0.2, 0.17), 0.022, 0.7, (4, 80)))
+    yield thing(_blanket((-0.72, -0.1, 2.45)), plaid(21, 0.8, (0.55, 0.5, 0.34), (0.3, 0.36, 0.3), 4, 0.8))
+    yield thing(_rack((-0.72, -0.1, 2.45)), patterns.wood(51, 0.4))
+    for n, colour in enumerate([(0.86, 0.84, 0.8), (0.62, 0.68, 0.6), (0.78, 0.66, 0.56), (0.86, 0.85, 0.83)]):
+        folded = _folded((0.32 + 0.008 * (n % 2), TABLE - 0.032 - 0.06 * n, 2.58), n)
+        yield thing(folded, linen(70 + 3 * n, 0.6, colour))
+    yield thing(_crumpled((-0.07, TABLE - 0.003, 2.42)), linen(91, 0.6, (0.8, 0.74, 0.72), 0.05))
+
+
+def _waves(along: Points, seed: int, period: float) -> Points:
     """Phase of folds that are not all as wide."""
     rng = np.random.default_rng(seed)
-    found: Array = 2 * np.pi * along / period
+    found = 2 * np.pi * along / period
     for factor in (3.1, 5.3, 9.7):
         found = found + 0.22 * factor * np.sin(along * 2 * np.pi / (period * factor) + rng.uniform(0, 6))
-    return found
+    return np.asarray(found)
 
 
 def _curtain() -> Mesh:
@@ -67,7 +53,7 @@ def _curtain() -> Mesh:
     depth = 0.035 + 0.03 * down + 0.012 * np.sin(1.7 * along + 4 * down)
     x = along - 0.02 * np.sin(2 * phase)
     z = 3.3 + depth * (np.cos(phase) + 0.18 * np.cos(2 * phase + 1.5 * down)) + 0.01 * np.sin(5 * along + 6 * down)
-    return shapes.sheet(np.stack(np.broadcast_arrays(x, -1.9 + 2.88 * down, z), -1))
+    return sheet(raster(x, -1.9 + 2.88 * down, z))
 
 
 def _tied(tie: Vector) -> Mesh:
@@ -79,7 +65,7 @@ def _tied(tie: Vector) -> Mesh:
     phase = _waves(1.5 * along, 8, 0.21)
     x = centre + half * (2 * along - 1) - 0.12 * half * np.sin(2 * phase)
     z = tie[2] + (0.03 + 0.035 * np.minimum(half / 0.2, 1)) * np.cos(phase + 0.5 * above)
-    return shapes.sheet(np.stack(np.broadcast_arrays(x, y, z), -1))
+    return sheet(raster(x, y, z))
 
 
 def _table_cloth(centre: Vector, radius: float) -> Mesh:
@@ -92,10 +78,10 @@ def _table_cloth(centre: Vector, radius: float) -> Mesh:
     out = np.minimum(length, radius) + bend + depth * (0.5 + np.cos(flute)) + 0.01 * np.cos(2 * flute) * fall
     turn = angle + 0.35 * depth / radius * np.sin(2 * flute)
     drop = np.maximum(fall - 0.008, 0) * (0.97 - 0.03 * np.cos(flute))
-    points = np.stack(np.broadcast_arrays(out * np.cos(turn), drop, -out * np.sin(turn)), -1)
-    mesh = shapes.sheet(points + np.array(centre))
-    laid = np.stack(np.broadcast_arrays(length * np.cos(angle), length * np.sin(angle)), -1).reshape(-1, 2)
-    return replace(mesh, uv=laid.astype(np.float32))
+    points = raster(out * np.cos(turn), drop, -out * np.sin(turn))
+    mesh = sheet(points + np.array(centre))
+    laid = raster(length * np.cos(angle), length * np.sin(angle)).reshape(-1, 2)
+    return mesh._replace(uv=laid.astype(np.float32))
 
 
 def _blanket(bar: Vector) -> Mesh:
@@ -107,17 +93,15 @@ def _blanket(bar: Vector) -> Mesh:
     z = -0.022 * np.sin(curve) - np.sign(length) * hang * 0.06 + 0.05 * hang * np.cos(phase) / (0.3 + hang)
     y = -0.022 * np.cos(curve) + hang * (1 + 0.015 * np.sin(5 * along))
     x = along * (1 - 0.07 * hang) - 0.012 * np.sin(2 * phase) * np.minimum(hang / 0.3, 1)
-    mesh = shapes.sheet(np.stack(np.broadcast_arrays(x, y, z), -1))
-    return shapes.moved(mesh, (0, 0.3, 0), bar)
+    mesh = sheet(raster(x, y, z))
+    return moved(mesh, (0, 0.3, 0), bar)
 
 
 def _rack(bar: Vector) -> Mesh:
     """Two frames of round wood with a bar between."""
-    bars = [shapes.tube(np.array([[-0.38, 0, 0], [0.38, 0, 0]]), 0.016)]
-    for side in (-0.36, 0.36):
-        for foot in (-0.2, 0.2):
-            bars.append(shapes.tube(np.array([[side, -0.03, -foot * 0.03], [side, FLOOR - bar[1], foot]]), 0.014))
-    return shapes.moved(shapes.joined(bars), (0, 0.3, 0), bar)
+    pairs = [(side, foot) for side in (-0.36, 0.36) for foot in (-0.2, 0.2)]
+    legs = [tube([[side, -0.03, -foot * 0.03], [side, FLOOR - bar[1], foot]], 0.014) for side, foot in pairs]
+    return moved([tube([[-0.38, 0, 0], [0.38, 0, 0]], 0.016), *legs], (0, 0.3, 0), bar)
 
 
 def _folded(centre: Vector, number: int) -> Mesh:
@@ -127,8 +111,8 @@ def _folded(centre: Vector, number: int) -> Mesh:
     end = (1 - np.abs(along) ** 14) ** 0.3
     z = 0.13 * np.sign(c) * np.abs(c) ** 0.25 * (1 - 0.035 * np.abs(np.cos(2 * np.pi * (s + 1))) * np.abs(c))
     y = 0.031 * np.sign(s) * np.abs(s) ** 0.45 * end + 0.003 * np.sin(6 * along + number) * s
-    points = np.stack(np.broadcast_arrays(0.17 * along, y, z * (0.97 + 0.03 * end)), -1)
-    return shapes.moved(shapes.sheet(points), (0, 0.25 - 0.09 * (number % 3), 0), centre)
+    points = raster(0.17 * along, y, z * (0.97 + 0.03 * end))
+    return moved(sheet(points), (0, 0.25 - 0.09 * (number % 3), 0), centre)
 
 
 def _crumpled(centre: Vector) -> Mesh:
@@ -138,4 +122,4 @@ def _crumpled(centre: Vector) -> Mesh:
     round_ = np.hypot(u + 0.12 * patterns.field(103, 40, 120, 128), v + 0.12 * patterns.field(104, 40, 120, 128))
     height = 0.075 * np.clip(1.15 - round_, 0, 1) * (0.6 + 0.5 * (1.3 - relief))
     points = np.stack([0.17 * u + 0.01 * relief, -np.maximum(height, 0), 0.13 * v], -1)
-    return shapes.moved(shapes.sheet(points), (0, 0.4, 0), centre)
+    return moved(sheet(points), (0, 0.4, 0), centre)

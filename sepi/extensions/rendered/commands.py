@@ -1,4 +1,4 @@
-"""The command ``sepi scenes`` with ``--rendered``."""
+"""The command ``sepi scenes`` with ``--rendered``, and the workflow's command that renders a scene into a file."""
 
 from __future__ import annotations
 
@@ -20,19 +20,12 @@ from sepi.extensions.rendered.rendering import RenderOptions, made_by, render_wo
 from sepi.extensions.rendered.tracing import require_mitsuba
 from sepi.extensions.rendered.worlds import RENDERED, world_of
 from sepi.process.command import SepiCommand, progress_bar
+from sepi.process.threads import use_threads
 from sepi.scenes.folder import write_hci
 from sepi.validation import require_known, settings_of
 from sepi.validation.models import validated
 from sepi.workflow.rendered_scenes import NOISE_LEVELS, WITHOUT_NOISE, exposed_name
 
-_TEXT = """
-Scenes of --rendered are path-traced, with plain walls, gloss, mirrors and glass, of 512 pixels unless --size says
-otherwise; a file NAME.h5 beside the folder has their light, and disparity, normals and masks of every view.
-
-\b
-Example:
-  sepi scenes --rendered sticks --size 256 --samples 16 --noise off --noise low
-"""
 _FLAGS = (
     click.Option(["--rendered"], is_flag=True, help="Path-traced scenes (Mitsuba 3, extra [render]); minutes each."),
     click.Option(["--samples"], type=click.IntRange(min=1), help="With --rendered: paths for each pixel; default: 64."),
@@ -59,6 +52,15 @@ def extended(command: SepiCommand) -> SepiCommand:
 
     @click.pass_context
     def scenes(context: click.Context, /, rendered: bool, **given: Any) -> None:
+        """Scenes of --rendered are path-traced, with plain walls, gloss, mirrors and glass.
+
+        They have 512 pixels unless --size says otherwise; a file NAME.h5 beside the folder has their light, and
+        disparity, normals and masks of every view.
+
+        \b
+        Example:
+          sepi scenes --rendered sticks --size 256 --samples 16 --noise off --noise low
+        """
         own = {flag.name: given.pop(flag.name) for flag in _FLAGS if flag.name in given}
         if not rendered:
             for flag in (flag for flag in _FLAGS if own.get(flag.name)):
@@ -75,7 +77,7 @@ def extended(command: SepiCommand) -> SepiCommand:
             levels = dict.fromkeys(own["levels"] or (WITHOUT_NOISE,))
             _write_rendered(given["names"], given["output"], values, levels, own["all_views"])
 
-    help_text = f"{cleandoc(command.help or '')}\n{_TEXT}"
+    help_text = f"{cleandoc(command.help or '')}\n\n{cleandoc(scenes.__doc__ or '')}"
     return SepiCommand(command.name, params=[*command.params, *_FLAGS], callback=scenes, help=help_text)
 
 
@@ -87,25 +89,25 @@ def _write_rendered(
     of_sensor = {key: settings.pop(key) for key in Exposure.model_fields if key in settings}
     options = validated(RenderOptions, settings, "--set")
     exposures = [validated(Exposure, {"noise": level, **of_sensor}, "--set") for level in levels]
-    folders = {
-        name: [(output / exposed_name(name, one.noise, one.noise_seed), one) for one in exposures]
-        for name in dict.fromkeys(names or RENDERED)
-    }
-    require_new(output, (folder.name for of_name in folders.values() for folder, _ in of_name))
+    paths = {name: output / f"{name}.h5" for name in names or RENDERED}
+    require_new(output, (exposed_name(name, one.noise, one.noise_seed) for name in paths for one in exposures))
     require_mitsuba()
-    paths = {name: output / f"{name}.h5" for name in folders}
     # before anything is rendered, which takes minutes
     for name, path in paths.items():
         if path.is_file():
             _known(name, options, path)
-    for name, of_name in folders.items():
-        if not paths[name].is_file():
-            with progress_bar(name) as progress:
-                render_world(name, world_of(name), options, paths[name], progress)
-        render = _known(name, options, paths[name])
-        for folder, exposure in of_name:
-            _write_folder(render, exposure, folder, all_views)
-            click.echo(f"written: {folder}/")
+    for name, path in paths.items():
+        if not path.is_file():
+            _render(name, options, path)
+        render = _known(name, options, path)
+        for exposure in exposures:
+            _write_folder(render, exposure, output, all_views)
+
+
+def _render(name: str, options: RenderOptions, path: Path) -> None:
+    require_mitsuba()
+    with progress_bar(name) as progress:
+        render_world(name, world_of(name), options, path, progress)
 
 
 def _known(name: str, options: RenderOptions, path: Path) -> Render:
@@ -116,11 +118,28 @@ def _known(name: str, options: RenderOptions, path: Path) -> Render:
     return render
 
 
-def _write_folder(render: Render, exposure: Exposure, folder: Path, all_views: bool) -> None:
+def _write_folder(render: Render, exposure: Exposure, output: Path, all_views: bool) -> None:
     light_field = exposed(render, exposure)
     camera = camera_from(**render.settings, shape=light_field.shape, crop_of=None)
     maps = {"gt_depth_lowres": camera.depth(render.disparity[render.centre])}
     if all_views:
         views = render.disparity.reshape(-1, *light_field.shape)
         maps |= {f"gt_disp_lowres_Cam{number:03d}": np.ascontiguousarray(view) for number, view in enumerate(views)}
-    write_hci(light_field, folder, render.settings, maps)
+    write_hci(light_field, output / light_field.name, render.settings, maps)
+    click.echo(f"written: {output / light_field.name}/")
+
+
+@click.command(name="python -m sepi.extensions.rendered.commands", cls=SepiCommand)
+@click.argument("name")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Options of rendering.")
+@click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
+@click.option("--output", type=click.Path(path_type=Path), required=True, help="HDF5 file to write.")
+def main(name: str, settings: tuple[str, ...], threads: int, output: Path) -> None:
+    """Render the scene NAME; an interrupted run keeps finished views."""
+    options = validated(RenderOptions, settings_of(settings, "lens=0.5"), "rendered")
+    use_threads(threads)
+    _render(name, options, output)
+
+
+if __name__ == "__main__":
+    main()
