@@ -45,9 +45,8 @@ class _Imported(Known[Any]):
         return [(name, super(_Imported, self).__getitem__(name)[1]) for name in sorted(self)]
 
 
-_COMMANDS = _Imported(
-    "commands", {name: (f"{__package__}.{module}", text) for name, (module, text) in _MODULES.items()}
-)
+_PLACES = {name: (f"{__package__}.{module}", text) for name, (module, text) in _MODULES.items()}
+_COMMANDS = _Imported("commands", _PLACES)
 
 
 class _Commands(SepiGroup):
@@ -62,27 +61,8 @@ class _Commands(SepiGroup):
             return super().get_command(ctx, cmd_name)
 
 
-def _tell_version(context: click.Context, _: click.Parameter, asked: bool) -> None:
-    if asked and not context.resilient_parsing:
-        from sepi import __version__
-
-        click.echo(f"{context.find_root().info_name} {__version__}")
-        context.exit()
-
-
-@click.group(
-    cls=_Commands,
-    commands=_COMMANDS,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-@click.option(
-    "--version",
-    is_flag=True,
-    is_eager=True,
-    expose_value=False,
-    callback=_tell_version,
-    help="Show the version and exit.",
-)
+@click.group(cls=_Commands, commands=_COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="sepi", message="%(prog)s %(version)s")
 def main() -> None:
     """Depth from light fields by stitched epipolar plane images.
 

@@ -28,7 +28,6 @@ from sepi.lightfield import FloatMap
 from sepi.regularization.multilevel import MARGIN
 
 FloatArray = npt.NDArray[np.floating]
-
 # along x, along y and mixed: rows and columns of the pixels of a difference, and their factors
 _DIFFERENCES = (
     (((0, 0), (0, 1), (0, 2)), (1.0, -2.0, 1.0)),

@@ -33,14 +33,7 @@ ENTRIES: dict[str, dict[str, Any]] = {
     "fast": {
         "initial": {"choice": "semi_global", "first_views": 9, "first_sampling": 3},
         # in a single pass, the mean reference takes a tenth longer and gains next to nothing
-        "occlusion": {
-            "choice": "visibility",
-            "passes": 1,
-            "views": 25,
-            "sampling": 2,
-            "mean_noise": 1,
-            "share_views": 27,
-        },
+        "occlusion": {"choice": "visibility", "passes": 1, "views": 25, "sampling": 2, "mean_noise": 1},
         "textureless": {"choice": "uniform_planes", "views": 9},
         # with so few views, faint detail in noise does more harm than good
         "optimize": {"choice": "second_order", "views": 25, "solves": 1, "least_noise": 0},

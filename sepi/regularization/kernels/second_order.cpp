@@ -4,11 +4,7 @@
 // Nodes of the finest level lie SPACING apart, from as far before the first pixel to behind the last one, so that mirrored
 // pictures take mirrored steps. A coarser level has every other node; each of its hats is one of the finer level plus half
 // of each neighbour. Sums add rows in order, so that all numbers of threads give the same bits. Number is float or double.
-#include <cmath>
-
-#include "kernels/arguments.hpp"
-#include "kernels/exponential.hpp"
-#include "kernels/parallel.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::second_order {
 namespace {
@@ -218,21 +214,20 @@ void diagonal_of_hats(Array<const Number, 3> stencil, Index spacing, Array<Numbe
 
 // The kernels of the second-order smoothing that work in single or double precision.
 template <class Number>
-void bind_of_numbers(nb::module_ &m) {
-    m.def("bend", &bend<Number>, Unlocked(), "stencil"_a, "ahead"_a, "share"_a, "direction"_a, "out"_a);
-    m.def("step", &step<Number>, Unlocked(), "length"_a, "direction"_a, "bent"_a, "solution"_a, "residual"_a);
-    m.def("diagonal_of_hats", &diagonal_of_hats<Number>, Unlocked(), "stencil"_a, "spacing"_a, "out"_a);
-    m.def("onto_finest", &onto_finest<Number>, Unlocked(), "vector"_a, "out"_a);
-    m.def("onto_coarser", &onto_coarser<Number>, Unlocked(), "fine"_a, "out"_a);
-    m.def("onto_finer", &onto_finer<Number>, Unlocked(), "coarse"_a, "inverse"_a, "fine"_a);
-    m.def("diagonal_and_finest", &diagonal_and_finest<Number>, Unlocked(), "inverse"_a, "vector"_a, "fine"_a, "out"_a);
+void bind_of_numbers(Kernels &m) {
+    m.def("bend", &bend<Number>);
+    m.def("step", &step<Number>);
+    m.def("diagonal_of_hats", &diagonal_of_hats<Number>);
+    m.def("onto_finest", &onto_finest<Number>);
+    m.def("onto_coarser", &onto_coarser<Number>);
+    m.def("onto_finer", &onto_finer<Number>);
+    m.def("diagonal_and_finest", &diagonal_and_finest<Number>);
 }
 
-const Submodule submodule("second_order", [](nb::module_ &m) {
+const Submodule submodule("second_order", [](Kernels &m) {
     m.attr("MARGIN") = MARGIN;
     m.attr("SPACING") = SPACING;
-    m.def("weights_of_differences", &weights_of_differences, Unlocked(), "disparity"_a, "reliability"_a, "colour"_a, "corners"_a,
-          "factors"_a, "threshold"_a, "variance"_a, "out"_a);
+    m.def("weights_of_differences", &weights_of_differences);
     bind_of_numbers<float>(m);
     bind_of_numbers<double>(m);
 });
