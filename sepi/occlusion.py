@@ -55,9 +55,7 @@ _PATCH = 4, 0.05, 0.3
 class OcclusionParameters(SweepParameters, CannyParameters):
     """Parameters of both occlusion models: candidates, and when a half replaces the full SEPI."""
 
-    candidate_reach: int = Field(
-        12, ge=0, le=50, description="distance from an edge within which pixels are candidates, in pixels"
-    )
+    candidate_reach: int = Field(12, ge=0, le=50, description="largest distance of a candidate from an edge, in pixels")
     gain_half: float = Field(0.015, ge=0, le=1, description="by how much a half must lower the mean cost (0..1)")
     gain_quarter: float = Field(0.03, ge=0, le=1, description="by how much a quarter must lower the mean cost (0..1)")
     min_change: float = Field(0.1, ge=0, description="least change from the depth by all views, pixels per view step")

@@ -81,9 +81,7 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     solves: int = Field(4, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
     solve_radius: int = Field(1, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
     max_update: float = Field(0.05, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
-    strength: float = Field(
-        7.0, ge=0, description="weight of the smoothness; the best-known tenth of data has weight 1"
-    )
+    strength: float = Field(7.0, ge=0, description="weight of smoothness; the best-known tenth of data has weight 1")
     second_difference_threshold: float = Field(
         0.03, gt=0, description="second difference that marks a discontinuity in the first round, pixels per view step"
     )
@@ -98,9 +96,7 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     reliable_confidence: float = Field(
         0.5, gt=0, le=1, description="confidence within two pixels from which a discontinuity in the data is trusted"
     )
-    rtol: float = Field(
-        3e-4, ge=1e-5, lt=1, description="residual at which the solver stops in the last round, relative"
-    )
+    rtol: float = Field(3e-4, ge=1e-5, lt=1, description="relative residual that ends the solver in the last round")
     first_rtol: float = Field(3e-3, ge=1e-5, lt=1, description="the same for the other rounds")
     max_iterations: int = Field(200, ge=1, description="most iterations of the solver")
 

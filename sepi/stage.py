@@ -132,9 +132,7 @@ class NoParameters(Parameters):
 class OcclusionMarginParameters(Parameters):
     """Parameters of the occlusion of a pixel in a view."""
 
-    occlusion_margin: float = Field(
-        0.15, ge=0, description="by how much an occluder must be nearer, pixels per view step"
-    )
+    occlusion_margin: float = Field(0.15, ge=0, description="how much nearer an occluder must be, pixels per view step")
 
 
 @dataclass(frozen=True)

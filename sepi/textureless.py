@@ -62,9 +62,7 @@ class LtiParameters(CannyParameters):
     )
     continuity: float = Field(0.3, ge=0, description="tau_out, weight of continuity between neighbours")
     tolerance: float = Field(0.05, gt=0, description="residual of an inlier, pixels per view step")
-    keep_confidence: float = Field(
-        0.7, ge=0, le=1, description="relative confidence from which a pixel resists a plane"
-    )
+    keep_confidence: float = Field(0.7, ge=0, le=1, description="relative confidence from which pixels resist a plane")
 
 
 def lti(

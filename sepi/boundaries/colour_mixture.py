@@ -8,8 +8,6 @@ mixtures of both is none: surfaces are darker, or of another colour, towards the
 does, and all count for less.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sepi.boundaries.parameters import BoundaryParameters

@@ -11,8 +11,6 @@ wide, and narrow gaps between them close. The pixel is near if the share exceeds
 The cost of a share is the evidence of views and colours against it, and its distance from the map's current side.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sepi.boundaries.colour_mixture import mixture_evidence

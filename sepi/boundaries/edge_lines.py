@@ -7,8 +7,6 @@ beside a step are tried, in steps of direction and offset, straight ones and one
 belongs to the surface that holds its middle according to the cheapest edge.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parameters of the decision between the two surfaces of a depth step."""
 
-from __future__ import annotations
-
 from pydantic import Field
 
 from sepi.stage import OcclusionMarginParameters
@@ -27,9 +25,7 @@ class BoundaryParameters(OcclusionMarginParameters):
         lt=1,
         description="cost of a change to the other surface, for a whole pixel, relative to the views' mean costs, 0..1",
     )
-    share_radius: int = Field(
-        2, ge=1, le=10, description="distance from the step within which shares decide, in pixels"
-    )
+    share_radius: int = Field(2, ge=1, le=10, description="distance from the step within which shares decide, pixels")
     share_scale: float = Field(
         0.2,
         gt=0,
@@ -46,7 +42,5 @@ class BoundaryParameters(OcclusionMarginParameters):
         description="squared colour difference of the two sides at which the mixture counts half, in units of their "
         "variance",
     )
-    speck_area: int = Field(
-        4, ge=0, le=100, description="largest part of the map that joins its surroundings as a speck, in pixels"
-    )
+    speck_area: int = Field(4, ge=0, le=100, description="largest speck, which joins its surroundings, in pixels")
     hole_area: int = Field(8, ge=0, le=100, description="the same where all its surroundings are nearer")

@@ -1,7 +1,5 @@
 """The pixels beside depth steps, the surfaces on both sides, and the views that are compared there."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import cv2

@@ -9,8 +9,6 @@ A surface behind a fence also shows in gaps of a few pixels. Such a gap is as de
 and stays unless views favour closing it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sepi.boundaries.parameters import BoundaryParameters

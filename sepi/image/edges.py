@@ -1,7 +1,5 @@
 """Edges of the reference view and discontinuities of a depth map."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from pydantic import Field
@@ -16,9 +14,7 @@ class CannyParameters(Parameters):
 
     canny_sigma: float = Field(1.0, gt=0, le=10, description="smoothing before the edges, in pixels")
     canny_low: float = Field(0.01, gt=0, le=1, description="least gradient along an edge, grey values 0..1 per px")
-    canny_high: float = Field(
-        0.025, gt=0, le=1, description="least gradient at which an edge starts, grey values 0..1 per px"
-    )
+    canny_high: float = Field(0.025, gt=0, le=1, description="gradient that starts an edge, grey values 0..1 per px")
 
 
 # response of the 3x3 Sobel operator to a gradient of one grey level per pixel

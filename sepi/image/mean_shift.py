@@ -11,8 +11,6 @@ References
    doi:10.1109/34.1000236
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sepi.kernels import mean_shift as kernels

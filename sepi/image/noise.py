@@ -1,7 +1,5 @@
 """Noise of the reference view, and the residuals that it causes between views of the same surface."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import numpy.typing as npt

@@ -1,7 +1,5 @@
 """Texture of a picture: by how much colours differ within one surface."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

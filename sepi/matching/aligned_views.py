@@ -9,8 +9,6 @@ No view is compared with a mean that it is part of. Its own noise would make it 
 and in strong noise every error would stay.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ sampling times that view's distance. A sweep has a *usual* number of candidates.
 finer than is of use, and more where they would be coarser than its optimisation can bridge.
 """
 
-from __future__ import annotations
-
 import math
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 

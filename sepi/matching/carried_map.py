@@ -1,7 +1,5 @@
 """A disparity map, or values of its pixels, warped to another view as surfaces; the nearest surface wins."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

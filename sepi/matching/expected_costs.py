@@ -9,8 +9,6 @@ not match has none. Without noise nothing changes. All views count as if they sa
 The paper, whose light fields have hardly any noise, does not have it.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import numpy.typing as npt

@@ -4,8 +4,6 @@ All methods compare colours of the views. A difference of a few per cent exceeds
 minimum of a cost over all views. It is the same all over a view, so small pictures are enough to measure it.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

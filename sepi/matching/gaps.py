@@ -9,8 +9,6 @@ in the views in which nothing else occludes them.
 Both depths are compared in the same views and pixels, so noise and slow colour changes count alike on either side.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from pydantic import Field
@@ -41,9 +39,7 @@ class GapParameters(OcclusionMarginParameters):
         32, ge=1, le=200, description="distance within which a farther surface of the same colour is searched, pixels"
     )
     gap_colour: float = Field(0.06, gt=0, le=2, description="largest RGB distance of the same colour, colours in 0..1")
-    gap_gain: float = Field(
-        0.5, gt=0, lt=1, description="largest squared residual at the farther depth, as a share of that before"
-    )
+    gap_gain: float = Field(0.5, gt=0, lt=1, description="share of squared residual that the farther depth may leave")
 
 
 def with_open_gaps(

@@ -14,8 +14,6 @@ a map extends a surface too far, disparity does not reveal it, but colour may: a
 box beside it still has the colours of the wall.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ as a whole. Whatever needs all views at once is computed in bands of rows (:mod:
 ones if memory is short. The results are the same. The compared methods hold everything as a whole.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from sepi.errors import SepiError

@@ -5,8 +5,6 @@ longest baseline. The arrays of the views' rows (detail, splines, z-buffers) do 
 results are the same for any number of bands.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import NamedTuple

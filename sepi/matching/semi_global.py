@@ -11,8 +11,6 @@ References
    doi:10.1109/TPAMI.2007.1166
 """
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple, Self
 
 import cv2
@@ -54,9 +52,7 @@ SmallPenalty = Annotated[
 class SmoothingParameters(Parameters):
     """Parameters of aggregation and semi-global smoothing."""
 
-    window_radius: int = Field(
-        2, ge=0, le=10, description="cost window of 2 r + 1 pixels, in pixels; wider below 25 views"
-    )
+    window_radius: int = Field(2, ge=0, le=10, description="cost window of 2 r + 1 pixels; wider below 25 views")
     window_sigma: float = Field(
         0.01, ge=1e-6, le=10, description="colour distance at which a window pixel's weight falls, colours in 0..1"
     )
@@ -112,7 +108,7 @@ class Places(NamedTuple):
     candidates: int
 
     @classmethod
-    def of_candidates(cls, first: npt.NDArray[np.int32], last: npt.NDArray[np.int32], candidates: int) -> Places:
+    def of_candidates(cls, first: npt.NDArray[np.int32], last: npt.NDArray[np.int32], candidates: int) -> Self:
         """Places of at least the candidates ``first`` to ``last``, (H, W), of each pixel."""
         step = kernels.AT_ONCE
         begin, beyond, count = first // step * step, (last // step + 1) * step, -(-candidates // step) * step

@@ -7,8 +7,6 @@ removes these frequencies. It costs detail, so only dense texture of such freque
 sharp.
 """
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Annotated, Any

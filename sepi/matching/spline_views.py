@@ -1,7 +1,5 @@
 """Cubic splines of the views, kept from stage to stage: colours are made once for planes and refinement."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -17,8 +17,6 @@ References
    Signal Processing 29(6), 1981. doi:10.1109/TASSP.1981.1163711
 """
 
-from __future__ import annotations
-
 import math
 
 import cv2

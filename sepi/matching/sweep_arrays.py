@@ -3,8 +3,6 @@
 In C++ each group is a struct of the same fields in the same order.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

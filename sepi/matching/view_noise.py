@@ -12,8 +12,6 @@ Both bounds are too high for a brightness that has texture everywhere. Photon no
 power of brightness, so a bound far above the line through the lower ones is cut down to this line.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

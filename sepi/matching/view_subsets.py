@@ -4,8 +4,6 @@ A sweep sums the costs of groups of views; a subset is a union of groups. A stra
 on one side of a line through the reference view, so halves and quarters are enough.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

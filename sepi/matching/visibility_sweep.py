@@ -81,9 +81,7 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
     first_views: int = Field(
         25, ge=2, description="least number of views for all maps but the last; spread evenly over the grid"
     )
-    first_sampling: float = Field(
-        2.0, ge=1, le=8, description="distance of their candidates, in steps of num_disparities"
-    )
+    first_sampling: float = Field(2.0, ge=1, le=8, description="distance of their candidates, steps of num_disparities")
 
     @property
     def finest_sampling(self) -> float:
@@ -99,7 +97,7 @@ class VisibleViewsParameters(VisibilitySweepParameters, GapParameters):
     """Parameters of the sweep over the views that see a pixel."""
 
     views: int = Field(41, ge=2, description="least number of views for the last map")
-    sampling: float = Field(1.0, ge=1, le=8, description="distance of its candidates, in steps of num_disparities")
+    sampling: float = Field(1.0, ge=1, le=8, description="distance of its candidates, steps of num_disparities")
     passes: int = Field(3, ge=1, le=10, description="number of times that visibility and depth are computed in turn")
     mean_noise: float = Field(
         0.02,

@@ -9,8 +9,6 @@ References
 .. [1] Fischler, Bolles: Random Sample Consensus. CACM 1981. doi:10.1145/358669.358692
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Self
@@ -71,9 +69,7 @@ class BorderPlaneParameters(Parameters):
     """Parameters of planes by borders."""
 
     tolerance: float = Field(0.05, gt=0, description="largest distance of an inlier, pixels per view step")
-    behind_penalty: float = Field(
-        2.0, ge=0, description="penalty on border pixels behind the plane, relative to inliers"
-    )
+    behind_penalty: float = Field(2.0, ge=0, description="penalty on border behind the plane, relative to inliers")
     min_inlier_ratio: float = Field(0.25, ge=0, le=1, description="least share of inliers in the border")
     ransac_iterations: int = Field(500, ge=1, description="number of planes that are tried for each region")
 

@@ -5,8 +5,6 @@ texture. So both are compared with the views: where the plane fits clearly worse
 explains, the views contradict it. The rim of a region is left out: its pixels also show what stands beside it.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

@@ -12,8 +12,6 @@ References
 .. [1] Bramble, Pasciak, Xu: Parallel multilevel preconditioners. Mathematics of Computation 1990. doi:10.2307/2008789
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from itertools import pairwise

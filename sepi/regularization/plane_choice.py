@@ -4,8 +4,6 @@ There are three sources: its border (:mod:`sepi.regularization.border_planes`), 
 (:mod:`sepi.regularization.lit_planes`), and, where noise hides faint texture, its current disparity.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import cv2

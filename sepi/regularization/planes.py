@@ -8,8 +8,6 @@ References
 .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve

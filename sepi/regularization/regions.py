@@ -1,7 +1,5 @@
 """Regions of a picture, each with its own x and y axes."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import cv2

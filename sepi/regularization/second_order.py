@@ -15,8 +15,6 @@ for the second differences along x, along y and mixed. Real weights change slowl
 pixel, so means over windows of that size replace the equal weights.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import combinations_with_replacement
 

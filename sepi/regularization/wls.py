@@ -5,8 +5,6 @@ References
 .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from pydantic import Field
@@ -25,25 +23,17 @@ MOST_ITERATIONS = 1000
 class WlsParameters(Parameters):
     """Parameters of the weighted least squares."""
 
-    alpha: float = Field(
-        3e-6, ge=0, description="weight of smoothness against data; for gradients of values 0..1 per px"
-    )
-    gradient_floor: float = Field(
-        0.002, gt=0, description="image gradient below which smoothness no longer grows, 0..1 per px"
-    )
+    alpha: float = Field(3e-6, ge=0, description="weight of smoothness against data, gradients of values 0..1 per px")
+    gradient_floor: float = Field(0.002, gt=0, description="gradient below which smoothness does not grow, 0..1 per px")
     tau_0: float = Field(1000.0, ge=0, description="how sharply the data weight falls beyond tau_1")
-    tau_1: float = Field(
-        0.2, ge=0, description="standard deviation of the depth in 3x3 pixels that marks a discontinuity"
-    )
+    tau_1: float = Field(0.2, ge=0, description="standard deviation of depth in 3x3 pixels that marks a discontinuity")
     discontinuity_weight: float = Field(
         0.1, gt=0, le=1, description="share of its weight that data keeps at a discontinuity; Eq. 9: 0"
     )
     tau_2: float = Field(1.5, ge=0, description="how strongly confidence weakens smoothness")
     textureless_confidence: float = Field(0.8, ge=0, le=1, description="c_tl, confidence of textureless regions")
     confidence_power: float = Field(4.0, gt=0, le=10, description="exponent on the confidence as data weight")
-    rtol: float = Field(
-        1e-12, gt=0, lt=1, description="relative residual at which the solver stops; small for pixels of low weight"
-    )
+    rtol: float = Field(1e-12, gt=0, lt=1, description="relative residual that ends the solver; small for low weights")
 
 
 def rectified_confidence(confidence: FloatMap, textureless: BoolMap, parameters: WlsParameters) -> FloatMap:
