@@ -55,9 +55,11 @@ class Sample:
 
 
 def light_fields(
-    scenes: Iterable[str], sigmas: Sequence[float], held_out: bool = False
+    scenes: Iterable[str], sigmas: Sequence[float], held_out: bool = False, grids: Iterable[tuple[int, int]] = ()
 ) -> Iterator[tuple[str, LightField]]:
     """Light fields and names: built-in scenes and folders with the given noise, rendered scenes at all levels.
+
+    Built-in scenes and folders also as so many rows and columns of views from the reference view on, without noise.
 
     Raises
     ------
@@ -76,6 +78,15 @@ def light_fields(
                 yield f"{light_field.name} + {sigma:g}", with_noise(light_field, sigma)
             else:
                 yield light_field.name, light_field
+        for rows, columns in grids:
+            yield f"{light_field.name} + {rows}x{columns}", _few_views(light_field, rows, columns)
+
+
+def _few_views(light_field: LightField, rows: int, columns: int) -> LightField:
+    t, s = light_field.reference_position
+    views = np.ascontiguousarray(light_field.views[t : t + rows, s : s + columns])
+    known, truth = light_field.disparity_range, light_field.ground_truth
+    return LightField(views, light_field.name, disparity_range=known, view=(0, 0), ground_truth=truth)
 
 
 def sample(light_field: LightField, name: str, variant: str, step: float = 0.0, kept: Path | None = None) -> Sample:

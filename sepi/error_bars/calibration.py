@@ -37,7 +37,7 @@ class Calibration:
 
 SECOND_ORDER = Calibration(
     scale={
-        CONSTANT: 0.347,
+        CONSTANT: 0.261,
         "deviation": 0.288,
         "second_difference": 0.346,
         "disagreement": 0.146,
@@ -48,6 +48,7 @@ SECOND_ORDER = Calibration(
         "wide_confidence": -0.787,
         "long_second_difference": 0.185,
         "range": 0.371,
+        "few_views": 0.73,
     },
     outlier_scale={
         CONSTANT: -1.365,

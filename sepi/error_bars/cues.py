@@ -57,6 +57,7 @@ FLOORS: Mapping[str, float] = {
     "detail_agreement": 0.01,
     "range": 1e-3,
     "plane": 0.1,
+    "few_views": 1.125,
 }
 """Cue to its least value; smaller values count as this one."""
 
@@ -116,7 +117,8 @@ def cues_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, n
         ``deviation`` and ``wide_deviation``: standard deviation by the information over 3x3 and 7x7 pixels; ``step``
         and ``wide_step``: change of disparity that the cost asks for, over 3x3 and 15x15 pixels; ``disagreement``:
         difference of this change between views on opposite sides; ``misfit``: residuals in units of the noise;
-        ``agreement`` and ``detail_agreement``: mean robust weight of the views by colours and by detail.
+        ``agreement`` and ``detail_agreement``: mean robust weight of the views by colours and by detail;
+        ``few_views``: number of views that see the pixel over that of their differences.
     """
     seeing, bare = _mean(evidence.seeing, 3) + _LEAST, bare_pixels(curvature)
     step = np.abs(_mean(gradient, 3) / (_mean(curvature, 3) + _LEAST))
@@ -130,6 +132,7 @@ def cues_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, n
         "misfit": np.sqrt(residual / 3) / np.float32(max(noise, _LEAST_NOISE)),
         "agreement": _mean(evidence.agreement, 3) / seeing,
         "detail_agreement": _mean(evidence.detail_agreement, 3) / seeing,
+        "few_views": 1 + 1 / np.maximum(seeing, 1),
     }
 
 

@@ -1,13 +1,16 @@
 """The numbers of the error bars make the errors likeliest, and say of other scenes what they say of these."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from bench.error_model import as_code, fitted, judged, pooled
 from bench.error_samples import Sample
 from sepi.error_bars.calibration import CONSTANT, Calibration
+from sepi.error_bars.cues import FLOORS
 
 TRUE = Calibration(
-    scale={CONSTANT: 1.0, "deviation": 0.8, "second_difference": 0.0},
+    scale={CONSTANT: 1.0, "deviation": 0.8, "second_difference": 0.0, "few_views": 0.7},
     outlier_scale={CONSTANT: -0.7},
     outlier={CONSTANT: -3.0, "confidence": -1.0},
     rim={CONSTANT: -3.0},
@@ -22,11 +25,12 @@ def drawn(name: str, seed: int, pixels: int = 20_000) -> Sample:
         "deviation": np.exp(rng.uniform(-7, -2, pixels)),
         "second_difference": np.exp(rng.uniform(-8, -2, pixels)),
         "confidence": rng.uniform(0.05, 1, pixels),
+        "few_views": rng.choice([1.02, 1.5, 2], pixels),
         "above": rng.uniform(0, 1, pixels),
         "below": np.zeros(pixels),
         "smooth_confidence": rng.uniform(0, 1, pixels),
     }
-    scale = np.exp(1.0) * cues["deviation"] ** 0.8
+    scale = np.exp(1.0) * cues["deviation"] ** 0.8 * np.maximum(cues["few_views"], FLOORS["few_views"]) ** 0.7
     odds = np.stack([np.ones(pixels), np.exp(-3.0) / cues["confidence"], np.full(pixels, np.exp(-3.0))])
     chosen = (rng.uniform(size=pixels) * odds.sum(axis=0) > np.cumsum(odds, axis=0)).sum(axis=0)
     width = np.choose(chosen, [scale, np.full(pixels, np.exp(-0.7)), 0.2 * cues["above"] + 0.01])
@@ -48,3 +52,14 @@ def test_a_fit_finds_the_numbers_that_errors_were_drawn_with() -> None:
     names = {"Calibration": Calibration, "CONSTANT": CONSTANT}
     exec(as_code("WRITTEN", found), names)
     assert names["WRITTEN"] == found
+
+
+def test_a_cue_is_added_without_moving_what_it_rests_on() -> None:
+    """Of few views alone: full light fields keep their bars to the last digit that is written."""
+    power, least = TRUE.scale["few_views"], np.log(FLOORS["few_views"])
+    before = TRUE.scale | {CONSTANT: 1.0 + power * least, "few_views": 0.0}
+    found = fitted([drawn("one", 0)], replace(TRUE, scale=before), ["few_views"])
+    assert abs(found.scale["few_views"] - power) < 0.05
+    assert abs(found.scale[CONSTANT] + (found.scale["few_views"] - power) * least - 1.0) < 0.002
+    assert all(found.scale[name] == before[name] for name in ("deviation", "second_difference"))
+    assert found.parts[1:] == TRUE.parts[1:]
