@@ -71,8 +71,9 @@ def fitted(samples: Sequence[Sample], form: Calibration, only: Collection[str] =
     bounds: list[tuple[float | None, float | None]] = [(None, None)] * sum(map(len, names))
     if only:
         start = [np.array(list(part.values())) * s for part, s in zip(form.parts, spread, strict=True)]
-        for values, m, s in zip(start, middle, spread, strict=True):
+        for values, m, s, part in zip(start, middle, spread, names, strict=True):
             values[0] += values[1:] @ (m / s)[1:]
+            values[[label in only for label in part]] = 0
         free = [label in only for part in names for label in part]
         bounds = [(0, None) if one else (value, value) for one, value in zip(free, np.concatenate(start), strict=True)]
     pulled = [np.arange(len(part)) > 0 for part in names]

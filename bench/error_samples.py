@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.noisy import with_noise
+from bench.streets import street
 from bench.sweep import scene_for_choosing
 from sepi.error_bars.bars import ErrorBars, error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
@@ -72,17 +73,19 @@ def light_fields(
                 light_field = read_scene(Path(scene), level, 1) if held_out else scene_for_choosing(scene, level)
                 yield light_field.name, light_field
             continue
-        light_field = scene_for_choosing(scene, NOISE_LEVELS[0])
+        kind, _, seed = scene.partition(":")
+        light_field = street(int(seed)) if kind == "street" else scene_for_choosing(scene, NOISE_LEVELS[0])
         for sigma in sigmas:
             if sigma:
                 yield f"{light_field.name} + {sigma:g}", with_noise(light_field, sigma)
             else:
                 yield light_field.name, light_field
         for rows, columns in grids:
-            yield f"{light_field.name} + {rows}x{columns}", _few_views(light_field, rows, columns)
+            yield f"{light_field.name} + {rows}x{columns}", few_views(light_field, rows, columns)
 
 
-def _few_views(light_field: LightField, rows: int, columns: int) -> LightField:
+def few_views(light_field: LightField, rows: int, columns: int) -> LightField:
+    """So many rows and columns of the views, from the reference view on."""
     t, s = light_field.reference_position
     views = np.ascontiguousarray(light_field.views[t : t + rows, s : s + columns])
     known, truth = light_field.disparity_range, light_field.ground_truth

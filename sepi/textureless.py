@@ -30,7 +30,16 @@ from sepi.image.edges import CannyParameters, canny_edges
 from sepi.image.superpixels import FloatArray, Superpixels, adjacency, colour_modes, superpixels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions
-from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, relative_confidence, require_previous
+from sepi.stage import (
+    LIGHT_DEVIATION,
+    Choice,
+    NoParameters,
+    Progress,
+    StageMaps,
+    none,
+    relative_confidence,
+    require_previous,
+)
 
 
 class LtiParameters(CannyParameters):
@@ -149,7 +158,7 @@ def uniform_planes(
     Returns
     -------
     StageMaps
-        Adds ``textureless``, bool: pixels that got a plane.
+        Adds ``textureless``, bool: pixels that got a plane; and :data:`sepi.stage.LIGHT_DEVIATION`.
 
     Examples
     --------
@@ -168,9 +177,9 @@ def uniform_planes(
     True
     """
     before = require_previous(previous)
-    disparity, uniform = fill_uniform_regions(light_field, before, parameters)
+    disparity, uniform, deviation = fill_uniform_regions(light_field, before, parameters)
     progress(1.0)
-    return before.updated(disparity, before.confidence, textureless=uniform)
+    return before.updated(disparity, before.confidence, textureless=uniform, **{LIGHT_DEVIATION: deviation})
 
 
 def superpixel_size(shape: tuple[int, int], parameters: LtiParameters) -> int:
