@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 
 
 class RimViews(NamedTuple):
@@ -38,7 +38,7 @@ class RimViews(NamedTuple):
     channels: int
     units: FloatMap
     places: npt.NDArray[np.int64]
-    baselines: npt.NDArray[np.float64]
+    baselines: FloatArray
     nearest: FloatMap
     low: int
     margin: np.float32

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from sepi.image.noise import sum_of_channels
 from sepi.lightfield import FloatMap
 
 RADIUS = 4
@@ -34,9 +35,10 @@ def variance_within_surface(image: FloatMap, least: float, share: float) -> Floa
     """
     size = (2 * RADIUS + 1, 2 * RADIUS + 1)
     energy = np.zeros(image.shape[:2], np.float32)
-    for own, picture in ((energy, image), (energy.T, image.transpose(1, 0, 2))):
-        squares = np.square(picture[1:] - picture[:-1]).sum(axis=2)
-        own[1:] += squares
-        own[:-1] += squares
+    for axis, own in enumerate((energy, energy.T)):
+        squares = sum_of_channels(np.square(np.diff(image, axis=axis)))
+        between = squares.T if axis else squares
+        own[1:] += between
+        own[:-1] += between
     plainest = cv2.erode(cv2.GaussianBlur(energy / 4, size, 0.4 * RADIUS), np.ones(size, np.uint8))
     return np.asarray(np.maximum(np.float32(share) * plainest, np.float32(least)))

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sepi.image.noise import sum_of_channels
 from sepi.lightfield import HIGHEST, LOWEST, LightField, full_scale
 from sepi.matching.exposure import equally_bright
 
@@ -40,7 +41,8 @@ def coding_error(light_field: LightField) -> float:
     float
         Colours in 0..1; 0 if no blocks show, or the pictures are too small.
     """
-    grey, squares = light_field.reference_view.mean(axis=2), []
+    view, squares = light_field.reference_view, []
+    grey = sum_of_channels(view) / view.shape[2]
     for axis in (0, 1):
         steps = np.abs(np.diff(grey, axis=axis))
         # edges and highlights say nothing of a coder's errors

@@ -111,13 +111,18 @@ class Views:
 
         Lenses darken and blur the views towards the edge of the grid, so that hardly more than noise is left.
         """
-        # which all are compared with: not to be made by each thread
-        self._light((0, 0))
-        # OpenCV works outside Python's lock, on one thread for pictures as small as these
-        with ThreadPoolExecutor(threads_used()) as pool:
-            worth = list(pool.map(self._is_worth_matching, baselines))
+        self.details(baselines)
+        worth = [self._is_worth_matching(baseline) for baseline in baselines]
         kept = [baseline for baseline, is_worth in zip(baselines, worth, strict=True) if is_worth]
         return kept if 2 * len(kept) >= min(len(baselines), 4) else baselines
+
+    def details(self, baselines: list[Baseline]) -> list[FloatMap]:
+        """:meth:`detail` of several views."""
+        # which all are compared with: not to be made by each thread
+        self.detail((0, 0))
+        # OpenCV works outside Python's lock, on one thread for pictures as small as these
+        with ThreadPoolExecutor(threads_used()) as pool:
+            return list(pool.map(self.detail, baselines))
 
     def _is_worth_matching(self, baseline: Baseline) -> bool:
         (mean, contrast), (own_mean, own_contrast) = self._light(baseline), self._light((0, 0))
@@ -157,7 +162,7 @@ class Views:
             self._grey[key] = np.asarray(cv2.GaussianBlur(grey, (0, 0), _BLUR_SIGMA), np.float32)
         return self._grey[key]
 
-    def detail(self, baseline: Baseline, factor: int) -> FloatMap:
+    def detail(self, baseline: Baseline, factor: int = 1) -> FloatMap:
         """The same, high-pass filtered: differences of brightness between views do not count."""
         key = (*baseline, factor)
         if key not in self._detail:

@@ -66,12 +66,17 @@ struct type_caster<Struct> {
 
 namespace sepi {
 
-// Kernels run outside Python's lock.
-using Unlocked = nanobind::call_guard<nanobind::gil_scoped_release>;
+// Module of kernels in Python, which run outside Python's lock.
+struct Kernels : nanobind::module_ {
+    template <class Kernel>
+    void def(const char *name, Kernel kernel) {
+        nanobind::module_::def(name, kernel, nanobind::call_guard<nanobind::gil_scoped_release>());
+    }
+};
 
 // Submodule of a source of kernels in Python. Each source has one, filled when the extension module is loaded.
 struct Submodule {
-    Submodule(const char *name, void (*fill)(nanobind::module_ &)) : name(name), fill(fill) { all().push_back(*this); }
+    Submodule(const char *name, void (*fill)(Kernels &)) : name(name), fill(fill) { all().push_back(*this); }
 
     static std::vector<Submodule> &all() {
         static std::vector<Submodule> submodules;
@@ -79,12 +84,7 @@ struct Submodule {
     }
 
     const char *name;
-    void (*fill)(nanobind::module_ &);
+    void (*fill)(Kernels &);
 };
 
 }  // namespace sepi
-
-// Names that all sources use
-namespace nb = nanobind;
-using namespace nb::literals;
-using sepi::Unlocked;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <new>
 #include <stdexcept>
@@ -70,6 +71,8 @@ struct Array {
 // An array with any stride along its last axis; elements of Array are contiguous there.
 template <class T, int N>
 struct Strided : Array<T, N> {};
+
+constexpr float INFINITE = std::numeric_limits<float>::infinity();
 
 constexpr std::align_val_t ALIGNED{64};  // to lines of the cache
 

@@ -1,7 +1,5 @@
 // The extension module, with a submodule for each source of kernels.
-#include "arguments.hpp"
-#include "lanes.hpp"
-#include "parallel.hpp"
+#include "kernel.hpp"
 
 #if defined(__x86_64__)
 #include <cpuid.h>
@@ -28,9 +26,9 @@ NB_MODULE(_native, m) {
     m.attr("COMPILER") = __VERSION__;
     m.def("has_x86_64_v3", &has_x86_64_v3, "Whether this processor can use kernels that are built for x86-64-v3.");
     m.def("thread_count", &sepi::thread_count, "Threads of a loop, the caller's among them.");
-    m.def("set_thread_count", &sepi::set_thread_count, "count"_a, "Have each loop use so many threads.");
+    m.def("set_thread_count", &sepi::set_thread_count, nanobind::arg("count"), "Have each loop use so many threads.");
     for (const auto &[name, fill] : sepi::Submodule::all()) {
-        auto submodule = m.def_submodule(name);
+        sepi::Kernels submodule{m.def_submodule(name)};
         fill(submodule);
     }
 }

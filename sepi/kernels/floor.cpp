@@ -1,7 +1,5 @@
 // The operations of the plane sweep on a few numbers in the first cache, to measure their time alone.
-#include "arguments.hpp"
-#include "lanes.hpp"
-#include "parallel.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::floor {
 namespace {
@@ -43,9 +41,9 @@ void windows(Index passes, Array<const float, 3> data, Array<float, 2> out) {
     });
 }
 
-const Submodule submodule("floor", [](nb::module_ &m) {
-    m.def("samples", &samples, Unlocked(), "passes"_a, "data"_a, "out"_a);
-    m.def("windows", &windows, Unlocked(), "passes"_a, "data"_a, "out"_a);
+const Submodule submodule("floor", [](Kernels &m) {
+    m.def("samples", &samples);
+    m.def("windows", &windows);
 });
 
 }  // namespace

@@ -14,7 +14,9 @@ References
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,7 @@ import numpy.typing as npt
 from sepi.kernels import second_order as kernels
 from sepi.lightfield import FloatMap
 
-FloatArray = npt.NDArray[np.float64]
+FloatArray = npt.NDArray[Any]
 Inverse = Callable[[FloatArray], tuple[FloatArray, float]]
 
 LEVELS = 5
@@ -32,14 +34,8 @@ LEVELS = 5
 COUNTED = 2
 """Every second level is part of the preconditioner; the others only connect them."""
 
-HALF = np.float32(0.5)
-"""Height of a hat at the finer level's nodes beside its own."""
-
 MARGIN: int = kernels.MARGIN
 """Reach of the stencil, pixels, and so the width of the zeros round the solver's pictures."""
-
-LEAST_SINGLE_RTOL = 1e-5
-"""Least residual for which single precision is enough."""
 
 LEAST_WEIGHT = 1e-9
 """Least weight of the data, which keeps the system solvable."""
@@ -52,15 +48,17 @@ def solve_smooth(
 
     Parameters
     ----------
-    smoothness : ndarray, shape (N, H + 2 MARGIN, W + 2 MARGIN), float64
-        ``A``: the first N <= 7 entries of each pixel with itself and with the pixels to the right by 1 and 2, below by
-        1 and 2, below to the right, and below to the left, in a margin of zeros. This function adds the data's weights.
+    smoothness : ndarray, shape (N, H + 2 MARGIN, W + 2 MARGIN), float32 or float64
+        ``A``, in the precision of the solver: the first N <= 7 entries of each pixel with itself and with the pixels
+        to the right by 1 and 2, below by 1 and 2, below to the right, and below to the left, in a margin of zeros.
+        This function adds the data's weights.
     weight, data : ndarray, shape (H, W), float32
         ``w`` and ``z``.
     start : ndarray, shape (H, W), float32
         Initial disparities.
     rtol : float
-        Residual at which the solver stops, relative to the data's deviations from their mean.
+        Residual at which the solver stops, relative to the data's deviations from their mean; in single precision at
+        least 1e-5.
     max_iterations : int
         Most steps of the solver.
 
@@ -71,20 +69,15 @@ def solve_smooth(
     if not weight.any():
         # without weights any plane is a solution
         return data
-    w = np.maximum(weight.astype(np.float64), LEAST_WEIGHT)
+    w = np.maximum(weight.astype(smoothness.dtype), LEAST_WEIGHT)
     # smoothness ignores constants: without the mean, rtol does not depend on the zero of disparity
-    mean = np.average(data, weights=w)
+    mean = np.average(data, weights=weight).astype(smoothness.dtype)
     inside = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
-    # single precision takes a third of the time; it changes the solution by a hundredth of its error
-    dtype: Any = np.float32 if rtol >= LEAST_SINGLE_RTOL else np.float64
     smoothness[0][inside] += w
-    packed = smoothness.astype(dtype)
-    inverse = multilevel_inverse(smoothness, dtype)
-    # frees its memory unless the caller holds it
-    del smoothness
-    right, first = np.zeros((2, *packed.shape[1:]), dtype)
+    right, first = np.zeros((2, *smoothness.shape[1:]), smoothness.dtype)
     right[inside], first[inside] = w * (data - mean), start - mean
-    solution = conjugate_gradients(packed, inverse, right, first, rtol, max_iterations)
+    inverse = multilevel_inverse(smoothness)
+    solution = conjugate_gradients(smoothness, inverse, right, first, rtol, max_iterations)
     return np.asarray(solution[inside] + mean, np.float32)
 
 
@@ -115,30 +108,26 @@ def conjugate_gradients(
     if not enough:
         return np.zeros_like(right)
     direction, bent = np.zeros_like(right), np.zeros_like(right)
-    kernels.bend(stencil, start, bent)
-    solution, residual, before = start.copy(), right - bent, 1.0
+    kernels.bend(stencil, start, 0.0, direction, bent)
+    solution, residual, before = start.copy(), right - bent, math.inf
     left = float(np.linalg.norm(residual)) ** 2
     for _ in range(max_iterations):
         if left < enough**2:
             break
         ahead, along = inverse(residual)
-        direction *= along / before
-        direction += ahead
-        curved = kernels.bend(stencil, direction, bent)
+        curved = kernels.bend(stencil, ahead, along / before, direction, bent)
         left = kernels.step(along / curved, direction, bent, solution, residual)
         before = along
     return solution
 
 
-def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
+def multilevel_inverse(stencil: FloatArray) -> Inverse:
     """Approximate inverse of a matrix, symmetric and positive.
 
     Parameters
     ----------
-    stencil : ndarray, shape (N, H + 2 MARGIN, W + 2 MARGIN), float64
+    stencil : ndarray, shape (N, H + 2 MARGIN, W + 2 MARGIN), float32 or float64
         The smoothness, as for :func:`solve_smooth`, plus the data's weights.
-    dtype : dtype
-        Type in which the inverse is applied, float32 or float64.
 
     Returns
     -------
@@ -146,45 +135,25 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
         Takes a picture with its margin and returns another one and the inner product of both. The next call overwrites
         the returned picture.
     """
-    inverse = _inverse(stencil[0], dtype)
-    hats = [_inverse(diagonal, dtype) for diagonal in _diagonals(stencil)]
-    levels = [np.empty(shape, dtype) for shape in _shapes(stencil)]
-    out = np.zeros(stencil.shape[1:], dtype)
+    inverse, dtype = _inverse(stencil[0]), stencil.dtype
+    hats, levels = [], []
+    for i, shape in enumerate(_shapes(stencil)):
+        diagonal = np.zeros(shape, dtype)
+        if i % COUNTED == 0:
+            kernels.diagonal_of_hats(stencil, kernels.SPACING << i, diagonal)
+        hats.append(_inverse(diagonal))
+        levels.append(np.empty(shape, dtype))
+    nothing, out = np.zeros([n // 2 + 1 for n in levels[-1].shape], dtype), np.zeros(stencil.shape[1:], dtype)
 
     def apply(residual: FloatArray) -> tuple[FloatArray, float]:
         kernels.onto_finest(residual, levels[0])
-        for i in range(1, LEVELS):
-            _onto_coarser(levels[i - 1], levels[i])
-        for i in reversed(range(LEVELS)):
-            if i % COUNTED:
-                levels[i][:] = 0
-            else:
-                levels[i] *= hats[i // COUNTED]
-            if i + 1 < LEVELS:
-                _add_coarser(levels[i + 1], levels[i])
+        for fine, coarse in pairwise(levels):
+            kernels.onto_coarser(fine, coarse)
+        for coarse, diagonal, fine in reversed(list(zip([*levels[1:], nothing], hats, levels, strict=True))):
+            kernels.onto_finer(coarse, diagonal, fine)
         return out, kernels.diagonal_and_finest(inverse, residual, levels[0], out)
 
     return apply
-
-
-def _onto_coarser(fine: FloatArray, out: FloatArray) -> None:
-    """Compute the inner products with hats (h, w) from those with finer hats (2 h - 1, 2 w - 1)."""
-    rows, halves = fine[::2].copy(), HALF * fine[1::2]
-    rows[1:] += halves
-    rows[:-1] += halves
-    out[:] = 0
-    out[:, 1:] += rows[:, 1::2]
-    out[:, :-1] += rows[:, 1::2]
-    out *= HALF
-    out += rows[:, ::2]
-
-
-def _add_coarser(coarse: FloatArray, fine: FloatArray) -> None:
-    """Add hats of heights (h, w) to the heights of the finer level (2 h - 1, 2 w - 1)."""
-    rows = np.repeat(coarse, 2, axis=0)[:-1]
-    rows[1::2] = HALF * (coarse[:-1] + coarse[1:])
-    fine[:, ::2] += rows
-    fine[:, 1::2] += HALF * (rows[:, :-1] + rows[:, 1:])
 
 
 def _shapes(stencil: FloatArray) -> list[tuple[int, int]]:
@@ -194,16 +163,6 @@ def _shapes(stencil: FloatArray) -> list[tuple[int, int]]:
     return [((rows << i) + 1, (columns << i) + 1) for i in reversed(range(LEVELS))]
 
 
-def _diagonals(stencil: FloatArray) -> list[FloatArray]:
-    """Diagonal of the matrix in the hats of each level of the preconditioner."""
-    found: list[FloatArray] = []
-    for i, shape in list(enumerate(_shapes(stencil)))[::COUNTED]:
-        diagonal = np.empty(shape)
-        kernels.diagonal_of_hats(stencil, kernels.SPACING << i, diagonal)
-        found.append(diagonal)
-    return found
-
-
-def _inverse(diagonal: FloatArray, dtype: npt.DTypeLike) -> FloatArray:
+def _inverse(diagonal: FloatArray) -> FloatArray:
     """Reciprocals of a diagonal; 0 for hats without pixels."""
-    return np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0).astype(dtype)
+    return np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0)

@@ -1,9 +1,4 @@
 // Background behind the nearer surfaces beside depth steps, from the views that see it.
-#include <limits>
-#include <vector>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
 #include "view_samples.hpp"
 
 namespace sepi::background {
@@ -12,24 +7,23 @@ namespace {
 constexpr Index FEWEST_VIEWS = 3;  // least number of views for the colour of a background
 constexpr float UNSEEN = -1;       // variance of a background that fewer views see; negative
 
-constexpr float NONE = std::numeric_limits<float>::infinity();
 constexpr double MOST_DEVIATION2 = 0.01;  // largest squared residual of one view in the background's variance
 
-// Median of n numbers, NONE after them, by bisection: counting vectorises, sorting does not.
+// Median of n numbers, INFINITE after them, by bisection: counting vectorises, sorting does not.
 float median(const float *values, Index n) {
     const auto least_from = [&](float limit) {
-        Float8 least = spread(NONE);
+        Float8 least = spread(INFINITE);
         for (Index v = 0; v < n; v += LANES) least = load(values + v) >= spread(limit) ? smaller(load(values + v), least) : least;
         return least_of(least);
     };
     const auto most_below = [&](float limit) {
-        Float8 most = spread(-NONE);
+        Float8 most = spread(-INFINITE);
         for (Index v = 0; v < n; v += LANES) most = load(values + v) < spread(limit) ? larger(load(values + v), most) : most;
         return -least_of(-most);
     };
     const int middle = int(n / 2);
     // as many or fewer lie below low, more below high or it is the largest
-    float low = least_from(-NONE), high = most_below(NONE);
+    float low = least_from(-INFINITE), high = most_below(INFINITE);
     int below = 0;
     for (float half; below != middle && (half = low + (high - low) * 0.5f) > low && half < high;) {
         int found = 0;
@@ -55,7 +49,7 @@ void background_of(const RimViews &views, Array<const float, 2> layer, Array<con
             if (wanted(y, x)) columns.push_back(x);
         }
         const auto few = Index(columns.size());
-        const auto scratch = Scratch<float, 3>(few, 3, views.number() + LANES).filled(NONE);
+        const auto scratch = Scratch<float, 3>(few, 3, views.number() + LANES).filled(INFINITE);
         const auto samples = scratch.array();
         std::vector<Index> count(few);
         // view by view, since neighbouring pixels are close in memory
@@ -85,8 +79,8 @@ void background_of(const RimViews &views, Array<const float, 2> layer, Array<con
     });
 }
 
-const Submodule submodule("background", [](nb::module_ &m) {
-    m.def("background_of", &background_of, Unlocked(), "views"_a, "layer"_a, "wanted"_a, "begin"_a, "end"_a, "background"_a);
+const Submodule submodule("background", [](Kernels &m) {
+    m.def("background_of", &background_of);
     m.attr("FEWEST_VIEWS") = FEWEST_VIEWS;
     m.attr("UNSEEN") = UNSEEN;
 });

@@ -1,10 +1,5 @@
 // The evidence by colour mixture.
-#include <cmath>
-#include <vector>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::colour_mixture {
 namespace {
@@ -72,9 +67,8 @@ void mixture_evidence(Array<const float, 2> disparity, const Surroundings &aroun
     });
 }
 
-const Submodule submodule("colour_mixture", [](nb::module_ &m) {
-    m.def("mixture_evidence", &mixture_evidence, Unlocked(), "disparity"_a, "around"_a, "guide"_a, "discontinuity"_a, "radius"_a,
-          "contrast"_a, "threshold"_a, "least_variance"_a, "out"_a);
+const Submodule submodule("colour_mixture", [](Kernels &m) {
+    m.def("mixture_evidence", &mixture_evidence);
 });
 
 }  // namespace

@@ -1,8 +1,5 @@
 // The edges beside depth steps.
-#include <limits>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::edge_lines {
 namespace {
@@ -43,7 +40,7 @@ void evidence_of_lines(Array<const float, 2> disparity, Array<const float, 2> mi
             for (Index k = 0; k <= finest; ++k) table[k] = cost * (nearer ? 1 - float(k) / float(finest) : float(k) / float(finest));
         } else {
             // an edge may bend or end beside the pixel in the middle
-            const float weight = edges.weights(p), most = p == PATCH / 2 ? std::numeric_limits<float>::infinity() : MOST, *own = costs.at(n);
+            const float weight = edges.weights(p), most = p == PATCH / 2 ? INFINITE : MOST, *own = costs.at(n);
             for (Index k = 0; k < K - 1; ++k)
                 for (Index step = 0; step <= STEPS; ++step)
                     table[STEPS * k + step] = weight * std::min(own[k] + float(step) / float(STEPS) * (own[k + 1] - own[k]), most);
@@ -52,7 +49,7 @@ void evidence_of_lines(Array<const float, 2> disparity, Array<const float, 2> mi
     parallel_for_blocks(0, costs.shape[0], AT_ONCE, [&](Index i) {
         float table[PATCH][1 << 8];  // for any number of steps
         for (Index p = 0; p < PATCH; ++p) fill(pixels(i) / W, pixels(i) % W, p, table[p]);
-        float near = std::numeric_limits<float>::infinity(), far = near;
+        float near = INFINITE, far = near;
         for (Index m = 0; m < edges.costs.shape[0]; ++m) {
             const std::uint8_t *shares = edges.shares.at(m);
             float total = edges.costs(m);
@@ -64,9 +61,8 @@ void evidence_of_lines(Array<const float, 2> disparity, Array<const float, 2> mi
     });
 }
 
-const Submodule submodule("edge_lines", [](nb::module_ &m) {
-    m.def("evidence_of_lines", &evidence_of_lines, Unlocked(), "disparity"_a, "middle"_a, "number"_a, "costs"_a, "edges"_a, "pixels"_a,
-          "evidence"_a);
+const Submodule submodule("edge_lines", [](Kernels &m) {
+    m.def("evidence_of_lines", &evidence_of_lines);
     m.attr("STEPS") = STEPS;
 });
 

@@ -1,10 +1,5 @@
 // Specks of a map.
-#include <array>
-#include <cmath>
-#include <numeric>
-#include <vector>
-
-#include "kernels/arguments.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::specks {
 namespace {
@@ -43,8 +38,8 @@ void specks_of(Array<const float, 2> disparity, float difference, Index most_pix
     }
 }
 
-const Submodule submodule("specks", [](nb::module_ &m) {
-    m.def("specks_of", &specks_of, Unlocked(), "disparity"_a, "difference"_a, "most_pixels"_a, "most_of_hole"_a, "specks"_a);
+const Submodule submodule("specks", [](Kernels &m) {
+    m.def("specks_of", &specks_of);
 });
 
 }  // namespace

@@ -1,8 +1,4 @@
 // Share of the nearer surface in a pixel beside a depth step: residuals of the views for each share.
-#include <cmath>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
 #include "view_samples.hpp"
 
 namespace sepi::surface_shares {
@@ -244,9 +240,8 @@ void costs_of_shares(const RimViews &views, const Rim &rim, Array<const float, 3
     });
 }
 
-const Submodule submodule("surface_shares", [](nb::module_ &m) {
-    m.def("costs_of_shares", &costs_of_shares, Unlocked(), "views"_a, "rim"_a, "background"_a, "sides"_a, "scale2"_a, "contrast2"_a,
-          "pixels"_a, "costs"_a, "told"_a);
+const Submodule submodule("surface_shares", [](Kernels &m) {
+    m.def("costs_of_shares", &costs_of_shares);
     m.attr("FEWEST_SAMPLES") = FEWEST_SAMPLES;
     m.attr("FEWEST_ALONE") = FEWEST_ALONE;
     m.attr("SHARES") = SHARES;

@@ -1,10 +1,7 @@
 // A map and its views as arguments; positions of a pixel in the views, and colours interpolated between their pixels.
 #pragma once
 
-#include <variant>
-
-#include "kernels/lanes.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi {
 

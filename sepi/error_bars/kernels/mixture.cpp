@@ -1,10 +1,5 @@
 // Distribution of a pixel's error.
-#include <cmath>
-#include <numbers>
-
-#include "kernels/arguments.hpp"
-#include "kernels/exponential.hpp"
-#include "kernels/parallel.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::mixture {
 namespace {
@@ -117,10 +112,10 @@ void describe(const ErrorMixture &mixture, double tail, double close, Array<floa
     });
 }
 
-const Submodule submodule("mixture", [](nb::module_ &m) {
+const Submodule submodule("mixture", [](Kernels &m) {
     m.attr("RIM_WIDTH") = RIM_WIDTH;
     m.attr("LEAST_RIM") = LEAST_RIM;
-    m.def("describe", &describe, Unlocked(), "mixture"_a, "tail"_a, "close"_a, "out"_a);
+    m.def("describe", &describe);
 });
 
 }  // namespace

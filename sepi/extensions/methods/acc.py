@@ -55,7 +55,7 @@ from scipy import fft
 from sepi.extensions.methods.costs import GuidedFilter, distinctness, maps_of, weighted_median
 from sepi.extensions.methods.markov_field import labels_of_least_energy
 from sepi.kernels import thread_count
-from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.lightfield import FloatMap, LightField, as_unit_float, without_reference
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, require_costs
 
@@ -161,8 +161,7 @@ def phase_shift_costs(
         0..1.
     """
     reference = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
-    others = light_field.present.copy()
-    others[light_field.reference_position] = False
+    others = without_reference(light_field, light_field.present)
     farthest = light_field.reach * float(np.abs(disparities).max())
     costs = np.zeros((len(disparities), *light_field.shape), np.float32)
     for n, (t, s) in enumerate(np.argwhere(others)):
@@ -387,8 +386,7 @@ def matched_disparities(light_field: LightField, low: float, high: float) -> tup
         Pixels per view step.
     """
     here = features_of(light_field.reference_view)
-    others = light_field.present.copy()
-    others[light_field.reference_position] = False
+    others = without_reference(light_field, light_field.present)
     baselines = light_field.baselines[others]
     found = np.full((len(baselines), len(here.points)), np.nan)
     for n, position in enumerate(np.argwhere(others)):

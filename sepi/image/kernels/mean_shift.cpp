@@ -1,10 +1,5 @@
 // Mean shift: modes of a distribution near points.
-#include <array>
-#include <cmath>
-
-#include "kernels/arguments.hpp"
-#include "kernels/lanes.hpp"
-#include "kernels/parallel.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::mean_shift {
 namespace {
@@ -99,9 +94,9 @@ void sample_modes(Array<const double, 2> samples, double bandwidth, Array<double
     });
 }
 
-const Submodule submodule("mean_shift", [](nb::module_ &m) {
-    m.def("patch_modes", &patch_modes, Unlocked(), "planes"_a, "mask"_a, "radius"_a, "unit"_a, "modes"_a);
-    m.def("sample_modes", &sample_modes, Unlocked(), "samples"_a, "bandwidth"_a, "modes"_a);
+const Submodule submodule("mean_shift", [](Kernels &m) {
+    m.def("patch_modes", &patch_modes);
+    m.def("sample_modes", &sample_modes);
 });
 
 }  // namespace

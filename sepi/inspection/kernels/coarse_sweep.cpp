@@ -1,16 +1,11 @@
 // The plane sweep of the range estimate.
-#include <cmath>
-#include <limits>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::coarse_sweep {
 namespace {
 
 constexpr Index ROWS = 16;  // rows of a thread for all candidates, a few MB
 constexpr Index LINE = 16;  // numbers in a cache line, so that planes of costs begin in different cache sets
-constexpr float INFINITE = std::numeric_limits<float>::infinity();
 
 void add(const float *row, Index n, float *__restrict out) {
     for (Index x = 0; x < n; ++x) out[x] += row[x];
@@ -117,9 +112,8 @@ void coarse_sweep(Array<const float, 2> reference, Array<const float, 3> views, 
     });
 }
 
-const Submodule submodule("coarse_sweep", [](nb::module_ &m) {
-    m.def("coarse_sweep", &coarse_sweep, Unlocked(), "reference"_a, "views"_a, "offsets"_a, "candidates"_a, "truncation"_a, "radius"_a,
-          "out"_a);
+const Submodule submodule("coarse_sweep", [](Kernels &m) {
+    m.def("coarse_sweep", &coarse_sweep);
 });
 
 }  // namespace

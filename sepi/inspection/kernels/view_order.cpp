@@ -1,10 +1,5 @@
 // Matching for the check of the views' order.
-#include <cmath>
-#include <limits>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::view_order {
 namespace {
@@ -86,7 +81,7 @@ void residuals(Array<const float, 2> reference, Array<const float, 2> view, Arra
                Array<const bool, 2> asked, Index radius, Array<float, 2> out) {
     const Index H = reference.shape[0], W = reference.shape[1], side = 2 * radius + 1;
     parallel_for(0, H, [&](Index row) {
-        std::fill_n(out.at(row), W, std::numeric_limits<float>::infinity());
+        std::fill_n(out.at(row), W, INFINITE);
         const Index y = row - radius;
         if (y < 0 || y > H - side) return;
         for (Index x = 0; x <= W - side; ++x) {
@@ -97,10 +92,9 @@ void residuals(Array<const float, 2> reference, Array<const float, 2> view, Arra
     });
 }
 
-const Submodule submodule("view_order", [](nb::module_ &m) {
-    m.def("layout_costs", &layout_costs, Unlocked(), "reference"_a, "views"_a, "offsets"_a, "candidates"_a, "points"_a, "radius"_a,
-          "cost"_a, "disparity"_a);
-    m.def("residuals", &residuals, Unlocked(), "reference"_a, "view"_a, "baseline"_a, "disparity"_a, "asked"_a, "radius"_a, "out"_a);
+const Submodule submodule("view_order", [](Kernels &m) {
+    m.def("layout_costs", &layout_costs);
+    m.def("residuals", &residuals);
 });
 
 }  // namespace

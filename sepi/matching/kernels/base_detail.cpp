@@ -2,7 +2,6 @@
 //
 // The weight exp(-q) of a difference is computed as (1 - q / 32)^32, which differs by at most 0.01, reaches 0, and needs
 // only multiplications. The weight of each pair of pixels is computed once for both.
-#include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi::base_detail {
@@ -126,9 +125,8 @@ void detail_of_views(const Views &views, float unit, Array<const bool, 2> presen
     });
 }
 
-const Submodule submodule("base_detail", [](nb::module_ &m) {
-    m.def("detail_of_views", &detail_of_views, Unlocked(), "views"_a, "unit"_a, "present"_a, "low"_a, "nearness"_a, "falloff"_a,
-          "detail_unit"_a, "out"_a);
+const Submodule submodule("base_detail", [](Kernels &m) {
+    m.def("detail_of_views", &detail_of_views);
 });
 
 }  // namespace

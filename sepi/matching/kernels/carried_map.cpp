@@ -34,11 +34,11 @@ void corner_disparities(Array<const float, 2> disparity, Array<float, 3> out) {
     });
 }
 
-const Submodule submodule("carried_map", [](nb::module_ &m) {
+const Submodule submodule("carried_map", [](Kernels &m) {
     m.attr("EMPTY") = EMPTY;
     m.attr("TOLERANCE") = TOLERANCE;
-    m.def("corner_disparities", &corner_disparities, Unlocked(), "disparity"_a, "out"_a);
-    m.def("carry", &carry, Unlocked(), "disparity"_a, "corners"_a, "v"_a, "u"_a, "nearest"_a, "origin"_a);
+    m.def("corner_disparities", &corner_disparities);
+    m.def("carry", &carry);
 });
 
 }  // namespace

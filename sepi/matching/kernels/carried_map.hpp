@@ -6,11 +6,7 @@
 // a plane in one view is a plane in all.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::carried_map {
 

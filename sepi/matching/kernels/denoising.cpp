@@ -1,5 +1,4 @@
 // Denoising: the detail of each view, kept as far as it exceeds the noise.
-#include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi::denoising {
@@ -120,8 +119,8 @@ void denoise_views(const Views &views, Array<const bool, 2> present, float full,
     });
 }
 
-const Submodule submodule("denoising", [](nb::module_ &m) {
-    m.def("denoise_views", &denoise_views, Unlocked(), "views"_a, "present"_a, "full"_a, "noise"_a, "least"_a, "out"_a);
+const Submodule submodule("denoising", [](Kernels &m) {
+    m.def("denoise_views", &denoise_views);
 });
 
 }  // namespace

@@ -1,7 +1,4 @@
 // Surfaces seen through gaps: farther surfaces of a similar colour, and residuals at both depths.
-#include <vector>
-
-#include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi::gaps {
@@ -74,11 +71,9 @@ void compare_depths(const Views &views, float unit, Array<const float, 2> dispar
     });
 }
 
-const Submodule submodule("gaps", [](nb::module_ &m) {
-    m.def("farther_alike", &farther_alike, Unlocked(), "disparity"_a, "lowest"_a, "colours"_a, "reach"_a, "least_step"_a, "distance2"_a,
-          "farther"_a);
-    m.def("compare_depths", &compare_depths, Unlocked(), "views"_a, "unit"_a, "disparity"_a, "farther"_a, "reference"_a, "asked"_a, "most"_a,
-          "begin"_a, "end"_a, "sums"_a);
+const Submodule submodule("gaps", [](Kernels &m) {
+    m.def("farther_alike", &farther_alike);
+    m.def("compare_depths", &compare_depths);
 });
 
 }  // namespace

@@ -3,7 +3,6 @@
 // A sample of a cubic spline is a sum of 4 x 4 coefficients. The four channels of a coefficient lie side by side, so that a
 // row of four coefficients is one vector of sixteen numbers. Coefficients and weights are whole numbers of 16 bits, of
 // which processors multiply twice as many at once as of floats. All else is done for eight pixels at once.
-#include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi::gauss_newton {
@@ -257,11 +256,10 @@ void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<co
         });
 }
 
-const Submodule submodule("gauss_newton", [](nb::module_ &m) {
+const Submodule submodule("gauss_newton", [](Kernels &m) {
     m.attr("AT_ONCE") = AT_ONCE;
-    m.def("mean_of_views", &mean_of_views, Unlocked(), "views"_a, "seeing"_a, "disparity"_a, "begin"_a, "end"_a, "out"_a);
-    m.def("equations_of_views", &equations_of_views, Unlocked(), "views"_a, "seeing"_a, "disparity"_a, "mean"_a, "down"_a, "across"_a,
-          "begin"_a, "end"_a, "out"_a);
+    m.def("mean_of_views", &mean_of_views);
+    m.def("equations_of_views", &equations_of_views);
 });
 
 }  // namespace

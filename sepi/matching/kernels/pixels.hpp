@@ -1,13 +1,7 @@
 // Views of any picture type, and operations on their rows that kernels share.
 #pragma once
 
-#include <functional>
-#include <variant>
-
-#include "kernels/exponential.hpp"
-#include "kernels/lanes.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi {
 

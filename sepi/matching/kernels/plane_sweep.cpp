@@ -6,11 +6,6 @@
 //
 // There is no cost volume: a thread keeps the cost rows of one aggregation window, and takes the minimum as soon as a
 // pixel is aggregated. One thread sums each pixel in a fixed order, so results do not depend on the number of threads.
-#include <cmath>
-#include <cstring>
-#include <vector>
-
-#include "kernels/arguments.hpp"
 #include "pixels.hpp"
 #include "sweep_arrays.hpp"
 
@@ -349,9 +344,8 @@ void sweep_plane_rows(const ViewStack &views, const Candidates &candidates, cons
     });
 }
 
-const Submodule submodule("plane_sweep", [](nb::module_ &m) {
-    m.def("sweep_plane_rows", &sweep_plane_rows, Unlocked(), "views"_a, "candidates"_a, "window"_a, "expected"_a, "mask"_a, "begin"_a,
-          "end"_a, "height"_a, "width"_a, "maps"_a);
+const Submodule submodule("plane_sweep", [](Kernels &m) {
+    m.def("sweep_plane_rows", &sweep_plane_rows);
     m.attr("BLOCK") = BLOCK;
 });
 

@@ -1,6 +1,5 @@
 // Semi-global smoothing of a cost volume, after averaging over pixels of similar colour. Both volumes are 16-bit integers:
 // the candidates of a pixel are contiguous, padded to whole vectors, and pixel follows pixel.
-#include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi::semi_global {
@@ -209,14 +208,13 @@ void choose(Array<const std::uint16_t, 1> smoothed, Array<const std::uint16_t, 1
     });
 }
 
-const Submodule submodule("semi_global", [](nb::module_ &m) {
+const Submodule submodule("semi_global", [](Kernels &m) {
     m.attr("AT_ONCE") = AT_ONCE;
     m.attr("ONE") = ONE;
     m.attr("PATHS_AT_ONCE") = PATHS_AT_ONCE;
-    m.def("aggregate", &aggregate, Unlocked(), "cost"_a, "top"_a, "guide"_a, "places"_a, "radius"_a, "variance"_a, "begin"_a, "end"_a,
-          "out"_a);
-    m.def("semi_global", &semi_global, Unlocked(), "cost"_a, "guide"_a, "places"_a, "small"_a, "large"_a, "weakening"_a, "band"_a, "out"_a);
-    m.def("choose", &choose, Unlocked(), "smoothed"_a, "averaged"_a, "disparities"_a, "places"_a, "same"_a, "disparity"_a, "margin"_a);
+    m.def("aggregate", &aggregate);
+    m.def("semi_global", &semi_global);
+    m.def("choose", &choose);
 });
 
 }  // namespace

@@ -1,9 +1,5 @@
 // Whole views, moved by fractions of a pixel.
-#include <cmath>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::sheared_views {
 namespace {
@@ -45,8 +41,8 @@ void shear(Array<const float, 4> views, Strided<const double, 2> offsets, bool c
     });
 }
 
-const Submodule submodule("sheared_views", [](nb::module_ &m) {
-    m.def("shear", &shear, Unlocked(), "views"_a, "offsets"_a, "cubic"_a, "out"_a);
+const Submodule submodule("sheared_views", [](Kernels &m) {
+    m.def("shear", &shear);
 });
 
 }  // namespace

@@ -1,9 +1,6 @@
 // Cubic splines of the views. Coefficients are a convolution with sqrt(3) (sqrt(3) - 2)^|k| along each axis, mirrored at
 // the ends (Unser 1999, doi:10.1109/79.799930); cut off where it is below single precision, so that a row's coefficients
 // do not depend on rows far away.
-#include <numbers>
-
-#include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi::splines {
@@ -88,12 +85,11 @@ void view_splines(const Views &views, float colour_unit, Array<const std::int16_
     });
 }
 
-const Submodule submodule("splines", [](nb::module_ &m) {
+const Submodule submodule("splines", [](Kernels &m) {
     m.attr("MARGIN") = SPLINE_MARGIN;
     m.attr("REACH") = SPLINE_REACH;
-    m.def("spline_coefficients", &spline_coefficients, Unlocked(), "image"_a, "out"_a);
-    m.def("view_splines", &view_splines, Unlocked(), "views"_a, "colour_unit"_a, "detail"_a, "detail_unit"_a, "detail_low"_a,
-          "of_colours"_a, "of_detail"_a, "low"_a, "out"_a);
+    m.def("spline_coefficients", &spline_coefficients);
+    m.def("view_splines", &view_splines);
 });
 
 }  // namespace

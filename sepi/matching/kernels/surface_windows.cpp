@@ -1,5 +1,4 @@
 // Sums over windows of one surface.
-#include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi::surface_windows {
@@ -53,9 +52,8 @@ void sums_of_surface(Array<const float, 2> gradient, Array<const float, 2> curva
     });
 }
 
-const Submodule submodule("surface_windows", [](nb::module_ &m) {
-    m.def("sums_of_surface", &sums_of_surface, Unlocked(), "gradient"_a, "curvature"_a, "disparity"_a, "colours"_a, "radius"_a, "width"_a,
-          "colour_width"_a, "least"_a, "sums"_a);
+const Submodule submodule("surface_windows", [](Kernels &m) {
+    m.def("sums_of_surface", &sums_of_surface);
 });
 
 }  // namespace

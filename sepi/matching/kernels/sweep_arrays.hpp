@@ -1,10 +1,7 @@
 // Arrays that plane sweeps work on, in named groups: the fields of sepi.matching.sweep_arrays, in their order.
 #pragma once
 
-#include <utility>
-#include <variant>
-
-#include "kernels/array.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi {
 

@@ -1,7 +1,4 @@
 // Noise of the views: differences of blocks of the reference view from blocks of others at whole pixels.
-#include <limits>
-
-#include "kernels/arguments.hpp"
 #include "pixels.hpp"
 
 namespace sepi::view_noise {
@@ -35,7 +32,7 @@ void least_differences(const Views &views, Index t0, Index s0, Array<const std::
         const Scratch<float, 3> own(C, BLOCK, W), other(C, BLOCK, W);
         load_rows(views, t0, s0, y, own.array());
         float *found = least.at(i);
-        std::fill_n(found, least.shape[1], std::numeric_limits<float>::infinity());
+        std::fill_n(found, least.shape[1], INFINITE);
         for (Index n = 0; n < moves.shape[0]; ++n) {
             const Index row = y + moves(n, 2), across = moves(n, 3);
             if (row < 0 || row + BLOCK > H) continue;
@@ -53,8 +50,8 @@ void least_differences(const Views &views, Index t0, Index s0, Array<const std::
     });
 }
 
-const Submodule submodule("view_noise", [](nb::module_ &m) {
-    m.def("least_differences", &least_differences, Unlocked(), "views"_a, "t0"_a, "s0"_a, "moves"_a, "least"_a);
+const Submodule submodule("view_noise", [](Kernels &m) {
+    m.def("least_differences", &least_differences);
     m.attr("BLOCK") = BLOCK;
 });
 

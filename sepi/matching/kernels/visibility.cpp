@@ -1,7 +1,4 @@
 // The visibility sweep: z-buffers of every view, and costs over the views that see a pixel.
-#include <vector>
-
-#include "kernels/arguments.hpp"
 #include "pixels.hpp"
 #include "sweep_arrays.hpp"
 
@@ -342,13 +339,12 @@ void sweep_visible_rows(const BaseDetail &views, const Visibility &visibility, A
     parallel_for(begin, end, [&](Index y) { VisibleRow{views, visibility, scales2, shares, candidates, cost}.sweep(y, y - begin); });
 }
 
-const Submodule submodule("visibility", [](nb::module_ &m) {
+const Submodule submodule("visibility", [](Kernels &m) {
     m.attr("EMPTY") = EMPTY;
     m.attr("MISSING") = MISSING;
-    m.def("z_buffers", &z_buffers, Unlocked(), "disparity"_a, "present"_a, "baselines"_a, "low"_a, "high"_a, "out"_a);
-    m.def("occluded_in_any_view", &occluded_in_any_view, Unlocked(), "disparity"_a, "views"_a, "begin"_a, "end"_a, "out"_a);
-    m.def("sweep_visible_rows", &sweep_visible_rows, Unlocked(), "views"_a, "visibility"_a, "scales2"_a, "shares"_a, "candidates"_a,
-          "begin"_a, "end"_a, "cost"_a);
+    m.def("z_buffers", &z_buffers);
+    m.def("occluded_in_any_view", &occluded_in_any_view);
+    m.def("sweep_visible_rows", &sweep_visible_rows);
 });
 
 }  // namespace

@@ -1,9 +1,6 @@
 // Planes of superpixels, and of the borders of regions. labels (H W): superpixel of each pixel; design (H W, 3):
 // coefficient of each plane parameter there.
-#include <cmath>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::planes {
 namespace {
@@ -50,11 +47,10 @@ void support_of(Array<const double, 2> positions, Array<const double, 1> values,
     });
 }
 
-const Submodule submodule("planes", [](nb::module_ &m) {
-    m.def("support_of", &support_of, Unlocked(), "positions"_a, "values"_a, "planes"_a, "tolerance"_a, "behind_penalty"_a, "out"_a);
-    m.def("add_normal_equations", &add_normal_equations, Unlocked(), "labels"_a, "design"_a, "weight"_a, "disparity"_a, "left"_a,
-          "right"_a);
-    m.def("values_of_planes", &values_of_planes, Unlocked(), "labels"_a, "design"_a, "planes"_a, "out"_a);
+const Submodule submodule("planes", [](Kernels &m) {
+    m.def("support_of", &support_of);
+    m.def("add_normal_equations", &add_normal_equations);
+    m.def("values_of_planes", &values_of_planes);
 });
 
 }  // namespace

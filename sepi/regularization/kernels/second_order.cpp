@@ -4,10 +4,7 @@
 // Nodes of the finest level lie SPACING apart, from as far before the first pixel to behind the last one, so that mirrored
 // pictures take mirrored steps. A coarser level has every other node; each of its hats is one of the finer level plus half
 // of each neighbour. Sums add rows in order, so that all numbers of threads give the same bits. Number is float or double.
-#include <cmath>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::second_order {
 namespace {
@@ -54,27 +51,34 @@ double in_order(const Scratch<Number, 1> &rows) {
     return total;
 }
 
-// Weights of second differences in one direction; corners (n, 2) and factors (n) are the pixels of a difference.
-void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const double, 2> colour,
-                            Array<const std::int64_t, 2> corners, Array<const double, 1> factors, double threshold, double variance,
-                            Array<double, 2> out) {
-    parallel_for_pixels(out.shape[0], out.shape[1], [&](Index y, Index x) {
-        double difference = 0, trust = reliability(y, x);
-        for (Index i = 0; i < factors.shape[0]; ++i) {
-            const Index row = y + corners(i, 0), column = x + corners(i, 1);
-            difference += factors(i) * double(disparity(row, column));
-            trust = std::min(trust, double(reliability(row, column)));
+// Weights of second differences in one direction; corners (n, 2) and factors (n) are the pixels of a difference, at most four.
+void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const float, 2> colour,
+                            Array<const std::int64_t, 2> corners, Array<const float, 1> factors, float threshold, float variance,
+                            Array<float, 2> out) {
+    parallel_for(0, out.shape[0], [&](Index y) {
+        const float *values[4], *trusts[4], *changes = colour.at(y);
+        float factor[4] = {}, *__restrict target = out.at(y);
+        for (Index i = 0; i < 4; ++i) {
+            // a fourth of three is the first again, without effect
+            const Index n = i < factors.shape[0] ? i : 0;
+            values[i] = disparity.at(y + corners(n, 0), corners(n, 1)), trusts[i] = reliability.at(y + corners(n, 0), corners(n, 1));
+            factor[i] = i == n ? factors(n) / threshold : 0;
         }
-        difference /= threshold;
-        out(y, x) = std::exp(-std::min(difference * difference * trust + 2 * colour(y, x) / variance, 30.0));
+        for (Index x = 0; x < out.shape[1]; ++x) {
+            const float difference = factor[0] * values[0][x] + factor[1] * values[1][x] + factor[2] * values[2][x] + factor[3] * values[3][x];
+            const float trust = std::min(std::min(trusts[0][x], trusts[1][x]), std::min(trusts[2][x], trusts[3][x]));
+            target[x] = exp_of_negative(-std::min(difference * difference * trust + 2 * changes[x] / variance, 30.0f));
+        }
     });
 }
 
-// Computes the matrix times a direction, into out; returns the inner product of both.
+// Computes the next direction, ahead plus a share of the last one, and the matrix times it, into out; returns the inner
+// product of both.
 template <class Number>
-double bend(Array<const Number, 3> stencil, Array<const Number, 2> direction, Array<Number, 2> out) {
+double bend(Array<const Number, 3> stencil, Array<const Number, 2> ahead, Number share, Array<Number, 2> direction, Array<Number, 2> out) {
     const Index H = direction.shape[0] - 2 * MARGIN, W = direction.shape[1] - 2 * MARGIN;
     const Scratch<Number, 1> along(H);
+    parallel_for_pixels(direction.shape[0], direction.shape[1], [&](Index y, Index x) { direction(y, x) = share * direction(y, x) + ahead(y, x); });
     parallel_for(MARGIN, MARGIN + H, [&](Index y) {
         const Number *own = stencil.at(0, y, MARGIN), *here = direction.at(y, MARGIN);
         Number *__restrict target = out.at(y, MARGIN);
@@ -127,6 +131,34 @@ void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
     });
 }
 
+// Inner products with hats (h, w) from those with finer hats (2 h - 1, 2 w - 1).
+template <class Number>
+void onto_coarser(Array<const Number, 2> fine, Array<Number, 2> out) {
+    parallel_for(0, out.shape[0], [&](Index i) {
+        const auto with_margin = zeros<Number, 1>(fine.shape[1] + 2);
+        Number *line = with_margin.array().data + 1;
+        for (const Index n : {-1, 1, 0})
+            if (0 <= 2 * i + n && 2 * i + n < fine.shape[0]) add(line, Number(n ? 0.5 : 1), fine.at(2 * i + n), fine.shape[1]);
+        for (Index j = 0; j < out.shape[1]; ++j) out(i, j) = line[2 * j] + (line[2 * j - 1] + line[2 * j + 1]) / 2;
+    });
+}
+
+// Multiply hats (2 h - 1, 2 w - 1) by an inverse, and add coarser hats (h, w).
+template <class Number>
+void onto_finer(Array<const Number, 2> coarse, Array<const Number, 2> inverse, Array<Number, 2> fine) {
+    parallel_for(0, fine.shape[0], [&](Index i) {
+        const Number *above = coarse.at(i / 2), *below = coarse.at((i + 1) / 2), *own = inverse.at(i);
+        Number *__restrict row = fine.at(i);
+        for (Index j = 0; j < fine.shape[1] / 2; ++j) {
+            const Number here = above[j] + below[j], next = above[j + 1] + below[j + 1];
+            row[2 * j] = own[2 * j] * row[2 * j] + here / 2;
+            row[2 * j + 1] = own[2 * j + 1] * row[2 * j + 1] + (here + next) / 4;
+        }
+        // the last of an odd number
+        if (const Index j = fine.shape[1] - 1; j % 2 == 0) row[j] = own[j] * row[j] + (above[j / 2] + below[j / 2]) / 2;
+    });
+}
+
 // Computes inverse * vector plus the finest hats, into out; returns the inner product of vector and out.
 template <class Number>
 double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2> vector, Array<const Number, 2> fine, Array<Number,
@@ -154,24 +186,25 @@ double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2
 }
 
 // Diagonal of the matrix in hats with this spacing, out (h, w).
-void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<double, 2> out) {
+template <class Number>
+void diagonal_of_hats(Array<const Number, 3> stencil, Index spacing, Array<Number, 2> out) {
     const Index H = stencil.shape[1] - 2 * MARGIN, W = stencil.shape[2] - 2 * MARGIN, w = out.shape[1], reach = 2 * spacing;
     const Nodes down(out.shape[0], spacing, H), across(w, spacing, W);
     parallel_for(0, out.shape[0], [&](Index i) {
-        const Scratch<double, 1> lines(spacing * (w + 1));
-        double *line = lines.array().data, *__restrict target = out.at(i);
-        std::fill_n(target, w, 0.0);
+        const Scratch<Number, 1> lines(spacing * (w + 1));
+        Number *line = lines.array().data, *__restrict target = out.at(i);
+        std::fill_n(target, w, Number(0));
         for (Index k = 0; k < stencil.shape[0]; ++k) {
             const auto [dy, dx] = ENTRIES[k];
-            std::fill_n(line, spacing * (w + 1), 0.0);
+            std::fill_n(line, spacing * (w + 1), Number(0));
             for (Index p = 0; p < reach; ++p) {
                 const Index y = spacing * i + p - down.before;
-                const double share = down.height(p) * down.height(p + dy);
+                const auto share = Number(down.height(p) * down.height(p + dy));
                 if (0 <= y && y < H && share > 0) add(line + across.before, share, stencil.at(k, y + MARGIN, MARGIN), W);
             }
             for (Index p = 0; p < reach; ++p) {
                 // each entry from either of its pixels
-                const double share = (k == 0 ? 1.0 : 2.0) * across.height(p) * across.height(p + dx);
+                const auto share = Number((k == 0 ? 1 : 2) * across.height(p) * across.height(p + dx));
                 if (share > 0)
                     for (Index j = 0; j < w; ++j) target[j] += share * line[spacing * j + p];
             }
@@ -181,21 +214,22 @@ void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<doubl
 
 // The kernels of the second-order smoothing that work in single or double precision.
 template <class Number>
-void bind_of_numbers(nb::module_ &m) {
-    m.def("bend", &bend<Number>, Unlocked(), "stencil"_a, "direction"_a, "out"_a);
-    m.def("step", &step<Number>, Unlocked(), "length"_a, "direction"_a, "bent"_a, "solution"_a, "residual"_a);
-    m.def("onto_finest", &onto_finest<Number>, Unlocked(), "vector"_a, "out"_a);
-    m.def("diagonal_and_finest", &diagonal_and_finest<Number>, Unlocked(), "inverse"_a, "vector"_a, "fine"_a, "out"_a);
+void bind_of_numbers(Kernels &m) {
+    m.def("bend", &bend<Number>);
+    m.def("step", &step<Number>);
+    m.def("diagonal_of_hats", &diagonal_of_hats<Number>);
+    m.def("onto_finest", &onto_finest<Number>);
+    m.def("onto_coarser", &onto_coarser<Number>);
+    m.def("onto_finer", &onto_finer<Number>);
+    m.def("diagonal_and_finest", &diagonal_and_finest<Number>);
 }
 
-const Submodule submodule("second_order", [](nb::module_ &m) {
+const Submodule submodule("second_order", [](Kernels &m) {
     m.attr("MARGIN") = MARGIN;
     m.attr("SPACING") = SPACING;
-    m.def("weights_of_differences", &weights_of_differences, Unlocked(), "disparity"_a, "reliability"_a, "colour"_a, "corners"_a,
-          "factors"_a, "threshold"_a, "variance"_a, "out"_a);
+    m.def("weights_of_differences", &weights_of_differences);
     bind_of_numbers<float>(m);
     bind_of_numbers<double>(m);
-    m.def("diagonal_of_hats", &diagonal_of_hats, Unlocked(), "stencil"_a, "spacing"_a, "out"_a);
 });
 
 }  // namespace

@@ -1,11 +1,5 @@
 // Exact rendering of the built-in scenes: planar surfaces, and their intersections with rays.
-#include <cmath>
-#include <limits>
-#include <vector>
-
-#include "kernels/arguments.hpp"
-#include "kernels/lanes.hpp"
-#include "kernels/parallel.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::rendering {
 namespace {
@@ -26,8 +20,6 @@ struct Drawing {
 
 // Margin by which an occluder must be nearer, for the rounding at edges between two faces.
 constexpr double TOLERANCE = 1e-9;
-
-constexpr double INFINITE = std::numeric_limits<double>::infinity();
 
 // Rays of a turn of a thread.
 constexpr Index RAYS_AT_ONCE = 256;
@@ -180,12 +172,12 @@ void cast(const Drawing &drawing, Array<const double, 2> boxes, Array<const doub
     });
 }
 
-const Submodule submodule("rendering", [](nb::module_ &m) {
+const Submodule submodule("rendering", [](Kernels &m) {
     m.attr("BEYOND") = BEYOND;
-    m.def("nearest", &nearest, Unlocked(), "drawing"_a, "disparity"_a, "owner"_a);
-    m.def("shade", &shade, Unlocked(), "drawing"_a, "v"_a, "u"_a, "samples"_a, "picture"_a);
-    m.def("hide", &hide, Unlocked(), "drawing"_a, "boxes"_a, "disparity"_a, "v"_a, "u"_a, "hidden"_a);
-    m.def("cast", &cast, Unlocked(), "drawing"_a, "boxes"_a, "normals"_a, "origin"_a, "rays"_a, "pinhole"_a, "depth"_a, "colours"_a);
+    m.def("nearest", &nearest);
+    m.def("shade", &shade);
+    m.def("hide", &hide);
+    m.def("cast", &cast);
 });
 
 }  // namespace

@@ -1,9 +1,5 @@
 // Regions for evaluation.
-#include <cmath>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::regions {
 namespace {
@@ -42,8 +38,8 @@ void occluded(Array<const double, 2> ground_truth, Array<const double, 2> baseli
     });
 }
 
-const Submodule submodule("regions", [](nb::module_ &m) {
-    m.def("occluded", &occluded, Unlocked(), "ground_truth"_a, "baselines"_a, "nearest"_a, "out"_a);
+const Submodule submodule("regions", [](Kernels &m) {
+    m.def("occluded", &occluded);
 });
 
 }  // namespace

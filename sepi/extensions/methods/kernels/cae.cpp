@@ -1,11 +1,5 @@
 // The constrained angular entropy and the constrained adaptive defocus.
-#include <cmath>
-#include <limits>
-
-#include "kernels/arguments.hpp"
-#include "kernels/exponential.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::cae {
 namespace {
@@ -66,7 +60,7 @@ void constrained_least_patch(Array<const float, 3> response, Array<const float, 
         float *__restrict total = totals.array().data;
         for (Index x = 0; x < W; ++x) {
             float *__restrict least = out.at(y, x);
-            std::fill_n(least, K, std::numeric_limits<float>::infinity());
+            std::fill_n(least, K, INFINITE);
             for (Index part = 0; part < 9; ++part) {
                 const Index top = y - reach + part / 3 * PATCH, left = x - reach + part % 3 * PATCH;
                 float weights = 0;
@@ -86,11 +80,11 @@ void constrained_least_patch(Array<const float, 3> response, Array<const float, 
     });
 }
 
-const Submodule submodule("cae", [](nb::module_ &m) {
+const Submodule submodule("cae", [](Kernels &m) {
     m.attr("LEVELS") = LEVELS;
     m.attr("PATCH") = PATCH;
-    m.def("constrained_entropies", &constrained_entropies, Unlocked(), "sheared"_a, "own"_a, "weights"_a, "out"_a);
-    m.def("constrained_least_patch", &constrained_least_patch, Unlocked(), "response"_a, "guide"_a, "sigma"_a, "constraint"_a, "out"_a);
+    m.def("constrained_entropies", &constrained_entropies);
+    m.def("constrained_least_patch", &constrained_least_patch);
 });
 
 }  // namespace

@@ -2,16 +2,12 @@
 //
 // messages (4, H, W, K): to a pixel from its neighbour at the left, above, at the right, below; costs (H, W, K) of its
 // labels; across and down (H, W): weights of the edges to the next pixels.
-#include <limits>
-
-#include "kernels/arguments.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::message_passing {
 namespace {
 
 enum Side { LEFT, ABOVE, RIGHT, BELOW };
-
-constexpr float INFINITE = std::numeric_limits<float>::infinity();
 
 // Message over an edge: lower envelope of truncated cones on half the belief minus the opposite message.
 void send(const float *belief, const float *back, float weight, float truncation, float *__restrict out, Index K) {
@@ -72,9 +68,9 @@ void decode(Array<const float, 3> costs, Array<const float, 2> across, Array<con
     }
 }
 
-const Submodule submodule("message_passing", [](nb::module_ &m) {
-    m.def("pass_messages", &pass_messages, Unlocked(), "costs"_a, "across"_a, "down"_a, "truncation"_a, "messages"_a);
-    m.def("decode", &decode, Unlocked(), "costs"_a, "across"_a, "down"_a, "truncation"_a, "messages"_a, "labels"_a);
+const Submodule submodule("message_passing", [](Kernels &m) {
+    m.def("pass_messages", &pass_messages);
+    m.def("decode", &decode);
 });
 
 }  // namespace

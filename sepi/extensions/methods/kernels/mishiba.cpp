@@ -1,9 +1,5 @@
 // The fast method with one-bit features.
-#include <cmath>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::mishiba {
 namespace {
@@ -135,11 +131,10 @@ void median_pass(Array<const std::int32_t, 2> current, Array<const std::int32_t,
     });
 }
 
-const Submodule submodule("mishiba", [](nb::module_ &m) {
-    m.def("pair_costs", &pair_costs, Unlocked(), "details"_a, "offsets"_a, "step"_a, "out"_a);
-    m.def("keep_least", &keep_least, Unlocked(), "k"_a, "slopes"_a, "constants"_a, "guide"_a, "step"_a, "labels"_a, "kept"_a);
-    m.def("median_pass", &median_pass, Unlocked(), "current"_a, "data"_a, "data_weights"_a, "guide"_a, "radius"_a, "gap"_a, "table"_a,
-          "per_entry"_a, "out"_a);
+const Submodule submodule("mishiba", [](Kernels &m) {
+    m.def("pair_costs", &pair_costs);
+    m.def("keep_least", &keep_least);
+    m.def("median_pass", &median_pass);
 });
 
 }  // namespace

@@ -1,6 +1,5 @@
 // Angular patches that an edge splits in two.
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::occ {
 namespace {
@@ -34,9 +33,8 @@ void moments_of_halves(Array<const float, 4> sheared, Array<const float, 3> refe
     });
 }
 
-const Submodule submodule("occ", [](nb::module_ &m) {
-    m.def("moments_of_halves", &moments_of_halves, Unlocked(), "sheared"_a, "reference"_a, "places"_a, "halves"_a, "means"_a,
-          "variances"_a);
+const Submodule submodule("occ", [](Kernels &m) {
+    m.def("moments_of_halves", &moments_of_halves);
 });
 
 }  // namespace

@@ -2,9 +2,7 @@
 //
 // An EPI is processed column by column. A ring keeps the histograms of the columns in reach, so that each column is
 // counted once for all parallelograms that contain it.
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::spo {
 namespace {
@@ -89,8 +87,8 @@ void half_distances(Array<const float, 4> lines, Array<const float, 1> shares, I
     });
 }
 
-const Submodule submodule("spo", [](nb::module_ &m) {
-    m.def("half_distances", &half_distances, Unlocked(), "lines"_a, "shares"_a, "bins"_a, "out"_a);
+const Submodule submodule("spo", [](Kernels &m) {
+    m.def("half_distances", &half_distances);
 });
 
 }  // namespace

@@ -1,10 +1,5 @@
 // The weighted median of a map.
-#include <vector>
-
-#include "kernels/arguments.hpp"
-#include "kernels/exponential.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::weighted_median {
 namespace {
@@ -30,8 +25,8 @@ void weighted_medians(Array<const float, 2> values, Array<const float, 3> guide,
     });
 }
 
-const Submodule submodule("weighted_median", [](nb::module_ &m) {
-    m.def("weighted_medians", &weighted_medians, Unlocked(), "values"_a, "guide"_a, "radius"_a, "sigma"_a, "weight"_a, "out"_a);
+const Submodule submodule("weighted_median", [](Kernels &m) {
+    m.def("weighted_medians", &weighted_medians);
 });
 
 }  // namespace

@@ -1,10 +1,6 @@
 // Points of a view in the other views, by the exact disparity: occlusion, and shared light. Maps of all views are
 // (N, H, W), those of one view (H, W); baselines (N, 2), down and across, are from that view.
-#include <cmath>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::reprojection {
 namespace {
@@ -75,10 +71,9 @@ void gathered_light(Array<const float, 4> light, Array<const float, 3> dispariti
     });
 }
 
-const Submodule submodule("reprojection", [](nb::module_ &m) {
-    m.def("seen_elsewhere", &seen_elsewhere, Unlocked(), "disparities"_a, "baselines"_a, "view"_a, "same"_a, "hidden"_a, "seen"_a);
-    m.def("gathered_light", &gathered_light, Unlocked(), "light"_a, "disparities"_a, "surface"_a, "baselines"_a, "view"_a, "bend"_a,
-          "mean"_a, "variance"_a);
+const Submodule submodule("reprojection", [](Kernels &m) {
+    m.def("seen_elsewhere", &seen_elsewhere);
+    m.def("gathered_light", &gathered_light);
 });
 
 }  // namespace

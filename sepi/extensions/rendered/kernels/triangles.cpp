@@ -1,12 +1,5 @@
 // First triangles on the rays of a view's pixels.
-#include <array>
-#include <cmath>
-#include <limits>
-#include <vector>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::triangles {
 namespace {
@@ -91,13 +84,13 @@ void first_met(Array<const double, 3> corners, Array<const double, 1> origin, Ar
     const Scratch<double, 1> across(size);
     for (Index column = 0; column < size; ++column) across.array()(column) = (double(column) + 0.5 - frame(2)) / frame(0);
     parallel_for(0, (size + BAND - 1) / BAND, [&](Index band) {
-        const auto depth = Scratch<double, 2>(std::min(BAND, size - band * BAND), size).filled(std::numeric_limits<double>::infinity());
+        const auto depth = Scratch<double, 2>(std::min(BAND, size - band * BAND), size).filled(INFINITE);
         for (Index n = 1; n < count; ++n) triangles[n].meet(n, near, frame.data, across.array().data, band * BAND, depth.array(), out);
     });
 }
 
-const Submodule submodule("triangles", [](nb::module_ &m) {
-    m.def("first_met", &first_met, Unlocked(), "corners"_a, "origin"_a, "rotation"_a, "frame"_a, "near"_a, "out"_a);
+const Submodule submodule("triangles", [](Kernels &m) {
+    m.def("first_met", &first_met);
 });
 
 }  // namespace

@@ -1,10 +1,4 @@
 // Maps of all views, made from maps of a few.
-#include <cmath>
-#include <vector>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
 #include "matching/kernels/carried_map.hpp"
 
 namespace sepi::all_views {
@@ -151,9 +145,9 @@ void maps_of_views(const Sources &sources, Array<const double, 2> baselines, Arr
     });
 }
 
-const Submodule submodule("all_views", [](nb::module_ &m) {
+const Submodule submodule("all_views", [](Kernels &m) {
     m.attr("EMPTY") = EMPTY;
-    m.def("maps_of_views", &maps_of_views, Unlocked(), "sources"_a, "baselines"_a, "disparity"_a, "confidence"_a, "bars"_a, "extended"_a);
+    m.def("maps_of_views", &maps_of_views);
 });
 
 }  // namespace

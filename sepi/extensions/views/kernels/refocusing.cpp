@@ -1,9 +1,5 @@
 // Pictures in focus everywhere, and refocused pictures with views interpolated between the views.
-#include <cmath>
-
-#include "kernels/arguments.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "kernels/kernel.hpp"
 
 namespace sepi::refocusing {
 namespace {
@@ -100,11 +96,10 @@ void fill_between(Array<const float, 3> sheared, Array<const float, 2> surfaces,
     });
 }
 
-const Submodule submodule("refocusing", [](nb::module_ &m) {
+const Submodule submodule("refocusing", [](Kernels &m) {
     m.attr("WIDEST") = WIDEST;
-    m.def("add_view", &add_view, Unlocked(), "view"_a, "v"_a, "u"_a, "disparity"_a, "nearest"_a, "margin"_a, "centre"_a, "scale2"_a,
-          "sums"_a, "weights"_a);
-    m.def("fill_between", &fill_between, Unlocked(), "sheared"_a, "surfaces"_a, "focus"_a, "cell"_a, "margin"_a, "out"_a);
+    m.def("add_view", &add_view);
+    m.def("fill_between", &fill_between);
 });
 
 }  // namespace
