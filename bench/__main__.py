@@ -274,7 +274,9 @@ def cameras(scenes: tuple[str, ...], size: int, views: int, seeds: int, variant:
 
 
 @main.command()
-@click.option("--scene", "scenes", multiple=True, help="Built-in scene, light field or file of a render; repeatable.")
+@click.option(
+    "--scene", "scenes", multiple=True, help="Built-in scene, street:SEED, light field or render; repeatable."
+)
 @click.option(
     "--rounded",
     nargs=2,

@@ -58,9 +58,9 @@ class Sample:
 def light_fields(
     scenes: Iterable[str], sigmas: Sequence[float], held_out: bool = False, grids: Iterable[tuple[int, int]] = ()
 ) -> Iterator[tuple[str, LightField]]:
-    """Light fields and names: built-in scenes and folders with the given noise, rendered scenes at all levels.
+    """Light fields and names: built-in scenes, ``street:SEED`` and folders with the given noise, renders at all levels.
 
-    Built-in scenes and folders also as so many rows and columns of views from the reference view on, without noise.
+    All but renders also as so many rows and columns of views from the reference view on, without noise.
 
     Raises
     ------
@@ -74,7 +74,8 @@ def light_fields(
                 yield light_field.name, light_field
             continue
         kind, _, seed = scene.partition(":")
-        light_field = street(int(seed)) if kind == "street" else scene_for_choosing(scene, NOISE_LEVELS[0])
+        drawn = kind == "street" and seed.isdecimal()
+        light_field = street(int(seed)) if drawn else scene_for_choosing(scene, NOISE_LEVELS[0])
         for sigma in sigmas:
             if sigma:
                 yield f"{light_field.name} + {sigma:g}", with_noise(light_field, sigma)
