@@ -15,6 +15,7 @@ from bench.cases import GROUPS
 from bench.measure import Case, Measurement, Result, measured, read_result
 from bench.noisy import DIGITS
 from bench.scene import Scene
+from sepi.error_bars.cues import FLOORS
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
@@ -273,7 +274,9 @@ def cameras(scenes: tuple[str, ...], size: int, views: int, seeds: int, variant:
 
 
 @main.command()
-@click.option("--scene", "scenes", multiple=True, help="Built-in scene, light field or file of a render; repeatable.")
+@click.option(
+    "--scene", "scenes", multiple=True, help="Built-in scene, street:SEED, light field or render; repeatable."
+)
 @click.option(
     "--rounded",
     nargs=2,
@@ -285,8 +288,12 @@ def cameras(scenes: tuple[str, ...], size: int, views: int, seeds: int, variant:
 @click.option("--judge", multiple=True, help="File of a render that nothing is fitted to; repeatable.")
 @click.option("--sigma", "sigmas", type=click.FloatRange(0, 128), multiple=True, help="Noise, of 255; repeatable.")
 @click.option(
+    "--grid", "grids", nargs=2, type=click.IntRange(1), multiple=True, help="Rows and columns of few views; repeatable."
+)
+@click.option(
     "--variant", "variants", type=click.Choice(list(VARIANTS)), multiple=True, help="Repeatable; best and fast."
 )
+@click.option("--only", type=click.Choice(list(FLOORS)), multiple=True, help="Cue to fit, others stay; repeatable.")
 @click.option("--leave-out", is_flag=True, help="Judge each scene by a fit to all others.")
 @click.option("--kept", type=_PATH, help="Folder where pixels are kept for the next time.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
@@ -295,7 +302,9 @@ def errors(
     rounded: tuple[tuple[str, float], ...],
     judge: tuple[str, ...],
     sigmas: tuple[float, ...],
+    grids: tuple[tuple[int, int], ...],
     variants: tuple[str, ...],
+    only: tuple[str, ...],
     leave_out: bool,
     kept: Path | None,
     threads: int | None,
@@ -326,19 +335,19 @@ def errors(
         with tqdm(some, disable=None, leave=False, bar_format="{n}/{total} {desc} |{bar}|") as bar:
             for scene in bar:
                 bar.set_description(scene)
-                for name, light_field in light_fields([scene], levels, held_out):
+                for name, light_field in light_fields([scene], levels, held_out, grids):
                     found += [sample(light_field, name, one, steps.get(scene, 0.0), kept) for one in variants]
         return found
 
     levels = sigmas or (0.0, 3.0, 8.0)
     samples = sampled(scenes or ("rack", "pencils"), levels) + sampled(steps, (0.0,))
-    calibration = fitted(samples, CALIBRATIONS[choice])
+    calibration = fitted(samples, CALIBRATIONS[choice], only)
     click.echo(as_code(choice.upper(), calibration))
     held_out = sampled(judge, levels, held_out=True)
     click.echo(tables.markdown(judgements(samples + held_out, {}, calibration)))
     if leave_out:
         click.echo("\nFitted to all other scenes:\n")
-        click.echo(tables.markdown(judgements(samples, left_out(samples, CALIBRATIONS[choice]), calibration)))
+        click.echo(tables.markdown(judgements(samples, left_out(samples, CALIBRATIONS[choice], only), calibration)))
     names = ", ".join(f"`{variant}`" for variant in variants)
     parts = {"of the fit": samples, "held out": held_out}
     rows = [{"maps": f"{names}: {len(some)} {of}", **pooled(some, calibration)} for of, some in parts.items() if some]

@@ -1,12 +1,13 @@
 """Fit of the error model (:mod:`sepi.error_bars`) by maximum likelihood, and its evaluation on left-out scenes.
 
 Every light field and variant has the same weight. Powers are weakly regularised towards 0, in units of the variation of
-their cue's logarithm.
+their cue's logarithm. A cue that rests at its least value on most scenes can be added without moving the bars of these:
+its powers alone are fitted.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,11 +49,14 @@ class Judged(NamedTuple):
     ause_smooth: float
 
 
-def fitted(samples: Sequence[Sample], form: Calibration) -> Calibration:
-    """The calibration with the same cues as ``form`` that maximises the likelihood of the errors."""
+def fitted(samples: Sequence[Sample], form: Calibration, only: Collection[str] = ()) -> Calibration:
+    """The calibration with the same cues as ``form`` that maximises the likelihood of the errors.
+
+    Of cues ``only``, the powers alone are fitted, from 0 up: where these have their least values, nothing changes.
+    """
     names = [list(part) for part in form.parts]
     columns = [np.concatenate([_columns(one, part) for one in samples]) for part in names]
-    middle, spread = _scaling(columns)
+    middle, spread = _scaling(columns, names, only)
     designs = [(column - m) / s for column, m, s in zip(columns, middle, spread, strict=True)]
     data = _Data(
         np.concatenate([one.error for one in samples]),
@@ -61,9 +65,17 @@ def fitted(samples: Sequence[Sample], form: Calibration) -> Calibration:
         np.concatenate([np.full(one.error.size, one.step**2 / 12) for one in samples]),
         np.concatenate([np.full(one.error.size, 1 / (one.error.size * len(samples))) for one in samples]),
     )
-    start = [np.zeros(len(part)) for part in names]
-    for values, first in zip(start, (-5.0, -2.0, -2.0, -3.0), strict=True):
-        values[0] = first
+    start = [
+        np.append(first, np.zeros(len(part) - 1)) for first, part in zip((-5.0, -2.0, -2.0, -3.0), names, strict=True)
+    ]
+    bounds: list[tuple[float | None, float | None]] = [(None, None)] * sum(map(len, names))
+    if only:
+        start = [np.array(list(part.values())) * s for part, s in zip(form.parts, spread, strict=True)]
+        for values, m, s, part in zip(start, middle, spread, names, strict=True):
+            values[0] += values[1:] @ (m / s)[1:]
+            values[[label in only for label in part]] = 0
+        free = [label in only for part in names for label in part]
+        bounds = [(0, None) if one else (value, value) for one, value in zip(free, np.concatenate(start), strict=True)]
     pulled = [np.arange(len(part)) > 0 for part in names]
     ends = np.cumsum([len(part) for part in names])[:-1]
 
@@ -74,7 +86,8 @@ def fitted(samples: Sequence[Sample], form: Calibration) -> Calibration:
         slopes = [g + 2 * PULL * p * on for g, p, on in zip(slopes, powers, pulled, strict=True)]
         return value, np.concatenate(slopes)
 
-    found = minimize(loss, np.concatenate(start), jac=True, method="L-BFGS-B", options={"maxiter": 500}).x
+    options = {"maxiter": 500}
+    found = minimize(loss, np.concatenate(start), jac=True, method="L-BFGS-B", bounds=bounds, options=options).x
     parts: list[dict[str, float]] = []
     for labels, powers, m, s in zip(names, np.split(found, ends), middle, spread, strict=True):
         raw = powers / s
@@ -125,10 +138,10 @@ def pooled(samples: Sequence[Sample], calibration: Calibration) -> dict[str, str
     }
 
 
-def left_out(samples: Sequence[Sample], form: Calibration) -> dict[str, Calibration]:
+def left_out(samples: Sequence[Sample], form: Calibration, only: Collection[str] = ()) -> dict[str, Calibration]:
     """Scene to the calibration that is fitted to all other scenes."""
     worlds = dict.fromkeys(one.world for one in samples)
-    return {world: fitted([one for one in samples if one.world != world], form) for world in worlds}
+    return {world: fitted([one for one in samples if one.world != world], form, only) for world in worlds}
 
 
 def as_code(name: str, calibration: Calibration) -> str:
@@ -161,8 +174,12 @@ def _columns(one: Sample, part: Sequence[str]) -> FloatArray:
     return np.stack([np.ones(one.error.size), *columns], axis=1)
 
 
-def _scaling(columns: Sequence[FloatArray]) -> tuple[list[FloatArray], list[FloatArray]]:
+def _scaling(
+    columns: Sequence[FloatArray], names: Sequence[Sequence[str]], only: Collection[str]
+) -> tuple[list[FloatArray], list[FloatArray]]:
     middle, spread = [column.mean(axis=0) for column in columns], [column.std(axis=0) + 1e-6 for column in columns]
+    if only:
+        middle = [np.array([np.log(FLOORS.get(label, 1.0)) for label in part]) for part in names]
     for m, s in zip(middle, spread, strict=True):
         m[0], s[0] = 0, 1
     return middle, spread

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.noisy import with_noise
+from bench.streets import street
 from bench.sweep import scene_for_choosing
 from sepi.error_bars.bars import ErrorBars, error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
@@ -55,9 +56,11 @@ class Sample:
 
 
 def light_fields(
-    scenes: Iterable[str], sigmas: Sequence[float], held_out: bool = False
+    scenes: Iterable[str], sigmas: Sequence[float], held_out: bool = False, grids: Iterable[tuple[int, int]] = ()
 ) -> Iterator[tuple[str, LightField]]:
-    """Light fields and names: built-in scenes and folders with the given noise, rendered scenes at all levels.
+    """Light fields and names: built-in scenes, ``street:SEED`` and folders with the given noise, renders at all levels.
+
+    All but renders also as so many rows and columns of views from the reference view on, without noise.
 
     Raises
     ------
@@ -70,12 +73,24 @@ def light_fields(
                 light_field = read_scene(Path(scene), level, 1) if held_out else scene_for_choosing(scene, level)
                 yield light_field.name, light_field
             continue
-        light_field = scene_for_choosing(scene, NOISE_LEVELS[0])
+        kind, _, seed = scene.partition(":")
+        drawn = kind == "street" and seed.isdecimal()
+        light_field = street(int(seed)) if drawn else scene_for_choosing(scene, NOISE_LEVELS[0])
         for sigma in sigmas:
             if sigma:
                 yield f"{light_field.name} + {sigma:g}", with_noise(light_field, sigma)
             else:
                 yield light_field.name, light_field
+        for rows, columns in grids:
+            yield f"{light_field.name} + {rows}x{columns}", few_views(light_field, rows, columns)
+
+
+def few_views(light_field: LightField, rows: int, columns: int) -> LightField:
+    """So many rows and columns of the views, from the reference view on."""
+    t, s = light_field.reference_position
+    views = np.ascontiguousarray(light_field.views[t : t + rows, s : s + columns])
+    known, truth = light_field.disparity_range, light_field.ground_truth
+    return LightField(views, light_field.name, disparity_range=known, view=(0, 0), ground_truth=truth)
 
 
 def sample(light_field: LightField, name: str, variant: str, step: float = 0.0, kept: Path | None = None) -> Sample:

@@ -17,6 +17,7 @@ References
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple, Self
 
 import cv2
@@ -25,13 +26,13 @@ from pydantic import Field, model_validator
 
 from sepi.error_bars.bars import error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
-from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_views
+from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_texture, cues_of_views
 from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
 from sepi.matching.gauss_newton import ANY_SURFACE, Evidence, GaussNewton, Surfaces, windowed_step
-from sepi.matching.softening import compared_views
+from sepi.matching.softening import compared_views, reference_sharpness
 from sepi.matching.spline_views import forget_splines
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.multilevel import solve_smooth
@@ -43,7 +44,16 @@ from sepi.regularization.second_order import (
     upper_quartile,
 )
 from sepi.regularization.wls import WlsParameters, data_weight, rectified_confidence, smoothness_coefficient, solve
-from sepi.stage import Choice, NoParameters, OcclusionMarginParameters, Progress, StageMaps, none, require_previous
+from sepi.stage import (
+    LIGHT_DEVIATION,
+    Choice,
+    NoParameters,
+    OcclusionMarginParameters,
+    Progress,
+    StageMaps,
+    none,
+    require_previous,
+)
 
 UNIFORM_WEIGHT = 0.05
 """Weight of the data on planes of textureless regions; planes cost nothing, so a small weight keeps them."""
@@ -236,16 +246,22 @@ def _with_bars(
     The light field is the original one, whose noise counts. ``variance``, if given, is the variance after smoothing.
     """
     gradient, curvature, evidence = told
-    known = light_field.require_disparity_range()
+    known, noise = light_field.require_disparity_range(), measured_noise(light_field)
     cues = {
         **cues_of_map(disparity, curvature, known),
-        **cues_of_views(gradient, curvature, evidence, measured_noise(light_field).usual),
-        **cues_of_stage_before(before.confidence, before.mask("textureless"), curvature),
+        **cues_of_views(gradient, curvature, evidence, noise.usual),
+        **cues_of_stage_before(
+            before.confidence, before.mask("textureless"), before.extra.get(LIGHT_DEVIATION), curvature
+        ),
     }
     if variance is not None:
         cues["deviation"] = np.sqrt(variance)
+    cues |= cues_of_texture(reference_sharpness(light_field, noise), cues["agreement"], cues["deviation"])
     bars = error_bars(disparity, cues, known, calibration)
-    return before.updated(disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high)
+    kept = {name: values for name, values in before.extra.items() if name != LIGHT_DEVIATION}
+    return replace(before, extra=kept).updated(
+        disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high
+    )
 
 
 def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMap:

@@ -27,6 +27,9 @@ CLOSE = 0.07
 SIGMA, LOW, HIGH = ERROR_BARS = "sigma", "low", "high"
 """Names of the error bars: standard deviation, and bounds of the interval of 90 %."""
 
+LIGHT_DEVIATION = "light_deviation"
+"""Map from stage to stage: standard deviation of the disparity of planes by a region's light; 0 elsewhere."""
+
 Progress = Callable[[float], None]
 """Called with the fraction done, 0..1."""
 
@@ -402,7 +405,9 @@ def _rescaled(maps: StageMaps, factor: float) -> StageMaps:
     unit, volume = np.float32(factor), maps.cost_volume
     if volume is not None:
         volume = replace(volume, disparities=volume.disparities * unit)
-    extra = {name: values * unit if name in ERROR_BARS else values for name, values in maps.extra.items()}
+    extra = {
+        name: values * unit if name in (*ERROR_BARS, LIGHT_DEVIATION) else values for name, values in maps.extra.items()
+    }
     return replace(maps, disparity=maps.disparity * unit, extra=extra, cost_volume=volume)
 
 

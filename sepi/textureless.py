@@ -33,7 +33,16 @@ from sepi.image.edges import CannyParameters, canny_edges
 from sepi.image.superpixels import Superpixels, adjacency, colour_modes, superpixels
 from sepi.lightfield import BoolMap, FloatArray, FloatMap, LightField
 from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions
-from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, relative_confidence, require_previous
+from sepi.stage import (
+    LIGHT_DEVIATION,
+    Choice,
+    NoParameters,
+    Progress,
+    StageMaps,
+    none,
+    relative_confidence,
+    require_previous,
+)
 
 # weight of distance relative to colour in superpixels, as usual for SLIC
 _COMPACTNESS = 10.0
@@ -139,7 +148,7 @@ def uniform_planes(
     Returns
     -------
     StageMaps
-        Adds ``textureless``, bool: pixels that got a plane.
+        Adds ``textureless``, bool: pixels that got a plane; and :data:`sepi.stage.LIGHT_DEVIATION`.
 
     Examples
     --------
@@ -158,12 +167,13 @@ def uniform_planes(
     True
     """
     before = require_previous(previous)
-    filled, uniform = fill_uniform_regions(light_field, before, parameters)
+    filled, uniform, deviation = fill_uniform_regions(light_field, before, parameters)
     # beside what moved back, the map had no depth step at which to decide
     rims = BoundaryParameters(occlusion_margin=parameters.occlusion_margin)
     disparity = assigned_to_surfaces(light_field, filled, rims, before.disparity)
+    uniform &= disparity == filled
     progress(1.0)
-    return before.updated(disparity, before.confidence, textureless=uniform & (disparity == filled))
+    return before.updated(disparity, before.confidence, textureless=uniform, **{LIGHT_DEVIATION: deviation})
 
 
 def superpixel_size(shape: tuple[int, int], parameters: LtiParameters) -> int:

@@ -37,7 +37,7 @@ class Calibration:
 
 SECOND_ORDER = Calibration(
     scale={
-        CONSTANT: 0.347,
+        CONSTANT: -6.043,
         "deviation": 0.288,
         "second_difference": 0.346,
         "disagreement": 0.146,
@@ -48,6 +48,10 @@ SECOND_ORDER = Calibration(
         "wide_confidence": -0.787,
         "long_second_difference": 0.185,
         "range": 0.371,
+        "few_views": 0.73,
+        "interpolation": 0.307,
+        "conflict": 2.429,
+        "light_deviation": 1.019,
     },
     outlier_scale={
         CONSTANT: -1.365,
@@ -55,12 +59,13 @@ SECOND_ORDER = Calibration(
         "plane": -0.494,
     },
     outlier={
-        CONSTANT: -3.449,
+        CONSTANT: -3.203,
         "confidence": -0.429,
         "second_difference": 0.002,
         "agreement": -2.295,
         "wide_deviation": 0.886,
         "detail_agreement": -1.665,
+        "interpolation": 1.103,
     },
     rim={
         CONSTANT: -3.36,

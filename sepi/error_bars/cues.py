@@ -28,6 +28,9 @@ IGNORANCE = 0.01
 BARE_DEVIATION = 0.15
 """Standard deviation by the information of 3x3 pixels from which a pixel is bare, pixels per view step."""
 
+LEAST_DEVIATION = 0.004
+"""Standard deviation that errors of the texture are compared with at least, pixels per view step."""
+
 STEP_REACH = 2
 """Distance within which a pixel may belong to a neighbour's surface, pixels."""
 
@@ -57,6 +60,10 @@ FLOORS: Mapping[str, float] = {
     "detail_agreement": 0.01,
     "range": 1e-3,
     "plane": 0.1,
+    "few_views": 1.125,
+    "interpolation": 0.8,
+    "conflict": 60.0,
+    "light_deviation": 0.03,
 }
 """Cue to its least value; smaller values count as this one."""
 
@@ -116,7 +123,8 @@ def cues_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, n
         ``deviation`` and ``wide_deviation``: standard deviation by the information over 3x3 and 7x7 pixels; ``step``
         and ``wide_step``: change of disparity that the cost asks for, over 3x3 and 15x15 pixels; ``disagreement``:
         difference of this change between views on opposite sides; ``misfit``: residuals in units of the noise;
-        ``agreement`` and ``detail_agreement``: mean robust weight of the views by colours and by detail.
+        ``agreement`` and ``detail_agreement``: mean robust weight of the views by colours and by detail;
+        ``few_views``: number of views that see the pixel over that of their differences.
     """
     seeing, bare = _mean(evidence.seeing, 3) + _LEAST, bare_pixels(curvature)
     step = np.abs(_mean(gradient, 3) / (_mean(curvature, 3) + _LEAST))
@@ -130,16 +138,35 @@ def cues_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, n
         "misfit": np.sqrt(residual / 3) / np.float32(max(noise, _LEAST_NOISE)),
         "agreement": _mean(evidence.agreement, 3) / seeing,
         "detail_agreement": _mean(evidence.detail_agreement, 3) / seeing,
+        "few_views": 1 + 1 / np.maximum(seeing, 1),
     }
 
 
-def cues_of_stage_before(confidence: FloatMap, plane: BoolMap, curvature: FloatMap) -> dict[str, FloatMap]:
-    """Cues from the stage before: ``confidence``, ``wide_confidence`` over 15x15 pixels, and ``plane``, 1 on planes."""
+def cues_of_stage_before(
+    confidence: FloatMap, plane: BoolMap, light_deviation: FloatMap | None, curvature: FloatMap
+) -> dict[str, FloatMap]:
+    """Cues from the stage before: ``confidence``, ``wide_confidence`` over 15x15 pixels, and ``plane``, 1 on planes;
+    ``light_deviation``, standard deviation of planes by a region's light, 0 elsewhere.
+    """
     return {
         "confidence": confidence,
         "wide_confidence": _mean(confidence, 15, bare_pixels(curvature)),
         "plane": plane.astype(np.float32),
+        "light_deviation": np.zeros_like(confidence) if light_deviation is None else light_deviation,
     }
+
+
+def cues_of_texture(sharpness: FloatMap, agreement: FloatMap, deviation: FloatMap) -> dict[str, FloatMap]:
+    """Cues of errors that more information does not make less, in units of the ``deviation`` that it promises.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (H, W), float32
+        ``interpolation``: error of cubic splines, which grows with the fourth power of the frequency, by the
+        :func:`sepi.matching.softening.sharpness`; ``conflict``: share of the views that the colours do not fit.
+    """
+    information = np.asarray(1 / np.maximum(deviation, np.float32(LEAST_DEVIATION)), np.float32)
+    return {"interpolation": sharpness**4 * information, "conflict": (1 - agreement) * information}
 
 
 def bare_pixels(curvature: FloatMap) -> BoolMap:

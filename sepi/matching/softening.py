@@ -142,6 +142,11 @@ def sharpness(picture: FloatMap, variance: FloatMap) -> FloatMap:
     return np.asarray(cv2.blur(share, (_DENSE, _DENSE)), np.float32)
 
 
+def reference_sharpness(light_field: LightField, noise: ViewNoise) -> FloatMap:
+    """:func:`sharpness` of the reference view in this noise; shape (H, W), float32."""
+    return sharpness(_grey(light_field.views[light_field.reference_position]), _grey_variance(light_field, noise))
+
+
 def share_too_sharp(light_field: LightField) -> float:
     """Share of the reference view, 0..1, whose texture is too sharp for interpolation; 0 if views miss pixels.
 
@@ -189,5 +194,8 @@ def _softened_views(light_field: LightField, noise: ViewNoise, blur: float) -> n
 
 def _too_sharp(view: npt.NDArray[Any], variance: FloatMap) -> FloatMap:
     """Degree to which each pixel of a view (H, W, C) is too sharp, 0..1."""
-    grey = as_unit_float(cv2.cvtColor(view, cv2.COLOR_RGB2GRAY) if view.shape[2] == 3 else view[..., 0])
-    return np.asarray(np.clip((sharpness(grey, variance) - SHARP) / (SHARPEST - SHARP), 0, 1), np.float32)
+    return np.asarray(np.clip((sharpness(_grey(view), variance) - SHARP) / (SHARPEST - SHARP), 0, 1), np.float32)
+
+
+def _grey(view: npt.NDArray[Any]) -> FloatMap:
+    return as_unit_float(cv2.cvtColor(view, cv2.COLOR_RGB2GRAY) if view.shape[2] == 3 else view[..., 0])

@@ -61,6 +61,10 @@ class LitPlane:
         mean = _weighted(basis, np.full(len(basis), 1 / len(basis)))
         return float(np.sqrt(np.maximum(np.sum(self.covariance * mean), 0)))
 
+    def deviations(self, basis: FloatArray) -> FloatArray:
+        """Standard deviation of the disparity at points ``basis`` (N, 3); shape (N,)."""
+        return np.asarray(np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", basis, self.covariance, basis), 0)))
+
     def distance(self, plane: Plane) -> float:
         """Mahalanobis distance of another plane, in standard deviations."""
         difference = plane - self.plane

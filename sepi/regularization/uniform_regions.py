@@ -77,8 +77,8 @@ class UniformPlanesParameters(OcclusionMarginParameters, SofteningParameters, Bo
 
 def fill_uniform_regions(
     light_field: LightField, before: StageMaps, parameters: UniformPlanesParameters
-) -> tuple[FloatMap, BoolMap]:
-    """Disparity with planes in uniform regions, and the mask of their pixels.
+) -> tuple[FloatMap, BoolMap, FloatMap]:
+    """Disparity with planes in uniform regions, the mask of their pixels, and how well light tells them.
 
     Parameters
     ----------
@@ -92,6 +92,8 @@ def fill_uniform_regions(
     disparity : ndarray, shape (H, W), float32
     held : ndarray, shape (H, W), bool
         Pixels that got a plane and should keep it; where noise may hide faint texture, a border's plane is not held.
+    light_deviation : ndarray, shape (H, W), float32
+        Standard deviation of the disparity of planes by light, pixels per view step; 0 elsewhere.
 
     Raises
     ------
@@ -119,8 +121,11 @@ def fill_uniform_regions(
         chosen_plane(region, before.disparity[region.place], border, lit.get(n), noisy)
         for n, (region, border) in enumerate(found)
     ]
-    disparity, held = before.disparity.copy(), np.zeros_like(core)
+    disparity, held, light_deviation = before.disparity.copy(), np.zeros_like(core), np.zeros_like(before.disparity)
     known_planes = [(region, chosen) for (region, _), chosen in zip(found, planes, strict=True) if chosen is not None]
+    for n, ((region, _), chosen) in enumerate(zip(found, planes, strict=True)):
+        if chosen is not None and chosen.source == "light":
+            light_deviation[region.place][region.pixels] = lit[n].deviations(region.basis)
     for region, chosen in known_planes:
         # a plane known at one side only may leave the range at the other
         values = np.clip(region.basis @ chosen.plane, known.minimum, known.maximum)
@@ -139,7 +144,7 @@ def fill_uniform_regions(
         # faint texture below the noise may tell the surface better than a border's plane
         faint = noisy and chosen.source == "border" and 2 * core[place][pixels].sum() < pixels.sum()
         held[place] |= pixels & np.bool_(not faint)
-    return disparity, held
+    return disparity, held, light_deviation
 
 
 def _variance_of_views(light_field: LightField, field: LightField, compared: BoolMap) -> FloatMap:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sepi.error_bars.cues import FLOORS, cues_of_map, cues_of_stage_before, cues_of_views
+from sepi.error_bars.cues import FLOORS, cues_of_map, cues_of_stage_before, cues_of_texture, cues_of_views
 from sepi.lightfield import DisparityRange
 from sepi.matching.gauss_newton import Evidence
 
@@ -73,7 +73,8 @@ def test_where_no_view_sees_signs_are_numbers() -> None:
     cues = {
         **cues_of_map(np.zeros((2, 3), np.float32), np.zeros((2, 3), np.float32), RANGE),
         **cues_of_views(gradient, curvature, nothing, noise=0.0),
-        **cues_of_stage_before(np.zeros(SHAPE, np.float32), np.ones(SHAPE, bool), np.ones(SHAPE, np.float32)),
+        **cues_of_stage_before(nothing.seeing, np.ones(SHAPE, bool), None, np.ones(SHAPE, np.float32)),
+        **cues_of_texture(nothing.seeing, nothing.seeing, nothing.seeing),
     }
     for name, values in cues.items():
         assert np.isfinite(values).all(), name
@@ -85,7 +86,7 @@ def test_a_border_is_no_evidence_for_the_bare_pixels_beside_it() -> None:
     wire = np.abs(x - 25) < 2
     curvature, confidence = np.where(wire, 1e4, 1.0).astype(np.float32), np.where(wire, 0.9, 0.1).astype(np.float32)
     gradient, _, told = evidence((0.0, 0.0, 0.0, 0.0))
-    cues = cues_of_views(gradient, curvature, told, noise=0.01) | cues_of_stage_before(confidence, ~wire, curvature)
+    cues = cues_of_stage_before(confidence, ~wire, None, curvature) | cues_of_views(gradient, curvature, told, 0.01)
     for name, of_sky in (("wide_deviation", 1.0), ("wide_confidence", 0.1)):
         np.testing.assert_allclose(cues[name][:, 29], of_sky, rtol=0.01)
         assert np.abs(cues[name][:, 25] / of_sky - 1).min() > 0.5

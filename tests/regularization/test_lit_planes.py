@@ -137,10 +137,11 @@ def room() -> tuple[LightField, StageMaps, BoolMap]:
 def test_a_noisy_wall_leaves_the_depth_of_what_stands_before_it(room: tuple[LightField, StageMaps, BoolMap]) -> None:
     light_field, maps, of_wall = room
     truth = (Region(ALL, np.ones((SIZE, SIZE), bool)).basis @ WALL).reshape(SIZE, SIZE)
-    disparity, held = fill_uniform_regions(light_field, maps, UniformPlanesParameters())
+    disparity, held, deviation = fill_uniform_regions(light_field, maps, UniformPlanesParameters())
     assert held[of_wall].mean() > 0.9
+    assert 0 < np.median(deviation[held]) < 0.1
     assert not held[45:85, 55:95].any()
     assert np.abs(disparity - truth)[held].mean() < 0.1
     np.testing.assert_array_equal(disparity[~held], maps.disparity[~held])
-    without, held = fill_uniform_regions(light_field, maps, UniformPlanesParameters(light=False))
+    without, held, _ = fill_uniform_regions(light_field, maps, UniformPlanesParameters(light=False))
     assert np.abs(without - truth)[of_wall].mean() > 0.5

@@ -44,8 +44,8 @@ NEAR, FAR, SMALL = np.s_[10:34, 8:38], np.s_[36:56, 60:86], np.s_[8:12, 44:48]
 def test_a_mirrored_scene_has_mirrored_planes(axis: int) -> None:
     """A picture taken through a mirror must not have another depth."""
     light_field, maps = scene(NEAR, FAR)
-    disparity, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
-    other, other_filled = fill_uniform_regions(*mirrored(light_field, maps, axis), PARAMETERS)
+    disparity, filled, _ = fill_uniform_regions(light_field, maps, PARAMETERS)
+    other, other_filled, _ = fill_uniform_regions(*mirrored(light_field, maps, axis), PARAMETERS)
     assert filled[NEAR].mean() > 0.8
     assert filled[FAR].mean() > 0.8
     np.testing.assert_array_equal(np.flip(other_filled, axis), filled)
@@ -54,8 +54,8 @@ def test_a_mirrored_scene_has_mirrored_planes(axis: int) -> None:
 
 @pytest.mark.parametrize(("near", "far"), [(NEAR, FAR), (FAR, NEAR)])
 def test_a_far_region_does_not_change_a_near_ones_plane(near: tuple[slice, slice], far: tuple[slice, slice]) -> None:
-    alone, _ = fill_uniform_regions(*scene(near), PARAMETERS)
-    beside, _ = fill_uniform_regions(*scene(near, far), PARAMETERS)
+    alone, *_ = fill_uniform_regions(*scene(near), PARAMETERS)
+    beside, *_ = fill_uniform_regions(*scene(near, far), PARAMETERS)
     np.testing.assert_array_equal(beside[near], alone[near])
 
 
@@ -70,9 +70,9 @@ def test_a_refused_region_counts_the_same_before_and_after(refused: tuple[slice,
     rim[around] = True
     rim[refused] = rim[NEAR] = False
     maps.disparity[rim] = np.random.default_rng(2).uniform(-2, 2, rim.sum())
-    disparity, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
+    disparity, filled, _ = fill_uniform_regions(light_field, maps, PARAMETERS)
     assert not filled[refused].any()
-    flipped, other = fill_uniform_regions(*mirrored(light_field, maps, 0), PARAMETERS)
+    flipped, other, _ = fill_uniform_regions(*mirrored(light_field, maps, 0), PARAMETERS)
     np.testing.assert_array_equal(np.flip(other, 0), filled)
     np.testing.assert_allclose(np.flip(flipped, 0), disparity, atol=1e-5)
 
@@ -81,8 +81,8 @@ def test_planes_stay_within_the_range() -> None:
     """A plane that its border holds at one side only would lead behind what was searched."""
     light_field, maps = scene(NEAR)
     narrow = light_field.with_range(DisparityRange(0.0, 0.05, "given"))
-    whole, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
-    cut, _ = fill_uniform_regions(narrow, maps, PARAMETERS)
+    whole, filled, _ = fill_uniform_regions(light_field, maps, PARAMETERS)
+    cut, *_ = fill_uniform_regions(narrow, maps, PARAMETERS)
     assert whole[filled].min() < -0.01
     assert whole[filled].max() > 0.06
     np.testing.assert_array_equal(cut[filled], np.clip(whole[filled], 0, np.float32(0.05)))
@@ -94,7 +94,7 @@ def test_a_wall_in_steps_of_integers_is_bare() -> None:
     # upright bars and level steps, in which no noise is found
     light_field.views[:] = light_field.views[..., :1, :, :]
     light_field.views[..., 10:40, 10:60, :] = 120 + np.arange(30)[:, None, None] // 12
-    _, filled = fill_uniform_regions(light_field, maps, UniformPlanesParameters(growth=0, ransac_iterations=40))
+    _, filled, _ = fill_uniform_regions(light_field, maps, UniformPlanesParameters(growth=0, ransac_iterations=40))
     assert filled[16:34, 16:54].mean() > 0.95
 
 
@@ -116,11 +116,11 @@ def test_what_is_found_in_one_region_does_not_move_the_plane_of_the_next() -> No
     # the cable stays sharp in the mean of the views, so that the walls reach it from both sides
     maps.disparity[:, 35:44] = 0
     parameters = UniformPlanesParameters(window_radius=1, growth=8, ransac_iterations=40)
-    usual, filled = fill_uniform_regions(light_field, maps, parameters)
+    usual, filled, _ = fill_uniform_regions(light_field, maps, parameters)
     assert filled[left].mean() > 0.9
     assert filled[right].mean() > 0.9
     maps.disparity[right] = 1
-    moved, _ = fill_uniform_regions(light_field, maps, parameters)
+    moved, *_ = fill_uniform_regions(light_field, maps, parameters)
     np.testing.assert_array_equal(moved[left], usual[left])
 
 
