@@ -168,8 +168,8 @@ def uniform_planes(
     """
     before = require_previous(previous)
     filled, uniform, deviation = fill_uniform_regions(light_field, before, parameters)
-    # beside what moved back, the map had no depth step at which to decide
-    rims = BoundaryParameters(occlusion_margin=parameters.occlusion_margin)
+    # beside what moved back, the map had no depth step at which to decide; 25 views are enough for so few pixels
+    rims = BoundaryParameters(occlusion_margin=parameters.occlusion_margin, share_views=25)
     disparity = assigned_to_surfaces(light_field, filled, rims, before.disparity)
     uniform &= disparity == filled
     progress(1.0)
