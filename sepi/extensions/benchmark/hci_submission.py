@@ -52,7 +52,7 @@ _EXPECTED = {name for names in _NAMES.values() for name in names}
 
 _PIXELS = f"{SHAPE[1]}x{SHAPE[0]}"
 # size limits: header of a map; run time with white space
-_MOST_BYTES = {MAPS: 4 * SHAPE[0] * SHAPE[1] + 256, RUNTIMES: 64}
+_LIMITS = {MAPS: (4 * SHAPE[0] * SHAPE[1] + 256, f"a map of {_PIXELS} pixels"), RUNTIMES: (64, "one number")}
 # maximum number of lines about unexpected files
 _MOST_LINES = 10
 
@@ -290,9 +290,8 @@ def _seconds(text: str) -> float | None:
 
 
 def _size_problem(name: str, size: int) -> str | None:
-    part = name.partition("/")[0]
-    what = {MAPS: f"a map of {_PIXELS} pixels", RUNTIMES: "one number"}[part]
-    return None if size <= _MOST_BYTES[part] else f"{size} bytes are too many for {what}"
+    most, what = _LIMITS[name.partition("/")[0]]
+    return None if size <= most else f"{size} bytes are too many for {what}"
 
 
 def _shown(name: str) -> str:

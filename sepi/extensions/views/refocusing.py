@@ -114,11 +114,9 @@ def refocus(
             if surfaces is not None:
                 views = _filled_between(light_field, one_row, views, surfaces, disparity)
             for place, sheared in zip(np.argwhere(one_row).tolist(), views, strict=True):
-                down, across = moved[tuple(place)]
-                inside = _held(down, height), _held(across, width)
-                shown = _shown(light_field, tuple(place), moved[tuple(place)])[inside]
-                sums[:, *inside] += sheared[:, *inside] * shown
-                counts[inside] += shown
+                shown = _shown(light_field, tuple(place), moved[tuple(place)])
+                sums += sheared * shown
+                counts += shown
         progress((t + 1) / light_field.grid[0])
     picture = np.clip(sums / counts, 0, 1).transpose(1, 2, 0)
     return np.ascontiguousarray(picture[..., : light_field.views.shape[4]])
@@ -325,11 +323,15 @@ def _without_holes(nearest: FloatMap, otherwise: float) -> FloatMap:
 
 def _shown(light_field: LightField, place: tuple[int, ...], moved: npt.NDArray[np.float64]) -> FloatMap:
     """Mask of the reference pixels whose samples a view shows, as 1 and 0; shape (H, W)."""
-    shown = np.ones(light_field.shape, np.float32)
+    shown = np.zeros(light_field.shape, np.float32)
+    # pixels ``p`` for which the view has the pixel ``p - moved``
+    ends = ((max(0, math.ceil(by)), math.floor(n - 1 + by) + 1) for n, by in zip(shown.shape, moved, strict=True))
+    shown[tuple(slice(*end) for end in ends)] = 1
     # the reference view counts even at its missing pixels, for lack of others
     if light_field.missing is not None and place != light_field.reference_position:
         # reach of a cubic sample
-        shown -= _sheared(cv2.dilate(light_field.missing[place].astype(np.uint8), np.ones((5, 5), np.uint8)), moved)
+        beside = cv2.dilate(light_field.missing[place].astype(np.uint8), np.ones((5, 5), np.uint8))
+        shown[_sheared(beside, moved) > 0] = 0
     return shown
 
 
@@ -337,8 +339,3 @@ def _sheared(values: npt.NDArray[Any], moved: npt.NDArray[np.float64]) -> npt.ND
     """Values (H, W) of a view at the nearest pixels to those of the reference view, which it shows ``moved``."""
     at = (np.clip(np.rint(np.arange(n) - by), 0, n - 1).astype(int) for n, by in zip(values.shape, moved, strict=True))
     return np.ascontiguousarray(values[np.ix_(*at)])
-
-
-def _held(moved: float, length: int) -> slice:
-    """Pixels ``p`` of a line for which a view has the pixel ``p - moved``."""
-    return slice(max(0, math.ceil(moved)), min(length, math.floor(length - 1 + moved) + 1))

@@ -20,6 +20,7 @@ from sepi.camera import Camera
 from sepi.camera.rig import Lens, Shot
 from sepi.cli.main import main
 from sepi.errors import SepiError
+from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
 from sepi.extensions.cameras.files import rotation_of
 from sepi.extensions.cameras.posed_views import posed_views
 from sepi.extensions.cameras.reader import read_model
@@ -211,8 +212,6 @@ def test_poses_that_were_written_give_their_light_field_again(tmp_path: Path, ki
     """Views, positions, camera and map come back as they were, whichever program they were written for."""
     if kind == "colmap":
         pytest.importorskip("pycolmap")
-    from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
-
     light_field = replace(render("pyramids", size=SIZE, views=3), camera=CAMERA)
     truth = light_field.ground_truth
     {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](tmp_path / "out", posed_views(light_field, truth))
@@ -234,8 +233,6 @@ def test_written_cameras_stand_in_the_calibrated_world(folder: Path, tmp_path: P
     """Another program's map of the same room would lie elsewhere, turned."""
     if kind == "colmap":
         pytest.importorskip("pycolmap")
-    from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
-
     light_field = sepi.read_cameras(folder)
     flat = np.zeros(light_field.shape, np.float32)
     posed = posed_views(light_field, flat)
@@ -263,8 +260,6 @@ def test_written_cameras_stand_in_the_calibrated_world(folder: Path, tmp_path: P
 
 def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path: Path) -> None:
     """Their lengths would be those of the calibrated one, beside metres of the other."""
-    from sepi.extensions.cameras.data_sets import write_nerfstudio
-
     light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)
     assert light_field.ground_truth is not None
     write_nerfstudio(tmp_path / "rig", posed_views(light_field, light_field.ground_truth))
@@ -277,8 +272,6 @@ def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path:
 
 def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> None:
     """A hand before the lens, or the gantry itself, becomes part of the scene."""
-    from sepi.extensions.cameras.data_sets import write_nerfstudio
-
     light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)
     write_nerfstudio(tmp_path / "rig", posed_views(light_field, np.zeros(light_field.shape, np.float32)))
     told = json.loads((tmp_path / "rig/transforms.json").read_text())
