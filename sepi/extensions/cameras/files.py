@@ -213,7 +213,7 @@ def _picture_of_frame(name: str, entry: Mapping[str, Any], pictures: Pictures) -
         focal_x = number("fl_x")
     # counted from the picture's corner, not from the middle of the first pixel
     principal = number("cx", width / 2) - 0.5, number("cy", height / 2) - 0.5
-    distortion = tuple(number(key, 0.0) for key in _DISTORTION[kind][:6])
+    distortion = tuple(number(key, 0.0) for key in _DISTORTION[kind])
     lens = Lens(int(width), int(height), (focal_x, number("fl_y", focal_x)), principal, kind, distortion)
     matrix = np.array(number("transform_matrix", shapes=((4, 4), (3, 4))))
     shot = Shot(name, pictures.fitted(file, lens, sized), rotation_of((matrix[:3, :3] @ _TURN).T), matrix[:3, 3].copy())
