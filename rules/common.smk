@@ -321,26 +321,14 @@ def memory_for(*needs, **more):
 
     A job that a cluster ended for lack of memory asks for more at the next attempt.
     """
-
-    def memory(wildcards, attempt):
-        return attempt * scene_of(wildcards).memory_mb(*needs, **more)
-
-    return memory
+    return lambda wildcards, attempt: attempt * scene_of(wildcards).memory_mb(*needs, **more)
 
 
 def minutes_for(*seconds, **more):
     """Function of wildcards: time of a job in minutes (:meth:`sepi.workflow.datasets.Scene.minutes`)."""
-
-    def minutes(wildcards, attempt):
-        return attempt * scene_of(wildcards).minutes(*seconds, **more)
-
-    return minutes
+    return lambda wildcards, attempt: attempt * scene_of(wildcards).minutes(*seconds, **more)
 
 
 def of_source(read, of_module):
     """Function of wildcards: ``of_module`` for scenes that a module of an extension reads, else ``read``."""
-
-    def ask(wildcards, attempt):
-        return (read if scene_of(wildcards).module is None else of_module)(wildcards, attempt)
-
-    return ask
+    return lambda wildcards, attempt: (of_module if scene_of(wildcards).module else read)(wildcards, attempt)

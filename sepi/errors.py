@@ -1,5 +1,7 @@
 """The error that the command line shows as one line with exit code 1, and the warning."""
 
+import warnings
+
 
 class SepiError(Exception):
     """Something the user can mend; the message names the file or key, what is wrong and what would be right.
@@ -57,6 +59,11 @@ class SepiWarning(UserWarning):
 
     def __init__(self, message: str) -> None:
         super().__init__(one_line(message))
+
+
+def warn(message: str, up: int = 1) -> None:
+    """Warn of something that the user probably did not intend, as of the line ``up`` calls above the caller's."""
+    warnings.warn(message, SepiWarning, stacklevel=up + 2)
 
 
 def one_line(text: str) -> str:

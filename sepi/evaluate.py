@@ -118,11 +118,7 @@ def evaluations_of(
 
 
 def _evaluation(
-    light_field: LightField,
-    maps: FloatMap | StageMaps,
-    common: Evaluation,
-    edges: Edges,
-    thresholds: Sequence[float],
+    light_field: LightField, maps: FloatMap | StageMaps, common: Evaluation, edges: Edges, thresholds: Sequence[float]
 ) -> Evaluation:
     """Evaluation of one map, with the masks that all maps of the scene share."""
     disparity, truth = _disparity(maps), light_field.ground_truth

@@ -6,7 +6,6 @@ A missing or wrong map is no error: a warning tells it, and the report's table s
 from __future__ import annotations
 
 import hashlib
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,7 @@ import click
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from sepi.errors import SepiError, SepiWarning
+from sepi.errors import SepiError, warn
 from sepi.evaluate import evaluations_of
 from sepi.io.disparity_maps import map_file, read_disparity
 from sepi.io.hdf5 import read_with_truth
@@ -32,10 +31,7 @@ _SOURCES = TypeAdapter(dict[str, ExternalSource])
 
 
 def external_maps(
-    light_field: LightField,
-    sources: Mapping[str, ExternalSource],
-    scene: str = "",
-    thresholds: Sequence[float] = (),
+    light_field: LightField, sources: Mapping[str, ExternalSource], scene: str = "", thresholds: Sequence[float] = ()
 ) -> dict[str, ExternalMap]:
     """External methods' maps of a light field with their scores, or with their problems.
 
@@ -73,11 +69,8 @@ def _read(light_field: LightField, scene: str, method: str, source: ExternalSour
     path = Path(source.path)
     digest = ""
 
-    def tell(reason: str) -> None:
-        warnings.warn(f"external {method}, scene {scene}: {reason}", SepiWarning, stacklevel=3)
-
     def without_map(problem: str, reason: str) -> ExternalMap:
-        tell(reason)
+        warn(f"external {method}, scene {scene}: {reason}", up=3)
         return ExternalMap(str(path), problem, digest)
 
     try:
@@ -98,7 +91,8 @@ def _read(light_field: LightField, scene: str, method: str, source: ExternalSour
     if unknown == disparity.size:
         return without_map(NO_VALUE, f"{path}: none of its values is finite")
     if unknown:
-        tell(f"{path}: {unknown} of {disparity.size} values are not finite; they count as bad pixels")
+        values = f"{unknown} of {disparity.size} values"
+        warn(f"external {method}, scene {scene}: {path}: {values} are not finite; they count as bad pixels", up=2)
     return ExternalMap(str(path), "", digest, disparity)
 
 
@@ -108,26 +102,19 @@ def _sources(text: str) -> dict[str, ExternalSource]:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(["--maps", *map(str, first["loc"])])
-        raise SepiError(
-            f'{where}: {first["msg"]}; expected JSON such as {{"SPO": {{"path": "SPO/cotton.pfm"}}}}'
-        ) from error
+        raise SepiError(f'{where}: {first["msg"]}; expected JSON such as {{"SPO": {{"path": "SPO/a.pfm"}}}}') from error
 
 
 @click.command(name="python -m sepi.external", cls=SepiCommand)
-@click.option("--light-field", "light_field_path", type=click.Path(path_type=Path), required=True, help="From ingest.")
-@click.option(
-    "--truth", type=click.Path(path_type=Path), help="Ground truth from sepi.truth; default: the light field's own."
-)
+@click.option("--light-field", "path", type=click.Path(path_type=Path), required=True, help="From ingest.")
+@click.option("--truth", type=click.Path(path_type=Path), help="From sepi.truth; default: the light field's own.")
 @click.option("--maps", required=True, help='JSON: {"METHOD": {"path": FILE, "scale": NUMBER, "offset": NUMBER}, ...}.')
 @click.option("--scene", default="", help="Name of the scene in messages; default: the light field's own.")
 @bad_thresholds
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="File to write (HDF5).")
-def command(
-    light_field_path: Path, truth: Path | None, maps: str, scene: str, thresholds: tuple[float, ...], output: Path
-) -> None:
+def command(path: Path, truth: Path | None, maps: str, scene: str, thresholds: tuple[float, ...], output: Path) -> None:
     """Read and score the disparity maps that external methods made of a light field."""
-    sources = _sources(maps)
-    write_external(output, external_maps(read_with_truth(light_field_path, truth), sources, scene, thresholds))
+    write_external(output, external_maps(read_with_truth(path, truth), _sources(maps), scene, thresholds))
 
 
 if __name__ == "__main__":

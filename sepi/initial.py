@@ -21,9 +21,9 @@ from __future__ import annotations
 from sepi.lightfield import LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.softening import compared_views
-from sepi.matching.structure_tensor import StructureTensorParameters, structure_tensor_depth
+from sepi.matching.structure_tensor import structure_tensor_depth
 from sepi.matching.visibility_sweep import FirstDepthParameters, VisibilitySweepParameters, first_depth
-from sepi.stage import Choice, Progress, StageMaps
+from sepi.stage import Choice, NoParameters, Progress, StageMaps
 
 
 def sepi(
@@ -84,12 +84,11 @@ def semi_global(
     >>> bool(np.median(np.abs(maps.disparity - light_field.ground_truth)) < 0.05)
     True
     """
-    result = first_depth(compared_views(light_field, parameters), parameters, progress)
-    return StageMaps(result.disparity, result.confidence)
+    return first_depth(compared_views(light_field, parameters), parameters, progress)
 
 
 def structure_tensor(
-    light_field: LightField, previous: StageMaps | None, parameters: StructureTensorParameters, progress: Progress
+    light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
 ) -> StageMaps:
     """Depth from the structure tensor of single EPIs, for the paper's ablation without SEPIs (table 4 of [1]_).
 
@@ -119,7 +118,7 @@ def structure_tensor(
     >>> bool(median_error("sepi") < median_error("structure_tensor"))
     True
     """
-    disparity, confidence = structure_tensor_depth(light_field, parameters)
+    disparity, confidence = structure_tensor_depth(light_field)
     progress(1.0)
     return StageMaps(disparity, confidence)
 
@@ -127,7 +126,7 @@ def structure_tensor(
 CHOICES = {
     "sepi": Choice(SweepParameters, sepi),
     "semi_global": Choice(FirstDepthParameters, semi_global),
-    "structure_tensor": Choice(StructureTensorParameters, structure_tensor),
+    "structure_tensor": Choice(NoParameters, structure_tensor),
 }
 
 if __name__ == "__main__":

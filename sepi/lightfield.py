@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from sepi.process.workspace import Workspace
 
 FloatMap = npt.NDArray[np.float32]
+FloatArray = npt.NDArray[np.float64]
 BoolMap = npt.NDArray[np.bool_]
 
 Truth = tuple[FloatMap | None, Mapping[str, BoolMap]]
@@ -292,8 +293,7 @@ class LightField:
             If it does, or the range is unknown.
         """
         known = self.require_disparity_range()
-        others = self.present.copy()
-        others[self.reference_position] = False
+        others = without_reference(self, self.present)
         moved = np.abs(self.baselines[others]) / self.shape
         farthest = 1 / float(moved.max(axis=1).min())
         if max(abs(known.minimum), abs(known.maximum)) > _GENEROUS * farthest:
@@ -480,6 +480,13 @@ def as_unit_float(values: npt.NDArray[Any]) -> FloatMap:
 def require_light_field(value: object) -> None:
     """Raise unless a value is a light field, and not a path, for example."""
     require_type("light field", value, LightField, "a LightField, as sepi.read_light_field makes it")
+
+
+def without_reference(light_field: LightField, views: BoolMap) -> BoolMap:
+    """These views (T, S) without the reference view."""
+    others = views.copy()
+    others[light_field.reference_position] = False
+    return others
 
 
 def full_scale(dtype: npt.DTypeLike) -> float:

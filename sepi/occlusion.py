@@ -46,15 +46,15 @@ from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters, 
 from sepi.matching.visibility_sweep import VisibleViewsParameters, depth_from_visible_views, occluded_in_any_view
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_previous
 
+# change of the initial depth that makes a pixel a candidate for occlusion, pixels per view step
+_DISCONTINUITY = 0.3
+# mean-shift patch of 2 r + 1 pixels, and its bandwidths: RGB distance, colours in 0..1; pixels per view step
+_PATCH = 4, 0.05, 0.3
+
 
 class OcclusionParameters(SweepParameters, CannyParameters):
     """Parameters of both occlusion models: candidates, and when a half replaces the full SEPI."""
 
-    discontinuity_threshold: float = Field(
-        0.3,
-        gt=0,
-        description="change of the initial depth that makes a pixel a candidate for occlusion, pixels per view step",
-    )
     candidate_reach: int = Field(
         12, ge=0, le=50, description="distance from an edge within which pixels are candidates, in pixels"
     )
@@ -66,9 +66,6 @@ class OcclusionParameters(SweepParameters, CannyParameters):
 class HalfSepiParameters(OcclusionParameters):
     """Parameters of the half-SEPI."""
 
-    patch_radius: int = Field(4, ge=1, le=20, description="mean-shift patch of 2 r + 1 pixels")
-    patch_sigma_colour: float = Field(0.05, gt=0, description="mean-shift bandwidth, RGB distance, colours in 0..1")
-    patch_sigma_disparity: float = Field(0.3, gt=0, description="mean-shift bandwidth, pixels per view step")
     side_reach: int = Field(16, ge=1, le=50, description="distance within which the nearer surface is searched, pixels")
     side_margin: float = Field(0.1, ge=0, description="by how much the occluder must be nearer, pixels per view step")
     gain_unconfirmed: float = Field(
@@ -132,17 +129,9 @@ def half_sepi(
     before = require_previous(previous)
     candidates = occlusion_candidates(light_field.reference_view, before.disparity, parameters)
     views = halves_and_quarters(light_field)
-    result = sweep(
-        light_field, parameters, groups=views.groups, subsets=views.subsets, mask=candidates, progress=progress
-    )
-    surface = patch_modes(
-        light_field.reference_view,
-        before.disparity,
-        cv2.dilate(candidates.astype(np.uint8), _box(parameters.side_reach)) > 0,
-        radius=parameters.patch_radius,
-        sigma_colour=parameters.patch_sigma_colour,
-        sigma_disparity=parameters.patch_sigma_disparity,
-    )
+    result = sweep(light_field, parameters, subsets=views, mask=candidates, progress=progress)
+    near = cv2.dilate(candidates.astype(np.uint8), _box(parameters.side_reach)) > 0
+    surface = patch_modes(light_field.reference_view, before.disparity, near, *_PATCH)
     cost = result.cost.copy()
     for n, name in enumerate(views.names[1:], start=1):
         sides = name.split("-")
@@ -186,9 +175,7 @@ def wang(
     before = require_previous(previous)
     candidates = occlusion_candidates(light_field.reference_view, before.disparity, parameters)
     views = half_planes(light_field, parameters.directions)
-    result = sweep(
-        light_field, parameters, groups=views.groups, subsets=views.subsets, mask=candidates, progress=progress
-    )
+    result = sweep(light_field, parameters, subsets=views, mask=candidates, progress=progress)
     # the middles of the two halves lie along the edge's normal and against it
     normal = edge_angle(light_field.reference_view, parameters)
     first = np.floor(normal / np.pi * parameters.directions).astype(np.int64) % (2 * parameters.directions)
@@ -228,7 +215,7 @@ def visibility(
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress, mean_reference)
     # denoising would mix the colours of both surfaces at a rim
     disparity = assigned_to_surfaces(given, result.disparity, parameters)
-    views = spread_views(light_field, parameters.views)
+    views = spread_views(light_field, parameters.first_views)
     disparity = without_specks(light_field, disparity, views, parameters)
     return before.updated(
         disparity,
@@ -240,7 +227,7 @@ def visibility(
 def occlusion_candidates(reference_view: FloatMap, disparity: FloatMap, parameters: OcclusionParameters) -> BoolMap:
     """Pixels within reach of an edge of the reference view or of a depth discontinuity; shape (H, W), bool."""
     edges = canny_edges(reference_view, parameters)
-    edges |= depth_discontinuities(disparity, parameters.discontinuity_threshold)
+    edges |= depth_discontinuities(disparity, _DISCONTINUITY)
     return np.asarray(cv2.dilate(edges.astype(np.uint8), _box(parameters.candidate_reach)) > 0)
 
 
@@ -266,19 +253,11 @@ def nearer_on_hidden_side(
     -------
     ndarray, shape (H, W), bool
     """
-    nearest = np.full(surface.shape, -np.inf, np.float32)
-    H, W = surface.shape
-    for side in sides:
-        dt, ds = SIDES[side]
-        for distance in range(1, reach + 1):
-            # the views kept lie towards (dt, ds), so the occluder lies on the opposite side
-            dy, dx = -dt * distance, -ds * distance
-            if abs(dy) >= H or abs(dx) >= W:
-                break
-            here = np.s_[max(0, -dy) : H - max(0, dy), max(0, -dx) : W - max(0, dx)]
-            there = np.s_[max(0, dy) : H - max(0, -dy), max(0, dx) : W - max(0, -dx)]
-            np.maximum(nearest[here], surface[there], out=nearest[here])
-    return nearest > disparity + margin
+    # the views kept lie towards a side, so the occluder lies on the opposite one
+    hiding, steps = np.zeros((2 * reach + 1, 2 * reach + 1), np.uint8), np.arange(1, reach + 1)
+    for dt, ds in (SIDES[side] for side in sides):
+        hiding[reach - dt * steps, reach - ds * steps] = 1
+    return np.asarray(cv2.dilate(surface, hiding) > disparity + margin)
 
 
 def replace_where_better(

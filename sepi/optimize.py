@@ -17,11 +17,10 @@ References
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from sepi.error_bars.bars import error_bars
@@ -31,13 +30,20 @@ from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
+from sepi.matching.gauss_newton import ANY_SURFACE, Evidence, GaussNewton, Surfaces, windowed_step
 from sepi.matching.softening import compared_views
+from sepi.matching.spline_views import forget_splines
 from sepi.matching.view_subsets import spread_views
+from sepi.regularization.multilevel import solve_smooth
+from sepi.regularization.second_order import (
+    colour_changes,
+    inverse_diagonal,
+    second_difference_stencil,
+    smoothness_weights,
+    upper_quartile,
+)
 from sepi.regularization.wls import WlsParameters, data_weight, rectified_confidence, smoothness_coefficient, solve
 from sepi.stage import Choice, NoParameters, OcclusionMarginParameters, Progress, StageMaps, none, require_previous
-
-if TYPE_CHECKING:
-    from sepi.matching.gauss_newton import Evidence, Surfaces
 
 UNIFORM_WEIGHT = 0.05
 """Weight of the data on planes of textureless regions; planes cost nothing, so a small weight keeps them."""
@@ -92,8 +98,10 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     reliable_confidence: float = Field(
         0.5, gt=0, le=1, description="confidence within two pixels from which a discontinuity in the data is trusted"
     )
-    rtol: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the solver stops in the last round")
-    first_rtol: float = Field(3e-3, gt=0, lt=1, description="the same for the other rounds")
+    rtol: float = Field(
+        3e-4, ge=1e-5, lt=1, description="residual at which the solver stops in the last round, relative"
+    )
+    first_rtol: float = Field(3e-3, ge=1e-5, lt=1, description="the same for the other rounds")
     max_iterations: int = Field(200, ge=1, description="most iterations of the solver")
 
     @model_validator(mode="after")
@@ -136,8 +144,6 @@ def wls(
     >>> bool(errors[1] < 0.8 * errors[0])
     True
     """
-    from sepi.matching.gauss_newton import GaussNewton
-
     before = require_previous(previous)
     confidence = rectified_confidence(before.confidence, before.mask("textureless"), parameters)
     weight = data_weight(before.disparity, confidence, parameters)
@@ -177,9 +183,6 @@ def second_order(
     >>> bool(errors[1] < 0.8 * errors[0])
     True
     """
-    from sepi.matching.gauss_newton import ANY_SURFACE, GaussNewton, Surfaces, windowed_step
-    from sepi.matching.spline_views import forget_splines
-
     before, given = require_previous(previous), light_field
     noisy = isinstance(denoised(light_field, parameters.denoising), DenoisedLightField)
     light_field = compared_views(light_field, parameters, parameters.least_noise)
@@ -260,8 +263,6 @@ def _threshold(disparity: FloatMap, parameters: SecondOrderParameters, first: bo
 
     In the first round it is a parameter, because second differences are mostly noise before any smoothing.
     """
-    from sepi.regularization.second_order import upper_quartile
-
     if first:
         return parameters.second_difference_threshold
     low, high = THRESHOLDS
@@ -285,23 +286,19 @@ class _Prior(NamedTuple):
 
     uniform: BoolMap
     reliability: FloatMap
-    colours: list[npt.NDArray[np.float64]]
+    colours: list[FloatMap]
     colour_variance: float
 
 
 def _prior(
     light_field: LightField, confidence: FloatMap, uniform: BoolMap, parameters: SecondOrderParameters
 ) -> _Prior:
-    from sepi.regularization.second_order import colour_changes
-
     reliability = np.where(uniform, 1, reliable(confidence, parameters)).astype(np.float32)
     variance = parameters.smooth_colour**2 + 4 * reference_residual_variance(light_field)
     return _Prior(uniform, reliability, colour_changes(light_field.reference_view), variance)
 
 
 def _coloured(mean: FloatMap, light_field: LightField, parameters: SecondOrderParameters) -> Surfaces:
-    from sepi.matching.gauss_newton import Surfaces
-
     colours = np.ascontiguousarray(np.moveaxis(mean[..., :3], 2, 0))
     width = np.sqrt(parameters.smooth_colour**2 + reference_residual_variance(light_field))
     return Surfaces(parameters.occlusion_margin, colours, float(width))
@@ -322,10 +319,6 @@ def _smoothed(
     Smoothing is weak where ``shape``, the map so far, has a second difference beyond the threshold, or the colours
     change.
     """
-    from sepi.regularization.local_inverse import inverse_diagonal
-    from sepi.regularization.multilevel import solve_smooth
-    from sepi.regularization.second_order import second_difference_stencil, smoothness_weights
-
     unit = max(float(np.percentile(curvature, 90)), 1e-9)
     weight = np.minimum(curvature / unit, 1) * prior.reliability
     weight = np.where(prior.uniform, np.float32(UNIFORM_WEIGHT), weight)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from types import NoneType
 
 import numpy as np
 
-from sepi.errors import SepiError, SepiWarning
+from sepi.errors import SepiError, warn
 from sepi.inspection.coded_views import told_of_coding
 from sepi.io.provenance import reading_record
 from sepi.io.readers.arrays import UnclearAxesError
@@ -139,7 +138,7 @@ def read_light_field(
             others = (note for note in light_field.notes if not note.startswith(view_order.SIGN_OPEN))
             light_field = replace(light_field, notes=(*others, note))
     for warning in filter(None, found):
-        warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)
+        warn(f"{path}: {warning}")
     return light_field
 
 
@@ -179,10 +178,8 @@ def _require_contrast(path: Path, light_field: LightField) -> None:
     reference_view = light_field.reference_view
     if (reference_view == reference_view[0, 0]).all():
         colour = "black" if not reference_view.any() else "of one colour"
-        raise SepiError(
-            f"{path}: view {','.join(map(str, light_field.reference_position))} is all {colour}; depth needs views "
-            "with contrast"
-        )
+        t, s = light_field.reference_position
+        raise SepiError(f"{path}: view {t},{s} is all {colour}; depth needs views with contrast")
     views = light_field.views
     places = np.argwhere(light_field.present)
     if all(np.array_equal(views[t, s], views[light_field.reference_position]) for t, s in places):

@@ -12,7 +12,8 @@ edges around them:
    neighbourhood. (Noise lowers the confidence of good depth, but not its agreement.)
 
 ``uniform_planes`` finds textureless regions by comparison with the noise, and gives each the plane of its border
-(:mod:`sepi.regularization.uniform_regions`). ``none`` returns the depth unchanged.
+(:mod:`sepi.regularization.uniform_regions`). Beside them it decides again what is near or far. ``none`` returns the
+depth unchanged.
 
 :class:`sepi.stage.Choice` describes arguments and results of all choices.
 
@@ -26,11 +27,26 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
+from sepi.boundaries.decision import assigned_to_surfaces
+from sepi.boundaries.parameters import BoundaryParameters
 from sepi.image.edges import CannyParameters, canny_edges
-from sepi.image.superpixels import FloatArray, Superpixels, adjacency, colour_modes, superpixels
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.image.superpixels import Superpixels, adjacency, colour_modes, superpixels
+from sepi.lightfield import BoolMap, FloatArray, FloatMap, LightField
 from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, relative_confidence, require_previous
+
+# weight of distance relative to colour in superpixels, as usual for SLIC
+_COMPACTNESS = 10.0
+# least confidence of a distinct slope, relative to the scene's best; least share of neighbours that agree with a slope
+_DISTINCT, _AGREEING = 0.8, 0.9
+# neighbourhood of this agreement, 2 r + 1 pixels, and largest difference in it, pixels per view step
+_NEIGHBOURS, _ALIKE = 3, 0.15
+# least and greatest threshold of the LTI, share of texture points
+_FLOOR, _CEILING = 0.1, 0.4
+# mean-shift bandwidth in the HSV cone of radius 1 and height 1
+_BANDWIDTH = 0.03
+# change of depth below which no pixel resists, pixels per view step; share of a superpixel that may resist
+_SMOOTHING, _RESISTING = 0.1, 0.3
 
 
 class LtiParameters(CannyParameters):
@@ -38,39 +54,16 @@ class LtiParameters(CannyParameters):
 
     superpixel_size: int = Field(15, ge=4, le=100, description="superpixel width up to 512x512 pixels, in pixels")
     superpixel_size_large: int = Field(17, ge=4, le=100, description="superpixel width above 512x512 pixels, in pixels")
-    compactness: float = Field(10.0, gt=0, description="SLIC: weight of distance relative to colour")
-    texture_confidence: float = Field(
-        0.8, ge=0, le=1, description="least confidence of a distinct slope, relative to the scene's best"
-    )
-    texture_agreement: float = Field(
-        0.9, ge=0, le=1, description="least share of neighbours that must agree with a slope"
-    )
     min_support: float = Field(
         0.25,
         ge=0,
         le=1,
         description="share of texture points and agreeing slopes from which a superpixel keeps its depth",
     )
-    agreement_radius: int = Field(3, ge=1, le=10, description="neighbourhood for this agreement, 2 r + 1 pixels")
-    agreement_difference: float = Field(
-        0.15, gt=0, description="largest difference of agreeing neighbours, pixels per view step"
-    )
-    lti_floor: float = Field(0.1, ge=0, le=1, description="least threshold of the LTI, share of texture points")
-    lti_ceiling: float = Field(0.4, ge=0, le=1, description="greatest threshold of the LTI, share of texture points")
-    colour_bandwidth: float = Field(
-        0.03, gt=0, description="mean-shift bandwidth in the HSV cone of radius 1, height 1"
-    )
     continuity: float = Field(0.3, ge=0, description="tau_out, weight of continuity between neighbours")
-    slope_continuity: float = Field(10.0, ge=0, description="weight of equal slopes, relative to equal depth")
     tolerance: float = Field(0.05, gt=0, description="residual of an inlier, pixels per view step")
     keep_confidence: float = Field(
         0.7, ge=0, le=1, description="relative confidence from which a pixel resists a plane"
-    )
-    smoothing_difference: float = Field(
-        0.1, gt=0, description="change of depth below which no pixel resists, pixels per view step"
-    )
-    keep_share: float = Field(
-        0.3, ge=0, le=1, description="share of resisting pixels at which a superpixel keeps its own depth"
     )
 
 
@@ -106,20 +99,18 @@ def lti(
     """
     before = require_previous(previous)
     confidence = relative_confidence(before.confidence)
-    segments = superpixels(
-        light_field.reference_view, superpixel_size(light_field.shape, parameters), parameters.compactness
-    )
+    segments = superpixels(light_field.reference_view, superpixel_size(light_field.shape, parameters), _COMPACTNESS)
     progress(0.3)
-    agreement = slope_agreement(before.disparity, parameters.agreement_radius, parameters.agreement_difference)
+    agreement = slope_agreement(before.disparity)
     # where an end of the range was best, agreement of neighbours means nothing
     lowest, highest = light_field.require_disparity_range().candidates(2)
     rounding = 1e-6 * (highest - lowest + abs(highest) + abs(lowest))
     at_end = (before.disparity <= lowest + rounding) | (before.disparity >= highest - rounding)
     agreement = np.where(at_end, np.float32(0), agreement)
-    agrees = agreement > parameters.texture_agreement
-    texture = canny_edges(light_field.reference_view, parameters) | (confidence > parameters.texture_confidence)
+    agrees = agreement > _AGREEING
+    texture = canny_edges(light_field.reference_view, parameters) | (confidence > _DISTINCT)
     information = local_texture_information(segments, texture)
-    free = information < lti_threshold(information, parameters.lti_floor, parameters.lti_ceiling)
+    free = information < lti_threshold(information)
     # much depth is doubtful here, so the weight rises steeply with confidence
     weight = confidence**4 * agreement**2
     # far from its data, a plane may leave the range
@@ -129,9 +120,10 @@ def lti(
     progress(0.9)
     unsupported = local_texture_information(segments, texture | agrees) < parameters.min_support
     # a plane may smooth any depth, but replaces only depth neither distinct nor in agreement with its neighbourhood
-    overruled = np.abs(plane - before.disparity) > parameters.smoothing_difference
+    overruled = np.abs(plane - before.disparity) > _SMOOTHING
     resists = overruled & ((confidence > parameters.keep_confidence) | agrees | ~unsupported[segments.labels])
-    replaced = accepted(segments, free, resists, parameters.keep_share)
+    taken = free & (segments.means(resists) < _RESISTING)
+    replaced = taken[segments.labels] & ~resists
     return before.updated(
         np.where(replaced, plane, before.disparity),
         before.confidence,
@@ -168,9 +160,12 @@ def uniform_planes(
     True
     """
     before = require_previous(previous)
-    disparity, uniform = fill_uniform_regions(light_field, before, parameters)
+    filled, uniform = fill_uniform_regions(light_field, before, parameters)
+    # beside what moved back, the map had no depth step at which to decide
+    rims = BoundaryParameters(occlusion_margin=parameters.occlusion_margin)
+    disparity = assigned_to_surfaces(light_field, filled, rims, before.disparity)
     progress(1.0)
-    return before.updated(disparity, before.confidence, textureless=uniform)
+    return before.updated(disparity, before.confidence, textureless=uniform & (disparity == filled))
 
 
 def superpixel_size(shape: tuple[int, int], parameters: LtiParameters) -> int:
@@ -178,16 +173,12 @@ def superpixel_size(shape: tuple[int, int], parameters: LtiParameters) -> int:
     return parameters.superpixel_size if shape[0] * shape[1] <= 512 * 512 else parameters.superpixel_size_large
 
 
-def slope_agreement(disparity: FloatMap, radius: int, difference: float) -> FloatMap:
+def slope_agreement(disparity: FloatMap) -> FloatMap:
     """Share of a pixel's neighbours whose slope agrees with its own.
 
     Parameters
     ----------
     disparity : ndarray, shape (H, W), float32
-    radius : int
-        The neighbourhood is ``2 radius + 1`` pixels wide and high.
-    difference : float
-        Largest difference of agreeing slopes, pixels per view step.
 
     Returns
     -------
@@ -195,16 +186,14 @@ def slope_agreement(disparity: FloatMap, radius: int, difference: float) -> Floa
         0..1.
     """
     H, W = disparity.shape
-    size = 2 * radius + 1
-    padded = np.pad(disparity, radius, constant_values=np.nan)
+    padded = np.pad(disparity, _NEIGHBOURS, constant_values=np.nan)
     agreeing = np.zeros((H, W), np.float32)
-    for dy in range(size):
-        for dx in range(size):
-            agreeing += np.abs(padded[dy : dy + H, dx : dx + W] - disparity) < difference
-    rows, columns = (
-        np.minimum(np.arange(n) + radius, n - 1) - np.maximum(np.arange(n) - radius, 0) + 1 for n in (H, W)
-    )
-    return np.asarray(agreeing / (rows[:, None] * columns), np.float32)
+    inside = np.zeros((H, W))
+    for dy, dx in np.ndindex(2 * _NEIGHBOURS + 1, 2 * _NEIGHBOURS + 1):
+        there = padded[dy : dy + H, dx : dx + W]
+        agreeing += np.abs(there - disparity) < _ALIKE
+        inside += ~np.isnan(there)
+    return np.asarray(agreeing / inside, np.float32)
 
 
 def local_texture_information(segments: Superpixels, texture: BoolMap) -> FloatArray:
@@ -212,7 +201,7 @@ def local_texture_information(segments: Superpixels, texture: BoolMap) -> FloatA
     return segments.means(texture & segments.interior())
 
 
-def lti_threshold(information: FloatArray, floor: float, ceiling: float) -> float:
+def lti_threshold(information: FloatArray) -> float:
     """Adaptive threshold: the LTI at which the first-order difference of the sorted LTI is greatest.
 
     Few superpixels lie between those with and those without texture, so the sorted LTI rises fastest there. Differences
@@ -221,8 +210,6 @@ def lti_threshold(information: FloatArray, floor: float, ceiling: float) -> floa
     Parameters
     ----------
     information : ndarray, shape (N,), float
-    floor, ceiling : float
-        Bounds of the threshold.
 
     Returns
     -------
@@ -232,9 +219,9 @@ def lti_threshold(information: FloatArray, floor: float, ceiling: float) -> floa
     run = max(1, round(0.03 * len(ordered)))
     rise = ordered[run:] - ordered[:-run]
     middle = 0.5 * (ordered[run:] + ordered[:-run])
-    inside = (middle >= floor) & (middle <= ceiling)
+    inside = (middle >= _FLOOR) & (middle <= _CEILING)
     if not inside.any():
-        return floor if ordered[len(ordered) // 2] > ceiling else ceiling
+        return _FLOOR if ordered[len(ordered) // 2] > _CEILING else _CEILING
     return float(middle[inside][np.argmax(rise[inside])])
 
 
@@ -247,24 +234,18 @@ def propagated(
     parameters: LtiParameters,
 ) -> FloatMap:
     """Disparity of every pixel on its superpixel's plane, after propagation; shape (H, W), float32."""
-    from sepi.regularization.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
+    from sepi.regularization.planes import basis, evaluate_planes, fit_planes, propagate
 
     design = basis(segments)
     planes = fit_planes(segments, disparity, weight, design, parameters.tolerance)
     adjacent = adjacency(segments)
-    modes = colour_modes(reference_view, segments, parameters.colour_bandwidth)
+    modes = colour_modes(reference_view, segments, _BANDWIDTH)
     apart = ((modes[adjacent.first] - modes[adjacent.second]) ** 2).sum(axis=1)
-    affinity = np.exp(-0.5 * apart / parameters.colour_bandwidth**2)
-    coupling = Coupling(parameters.continuity, parameters.slope_continuity, parameters.tolerance)
+    affinity = np.exp(-0.5 * apart / _BANDWIDTH**2)
     if free.any():
-        planes = propagate(segments, adjacent, affinity, planes, free, disparity, weight, design, coupling)
+        coupling = parameters.continuity, parameters.tolerance
+        planes = propagate(segments, adjacent, affinity, planes, free, disparity, weight, design, *coupling)
     return evaluate_planes(segments, planes, design)
-
-
-def accepted(segments: Superpixels, free: BoolMap, resists: BoolMap, keep_share: float) -> BoolMap:
-    """Pixels that take the plane's depth: those that do not resist, in superpixels where few do; shape (H, W), bool."""
-    taken = free & (segments.means(resists) < keep_share)
-    return np.asarray(taken[segments.labels] & ~resists)
 
 
 CHOICES = {

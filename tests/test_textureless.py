@@ -8,7 +8,7 @@ from sepi.image.mean_shift import sample_modes
 from sepi.image.superpixels import Superpixels, adjacency, colour_modes, superpixels
 from sepi.kernels import planes as kernels
 from sepi.lightfield import DisparityRange, LightField
-from sepi.regularization.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
+from sepi.regularization.planes import basis, evaluate_planes, fit_planes, propagate
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 from sepi.textureless import (
@@ -94,16 +94,16 @@ def test_lti_is_the_share_of_inner_texture_points():
 
 def test_threshold_lies_where_the_sorted_lti_rises_fastest():
     few_between = np.concatenate([np.linspace(0, 0.12, 300), [0.2, 0.25], np.linspace(0.32, 0.9, 300)])
-    threshold = lti_threshold(few_between, 0.05, 0.5)
+    threshold = lti_threshold(few_between)
     assert 0.12 < threshold < 0.32
 
 
 def test_agreement_tells_noise_from_depth():
     columns = np.indices((40, 40))[1]
     plane = (0.02 * columns).astype(np.float32)
-    assert slope_agreement(plane, 3, 0.15).min() == 1
+    assert slope_agreement(plane).min() == 1
     noise = np.random.default_rng(0).uniform(-2, 2, (40, 40)).astype(np.float32)
-    assert slope_agreement(noise, 3, 0.15).mean() < 0.15
+    assert slope_agreement(noise).mean() < 0.15
 
 
 def test_robust_fit_ignores_outliers():
@@ -149,7 +149,7 @@ def test_propagation_equals_the_plane_that_its_neighbours_lie_on():
     adjacent = adjacency(segments)
     solved = propagate(
         segments, adjacent, np.ones(len(adjacent.first)), planes, free, ground_truth, np.zeros_like(ground_truth),
-        design, Coupling(continuity=1.0, slope=1.0, tolerance=0.05),
+        design, 1.0, 0.05,
     )  # fmt: skip
     np.testing.assert_allclose(evaluate_planes(segments, solved, design), ground_truth, atol=1e-3)
     np.testing.assert_array_equal(solved[~free], planes[~free])

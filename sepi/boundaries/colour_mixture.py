@@ -47,18 +47,10 @@ def mixture_evidence(
         0..1; 0 away from depth discontinuities, and on their more distant side.
     """
     evidence = np.zeros(disparity.shape, np.float32)
-    kernels.mixture_evidence(
-        disparity,
-        around,
-        guide,
-        parameters.boundary_step,
-        parameters.clean_radius,
-        parameters.alpha_contrast,
-        parameters.alpha_threshold,
-        # a hundredth of full scale counts as equal even without noise
-        1e-4 + noise,
-        evidence,
-    )
+    searched = parameters.boundary_step, parameters.clean_radius
+    alpha = parameters.alpha_contrast, parameters.alpha_threshold
+    # a hundredth of full scale counts as equal even without noise
+    kernels.mixture_evidence(disparity, around, guide, *searched, *alpha, 1e-4 + noise, evidence)
     return evidence * _trust(guide)
 
 

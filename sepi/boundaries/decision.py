@@ -33,7 +33,9 @@ _FREE_SHARE = np.float32(0.4)
 """Share of the nearer surface up to which colours that speak for the farther one cost nothing."""
 
 
-def assigned_to_surfaces(light_field: LightField, disparity: FloatMap, parameters: BoundaryParameters) -> FloatMap:
+def assigned_to_surfaces(
+    light_field: LightField, disparity: FloatMap, parameters: BoundaryParameters, before: FloatMap | None = None
+) -> FloatMap:
     """Disparity map whose pixels beside depth steps belong to the surface that fills most of them.
 
     Parameters
@@ -42,6 +44,8 @@ def assigned_to_surfaces(light_field: LightField, disparity: FloatMap, parameter
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
     parameters : BoundaryParameters
+    before : ndarray, shape (H, W), float32, optional
+        A map that was decided: only pixels beside what has changed by a depth step since are decided again.
 
     Returns
     -------
@@ -50,7 +54,7 @@ def assigned_to_surfaces(light_field: LightField, disparity: FloatMap, parameter
     """
     if not (parameters.use_shares or parameters.use_mixture):
         return disparity
-    rim = rim_of(disparity, parameters.share_radius, parameters.boundary_step)
+    rim = rim_of(disparity, parameters.share_radius, parameters.boundary_step, before)
     if not rim.inside.any():
         return disparity
     around = surroundings(disparity)

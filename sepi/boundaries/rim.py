@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 
 
 class RimViews(NamedTuple):
@@ -38,7 +38,7 @@ class RimViews(NamedTuple):
     channels: int
     units: FloatMap
     places: npt.NDArray[np.int64]
-    baselines: npt.NDArray[np.float64]
+    baselines: FloatArray
     nearest: FloatMap
     low: int
     margin: np.float32
@@ -108,7 +108,7 @@ class Rim(NamedTuple):
     is_near: BoolMap
 
 
-def rim_of(disparity: FloatMap, radius: int, step: float) -> Rim:
+def rim_of(disparity: FloatMap, radius: int, step: float, before: FloatMap | None = None) -> Rim:
     """Surfaces on both sides of each depth step, means over a window by nearness.
 
     Parameters
@@ -119,6 +119,8 @@ def rim_of(disparity: FloatMap, radius: int, step: float) -> Rim:
         Of the window, pixels.
     step : float
         By how much the disparities in the window of a pixel beside a step differ.
+    before : ndarray, shape (H, W), float32, optional
+        Another map: only pixels are inside in whose window both differ by a step.
 
     Returns
     -------
@@ -127,6 +129,8 @@ def rim_of(disparity: FloatMap, radius: int, step: float) -> Rim:
     window = np.ones((2 * radius + 1, 2 * radius + 1), np.uint8)
     lowest, highest = cv2.erode(disparity, window), cv2.dilate(disparity, window)
     inside = np.asarray(highest - lowest >= np.float64(step))
+    if before is not None:
+        inside &= cv2.dilate(np.abs(disparity - before), window) >= np.float64(step)
     y, x = np.nonzero(inside)
     middle = (lowest + highest)[inside] / 2
     # beyond the border is nothing, which is on neither side

@@ -15,7 +15,7 @@ import numpy as np
 
 from sepi.boundaries.parameters import BoundaryParameters
 from sepi.kernels import specks as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField, without_reference
 from sepi.matching.gaps import compared_depths
 
 # a gap is as deep as so many pixels of larger parts, no farther away than so many pixels
@@ -49,8 +49,7 @@ def without_specks(
     asked = _deep_as_something_near(disparity, joined, margin)
     if not asked.any():
         return joined
-    others = present.copy()
-    others[light_field.reference_position] = False
+    others = without_reference(light_field, present)
     closed, open_, seeing = compared_depths(light_field, np.where(asked, disparity, joined), joined, others, margin)
     stays = asked & (open_ <= _WORSE * closed) & (seeing >= _SEEING * others.sum())
     return np.where(stays, disparity, joined)
@@ -58,18 +57,14 @@ def without_specks(
 
 def _deep_as_something_near(disparity: FloatMap, joined: FloatMap, difference: float) -> BoolMap:
     """Pixels of specks that are farther than what they join, and as deep as a few that belong to larger parts."""
-    height, width = disparity.shape
     farther = disparity < joined
     y, x = np.nonzero(farther)
     alike = np.zeros(len(y), np.int64)
-    around = np.arange(-_ABOUT, _ABOUT + 1)
-    for dy in around:
-        for dx in around:
-            i, j = y + dy, x + dx
-            inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
-            there = i.clip(0, height - 1), j.clip(0, width - 1)
-            of_part = inside & (disparity[there] == joined[there])
-            alike += of_part & (np.abs(disparity[there] - disparity[y, x]) <= difference)
+    # beyond the border, nothing equals anything
+    found, parts = (np.pad(values, _ABOUT, constant_values=np.nan) for values in (disparity, joined))
+    for dy, dx in np.ndindex(2 * _ABOUT + 1, 2 * _ABOUT + 1):
+        there = y + dy, x + dx
+        alike += (found[there] == parts[there]) & (np.abs(found[there] - disparity[y, x]) <= difference)
     farther[y, x] = alike >= _AS_DEEP
     return farther
 

@@ -23,7 +23,7 @@ from sepi.kernels import surface_shares as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import row_bands
-from sepi.matching.view_subsets import views_without_aliases
+from sepi.matching.view_subsets import spread_views
 
 _LEAST_SCALE = 0.005
 """Of the residual at which a view counts half, beside noise; 0..1."""
@@ -119,7 +119,7 @@ def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryPara
 
     Lenses darken and blur views towards the edge of the grid; shares would take that for another surface.
     """
-    present = views_without_aliases(light_field, parameters.share_views)
+    present = spread_views(light_field, parameters.share_views)
     places, baselines = np.argwhere(present), light_field.baselines[present]
     brightness, residual = view_brightness(light_field, sides, places)
     alike = (brightness > 1 / _MOST_DARKENING) & (brightness < _MOST_DARKENING)

@@ -20,14 +20,13 @@ References
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import astuple, dataclass
 from numbers import Real
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.errors import SepiError, SepiWarning
+from sepi.errors import SepiError, warn
 from sepi.validation import described, is_finite, whole_pair
 
 Map = npt.NDArray[np.float32]
@@ -90,9 +89,7 @@ class Camera:
     def __post_init__(self) -> None:
         positive = all(is_finite(value) and value > 0 for value in (self.scale, self.focal_px))
         if not (positive and all(map(is_finite, (self.offset, self.right, self.down)))):
-            raise SepiError(
-                "camera: expected focal length, baseline, focus distance and sensor size to be positive numbers"
-            )
+            raise SepiError("camera: expected positive focal length, baseline, focus distance and sensor size")
 
     def depth(self, disparity: Map) -> Map:
         """Depth of disparities.
@@ -215,9 +212,8 @@ def require_part(part: Part, shape: tuple[int, ...]) -> None:
     """Raise unless a part of this height and width fits into its whole picture."""
     (width, height, x, y), (rows, columns) = part, shape
     if min(x, y) < 0 or x + columns > width or y + rows > height:
-        raise SepiError(
-            f"{columns}x{rows} pixels (width x height) from column {x}, row {y} do not fit into {width}x{height}"
-        )
+        part_of_it = f"{columns}x{rows} pixels (width x height) from column {x}, row {y}"
+        raise SepiError(f"{part_of_it} do not fit into {width}x{height}")
 
 
 def warn_of_infinity(where: object, camera: Camera, disparity: Map, sigma: Map | None, unknown: Flags) -> None:
@@ -238,12 +234,11 @@ def warn_of_infinity(where: object, camera: Camera, disparity: Map, sigma: Map |
     farthest = disparity + (_UNSURE if sigma is None else _SIGMAS * sigma)
     share = float(np.mean(farthest[~unknown] < -camera.offset)) if not unknown.all() else 0.0
     if share > _BEYOND:
-        warnings.warn(
+        warn(
             f"{where}: {100 * share:.0f} % of the pixels lie beyond infinity, below a disparity of "
             f"{0.0 - camera.offset:.3g} with this camera; check --baseline (millimetres), --focus-distance (metres; "
             "inf if no disparity is below 0), and whether near and far are exchanged (sepi check)",
-            SepiWarning,
-            stacklevel=3,
+            up=2,
         )
 
 

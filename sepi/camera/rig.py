@@ -89,10 +89,8 @@ class Lens:
                 f"{self.focal[1]:g} and {self.width}x{self.height}"
             )
         if len(self.distortion) > MOST_COEFFICIENTS[self.kind]:
-            raise SepiError(
-                f"lens: a {self.kind} has at most {MOST_COEFFICIENTS[self.kind]} coefficients of distortion, got "
-                f"{len(self.distortion)}"
-            )
+            got = f"{len(self.distortion)} coefficients of distortion"
+            raise SepiError(f"lens: a {self.kind} has at most {MOST_COEFFICIENTS[self.kind]}, got {got}")
 
     def scaled(self, width: int, height: int) -> Lens:
         """The lens for pictures scaled to another size.
@@ -139,8 +137,7 @@ class Lens:
     @property
     def _coefficients(self) -> Floats:
         # OpenCV takes 4, 5, 8, ... coefficients
-        missing = MOST_COEFFICIENTS[self.kind] - len(self.distortion)
-        return np.array([*self.distortion, *(0.0,) * missing], np.float64)
+        return np.array([*self.distortion, *[0.0] * (MOST_COEFFICIENTS[self.kind] - len(self.distortion))], np.float64)
 
     def project(self, rays: Floats) -> Floats:
         """Pixels at which the camera sees rays.
@@ -199,9 +196,8 @@ class Lens:
         square = (flat**2).sum(axis=1)
         if self.kind == PINHOLE:
             k1, k2, p1, p2, k3, k4, k5, k6 = self._coefficients
-            scale = (1 + square * (k1 + square * (k2 + square * k3))) / (
-                1 + square * (k4 + square * (k5 + square * k6))
-            )
+            below = 1 + square * (k4 + square * (k5 + square * k6))
+            scale = (1 + square * (k1 + square * (k2 + square * k3))) / below
             x, y = flat.T
             bent = np.column_stack(
                 [2 * p1 * x * y + p2 * (square + 2 * x * x), p1 * (square + 2 * y * y) + 2 * p2 * x * y]
@@ -210,9 +206,8 @@ class Lens:
         radius = np.maximum(np.sqrt(square), 1e-12)
         angle = np.arctan(radius)
         powers = angle[:, None] ** np.arange(3, 10, 2)
-        return np.asarray(
-            flat * ((angle + powers @ self._coefficients) / radius)[:, None] * self.focal + self.principal
-        )
+        bent = flat * ((angle + powers @ self._coefficients) / radius)[:, None]
+        return np.asarray(bent * self.focal + self.principal)
 
     def border(self) -> Floats:
         """Pixels along the edge of the picture.
@@ -223,14 +218,12 @@ class Lens:
             ``(x, y)``.
         """
         along = np.linspace(0, 1, _BORDER_POINTS)
-        unit = np.concatenate([[(a, 0), (a, 1), (0, a), (1, a)] for a in along])
-        return unit * (self.width - 1, self.height - 1)
+        return np.concatenate([[(a, 0), (a, 1), (0, a), (1, a)] for a in along]) * (self.width - 1, self.height - 1)
 
     @cached_property
     def _field(self) -> float:
         """Largest squared distance from the axis, at z = 1, of a ray that the picture shows."""
-        rays = self.rays(self.border())[:, :2]
-        return _BEYOND**2 * float((rays**2).sum(axis=1).max())
+        return _BEYOND**2 * float((self.rays(self.border())[:, :2] ** 2).sum(axis=1).max())
 
 
 @dataclass(frozen=True)
@@ -364,15 +357,8 @@ class Rig:
         -------
         str
         """
-        return json.dumps(
-            {
-                "rotation": self.rotation.tolist(),
-                "origin": self.origin.tolist(),
-                "step": self.step,
-                "units": self.units,
-                "views": [[*at, _plain(view)] for at, view in self.views.items()],
-            }
-        )
+        views = [[*at, {**asdict(view.shot), "zoom": view.zoom}] for at, view in self.views.items()]
+        return json.dumps({**vars(self), "views": views}, default=np.ndarray.tolist)
 
     @staticmethod
     def from_text(text: str) -> Rig:
@@ -394,30 +380,23 @@ class Rig:
         try:
             told = json.loads(text)
             views = {(int(t), int(s)): _rectified(view) for t, s, view in told["views"]}
-            rotation, origin = np.array(told["rotation"], np.float64), np.array(told["origin"], np.float64)
-            step, units = float(told["step"]), str(told["units"])
-            sound = (rotation.shape, origin.shape) == ((3, 3), (3,)) and step > 0
-            if not (sound and np.isfinite([*rotation.ravel(), *origin, step]).all()):
-                raise ValueError("no rotation, place and length")
+            step = float(told["step"])
+            if not 0 < step < np.inf:
+                raise ValueError("no length")
+            return Rig(*_pose(told, "origin"), step, str(told["units"]), views)
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError) as error:
             raise SepiError("damaged: it does not tell the poses of its cameras") from error
-        return Rig(rotation, origin, step, units, views)
 
 
-def _plain(view: Rectified) -> dict[str, Any]:
-    shot = view.shot
-    return {
-        "name": shot.name,
-        "lens": asdict(shot.lens),
-        "rotation": shot.rotation.tolist(),
-        "centre": shot.centre.tolist(),
-        "zoom": view.zoom,
-    }
+def _pose(told: Mapping[str, Any], place: str) -> tuple[Floats, Floats]:
+    rotation, at = (np.array(told[key], np.float64) for key in ("rotation", place))
+    if not (np.isfinite(rotation).all() and np.isfinite(at).all()):
+        raise ValueError("no rotation and place")
+    return rotation.reshape(3, 3), at.reshape(3)
 
 
 def _rectified(told: Mapping[str, Any]) -> Rectified:
     lens = told["lens"]
     pairs = {key: tuple(map(float, lens[key])) for key in ("focal", "principal", "distortion")}
     known = Lens(int(lens["width"]), int(lens["height"]), kind=str(lens["kind"]), **pairs)  # type: ignore[arg-type]
-    rotation, centre = np.array(told["rotation"], np.float64), np.array(told["centre"], np.float64)
-    return Rectified(Shot(str(told["name"]), known, rotation.reshape(3, 3), centre.reshape(3)), float(told["zoom"]))
+    return Rectified(Shot(str(told["name"]), known, *_pose(told, "centre")), float(told["zoom"]))

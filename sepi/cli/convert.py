@@ -81,8 +81,7 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
         if name != "depth" and "sigma" not in maps:
             raise SepiError(f"{result_path}: no {name}, since the result has no error bars")
         raise SepiError(f"{result_path}: no {name}, since the camera is unknown; give --focal-length and the others")
-    written = maps if name is None else {name: maps[name]}
-    comment = ", ".join(f"{key}: {_MAPS[key]}" for key in written)
+    comment = ", ".join(f"{key}: {_MAPS[key]}" for key in (maps if name is None else [name]))
     if name is None:
         write_exr(output, {_CHANNELS.get(key, key): values for key, values in maps.items()}, comment)
     elif suffix in EXR:
@@ -113,9 +112,7 @@ def _maps(path: Path, view: tuple[int, int] | None, geometry: Geometry | None) -
 
 @click.command(cls=SepiCommand)
 @click.argument("result_path", metavar="RESULT", type=_PATH)
-@click.option(
-    "-o", "--output", type=_PATH, help="PLY file to write; default: points.ply or points_ROW_COLUMN.ply in RESULT."
-)
+@click.option("-o", "--output", type=_PATH, help="PLY file to write; default: points[_ROW_COLUMN].ply in RESULT.")
 @click.option("--min-confidence", type=float, default=0.0, metavar="X", help="Least confidence of points, 0 to 1.")
 @click.option("--max-depth", type=float, metavar="M", help="Leave out points farther than this, metres.")
 @click.option(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -101,22 +100,18 @@ def depth(
     require_target(folder)
     if light_field_path.resolve() == folder.resolve():
         raise SepiError(f"{folder}: is the light field itself; choose another folder for the result")
-    light_field = reading.read(light_field_path, disparity_range=disparity_range)
+    light_field = reading.read(light_field_path, geometry, disparity_range=disparity_range)
     from sepi.inspection.disparity_range import settle_range
     from sepi.io.result_folder import write_result
     from sepi.matching.unknown import UNKNOWN
     from sepi.pipeline import estimate_depth
 
     require_own(folder, light_field, force=force)
-    if geometry is not None:
-        # with another camera, lengths of the calibrated rig mean nothing
-        light_field = replace(light_field, camera=geometry(shape=light_field.shape), rig=None)
     light_field = settle_range(light_field)
     with progress_bar(light_field.name) as progress:
         maps = estimate_depth(light_field, variant, parameters, progress, memory and memory * 2**20)
     seconds = time.perf_counter() - started if timing else None
-    taken = names_of_others(light_field, with_sigma=maps.sigma is not None)
-    others = () if also is None else (ALL_VIEWS, *taken)
+    others = () if also is None else (ALL_VIEWS, *names_of_others(light_field, with_sigma=maps.sigma is not None))
     files = write_result(folder, light_field, maps, force=force, seconds=seconds, beside=others)
     if also is not None:
         also(folder, light_field, maps, chosen, parameters, memory and memory * 2**20)
@@ -166,9 +161,7 @@ def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[
     for setting in settings:
         match = re.fullmatch(r"(\w+)\.(\w+)\.(\w+)=(.*)", setting)
         if match is None:
-            raise SepiError(
-                f"--set {setting}: expected STAGE.CHOICE.NAME=VALUE, such as initial.semi_global.num_disparities=91"
-            )
+            raise SepiError(f"--set {setting}: expected STAGE.CHOICE.NAME=VALUE, such as optimize.wls.alpha=1e-5")
         stage, choice, field, text = match.groups()
         used = [f"{stage}.{choice}" for stage, choice in variant.choices.items()]
         require_known(f"--set {setting}: stages of variant {name}", [f"{stage}.{choice}"], used)

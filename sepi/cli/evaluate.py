@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sepi.cli.input_options import Pair, Reading, read_ground_truth, reading_flags, truth_flags
-from sepi.errors import SepiError, SepiWarning
+from sepi.errors import SepiError, warn
 from sepi.process.command import SepiCommand, bad_thresholds
 
 if TYPE_CHECKING:
@@ -30,9 +29,7 @@ NO_INTERVAL = "no interval: the map has no error bars"
 @click.argument("ground_truth", metavar="[GROUND_TRUTH|SCENE]", type=_PATH, required=False)
 @truth_flags
 @bad_thresholds
-@click.option(
-    "--border", type=click.IntRange(min=0), help="Pixels to leave out on each side, in place of both protocols."
-)
+@click.option("--border", type=click.IntRange(min=0), help="Pixels left out on each side, in place of both protocols.")
 @click.option(
     "--offset",
     type=Pair("ROW,COLUMN"),
@@ -96,9 +93,8 @@ def evaluate(
     if source is None:
         raise click.UsageError("expected GROUND_TRUTH, a SCENE, or --truth FILE")
     disparity = read_disparity_at(estimate, reading.options.view)
-    values, light_field = read_ground_truth(
-        ground_truth, estimate, reading, own, None if offset is not None else disparity.shape
-    )
+    shape = None if offset is not None else disparity.shape
+    values, light_field = read_ground_truth(ground_truth, estimate, reading, own, shape)
     if values is None:
         view = "" if light_field is None else ",".join(map(str, light_field.reference_position))
         raise SepiError(f"{source}: no ground truth for view {view}")
@@ -115,7 +111,7 @@ def evaluate(
         )
     doubt = misfit(disparity, values, None if light_field is None else light_field.grid)
     if doubt is not None:
-        warnings.warn(f"{source}: the ground truth fits {estimate} far better {doubt}", SepiWarning, stacklevel=1)
+        warn(f"{source}: the ground truth fits {estimate} far better {doubt}")
     masks = None if light_field is None else region_masks(light_field)
     protocols = PROTOCOLS if border is None else {f"border {border}": border}
     if truth_step is None:

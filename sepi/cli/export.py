@@ -56,9 +56,7 @@ def export(
     if output.resolve() == light_field_path.resolve():
         raise SepiError(f"{output}: is the light field itself; choose another name")
     require_room(output, force=force)
-    light_field = reading.read(light_field_path, disparity_range=disparity_range)
-    if geometry is not None:
-        light_field = replace(light_field, camera=geometry(shape=light_field.shape), rig=None)
+    light_field = reading.read(light_field_path, geometry, disparity_range=disparity_range)
     if own is not None:
         part = reading.options.part if light_field.rig is None else None
         light_field = replace(light_field, ground_truth=own.read(light_field.shape, part))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,13 +44,11 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as
     from sepi.io.readers.formats import FORMATS, format_of
 
     known_format = format_of(light_field_path, reading.file_format)
-    light_field = reading.read(light_field_path)
+    light_field = reading.read(light_field_path, geometry)
     try:
         estimated: DisparityRange | str = estimate_range(light_field)
     except SepiError as error:
         estimated = str(error)
-    if geometry is not None:
-        light_field = replace(light_field, camera=geometry(shape=light_field.shape), rig=None)
     camera = light_field.camera
     missing = [(int(t), int(s)) for t, s in zip(*(~light_field.present).nonzero(), strict=True)]
     t0, s0 = light_field.reference_position
@@ -190,12 +188,11 @@ def _pixels(light_field: LightField) -> str:
     kind = light_field.views.dtype
     bits = f"{8 * kind.itemsize} bit{' float' if kind.kind == 'f' else ''}"
     shown = _shown(light_field)
-    told = (
-        ""
-        if shown is None
-        else f"; a view shows {100 * sum(shown) / len(shown):.0f} % of the picture, at least {100 * min(shown):.0f} %"
-    )
-    return f"{'RGB' if light_field.views.shape[4] == 3 else 'grey'}, {bits}; values as stored, no gamma applied{told}"
+    told = f"{'RGB' if light_field.views.shape[4] == 3 else 'grey'}, {bits}; values as stored, no gamma applied"
+    if shown is None:
+        return told
+    mean, least = 100 * sum(shown) / len(shown), 100 * min(shown)
+    return f"{told}; a view shows {mean:.0f} % of the picture, at least {least:.0f} %"
 
 
 def _shown(light_field: LightField) -> list[float] | None:
@@ -226,6 +223,4 @@ def _positions(light_field: LightField) -> list[list[list[float] | None]] | None
     if light_field.positions is None:
         return None
     rows = zip(light_field.positions.tolist(), light_field.present.tolist(), strict=True)
-    return [
-        [place if present else None for place, present in zip(places, there, strict=True)] for places, there in rows
-    ]
+    return [[at if there else None for at, there in zip(*row, strict=True)] for row in rows]

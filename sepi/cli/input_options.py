@@ -15,7 +15,7 @@ from sepi.errors import SepiError
 from sepi.io.readers.options import ReadOptions
 
 if TYPE_CHECKING:
-    from sepi.camera import Camera, Part
+    from sepi.camera import Camera
     from sepi.io.disparity_maps import TruthFile
     from sepi.io.provenance import Origin
     from sepi.io.result_folder import Result
@@ -33,9 +33,8 @@ class Pair(click.ParamType[tuple[int, int]]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
         from sepi.validation import pair_of
 
-        return pair_of(value, "," if "," in self.name else "xX×") or self.fail(
-            f"expected {self.name}, got {value!r}", param, ctx
-        )
+        found = pair_of(value, "," if "," in self.name else "xX×")
+        return found or self.fail(f"expected {self.name}, got {value!r}", param, ctx)
 
 
 _POSITIVE = click.FloatRange(0, math.inf, min_open=True, max_open=True)
@@ -56,11 +55,15 @@ class Reading:
     file_format: str | None
     options: ReadOptions
 
-    def read(self, path: Path, **more: Any) -> LightField:
-        """The light field at ``path``, as :func:`sepi.read_light_field` reads it."""
+    def read(self, path: Path, geometry: Geometry | None = None, **more: Any) -> LightField:
+        """The light field at ``path``, as :func:`sepi.read_light_field` reads it, with the camera that is given."""
         from sepi.reading import read_light_field
 
-        return read_light_field(path, file_format=self.file_format, options=self.options, **more)
+        light_field = read_light_field(path, file_format=self.file_format, options=self.options, **more)
+        if geometry is None:
+            return light_field
+        # with another camera, lengths of the calibrated rig mean nothing
+        return replace(light_field, camera=geometry(shape=light_field.shape), rig=None)
 
 
 _KINDS: dict[str, dict[str, Any]] = {
@@ -186,9 +189,7 @@ def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:
         geometry = None if missing else functools.partial(camera_from, **flags, crop_of=part)
         return command(*args, geometry=geometry, **values)
 
-    flags = (
-        click.option(_flag(name), name, type=float, metavar=unit, help=text) for name, (unit, text) in _GEOMETRY.items()
-    )
+    flags = (click.option(_flag(n), n, type=float, metavar=unit, help=text) for n, (unit, text) in _GEOMETRY.items())
     return _flagged(with_geometry, flags)
 
 
@@ -229,48 +230,33 @@ def read_ground_truth(
     SepiError
         If it cannot be read, or belongs to another view or light field.
     """
-    from sepi.io.all_views import read_disparity_at
+    from sepi.io.all_views import read_disparity_at, read_origin_at
     from sepi.io.disparity_maps import is_disparity
     from sepi.io.readers.view_grid import cut_like_views
 
-    part = _part_of(estimate, reading)
+    view, origin = reading.options.view, read_origin_at(estimate, reading.options.view)
+    part = reading.options.part
+    if origin is not None:
+        part = None if origin.rectified else part or origin.options.part
     if path is None:
         if own is None:
             return None, None
-        _require_view_of(estimate, reading)
-        truth = own.read()
-        return truth if shape is None else cut_like_views(truth, shape, part), None
-    if is_disparity(path):
+        if origin is not None and view not in (None, origin.view):
+            (t, s), (t0, s0) = view, origin.view
+            raise SepiError(f"{estimate}: depth of view {t0},{s0}, not of view {t},{s}; 'sepi depth' takes --view, too")
+        values = own.read()
+    elif is_disparity(path):
         if own is not None:
             raise click.UsageError(f"{path} and --truth FILE are both ground truth; give one of them")
-        values = read_disparity_at(path, reading.options.view)
+        values = read_disparity_at(path, view)
         require_one_view(estimate, path, reading)
-        return values if shape is None else cut_like_views(values, shape, part), None
-    light_field = read_light_field_of(path, estimate, reading, check_order=False)
-    if own is not None:
-        part = part if light_field.rig is None else None
-        light_field = replace(light_field, ground_truth=own.read(light_field.shape, part))
-    return light_field.ground_truth, light_field
-
-
-def _part_of(estimate: Path, reading: Reading) -> Part | None:
-    """Where the estimate's views were cut out, as the flags or the estimate say; None if they are no part."""
-    from sepi.io.all_views import read_origin_at
-
-    origin = read_origin_at(estimate, reading.options.view)
-    if origin is None:
-        return reading.options.part
-    return None if origin.rectified else reading.options.part or origin.options.part
-
-
-def _require_view_of(estimate: Path, reading: Reading) -> None:
-    """Raise for a map of another view than --view."""
-    from sepi.io.all_views import read_origin_at
-
-    origin, view = read_origin_at(estimate, reading.options.view), reading.options.view
-    if origin is not None and view not in (None, origin.view):
-        (t, s), (t0, s0) = view, origin.view
-        raise SepiError(f"{estimate}: depth of view {t0},{s0}, not of view {t},{s}; 'sepi depth' takes --view, too")
+    else:
+        light_field = read_light_field_of(path, estimate, reading, check_order=False)
+        if own is not None:
+            truth = own.read(light_field.shape, part if light_field.rig is None else None)
+            light_field = replace(light_field, ground_truth=truth)
+        return light_field.ground_truth, light_field
+    return values if shape is None else cut_like_views(values, shape, part), None
 
 
 def read_light_field_of(
@@ -307,16 +293,13 @@ def read_light_field_of(
     for one in dict.fromkeys((_as_it_was(origin, reading), _as_it_is(origin, reading))):
         try:
             light_field = one.read(path, check_order=False)
+            if (difference := origin.difference(light_field)) is None:
+                return light_field
+            advice = "give the light field that it was made from, with the same flags as for 'sepi depth'"
+            others = f" ({_BARE})" if bare else ""
+            raise SepiError(f"{result}: {difference}, as {path} is read here; {advice}{others}")
         except SepiError as error:
             failures.append(error)
-            continue
-        difference = origin.difference(light_field)
-        if difference is None:
-            return light_field
-        advice = "give the light field that it was made from, with the same flags as for 'sepi depth'"
-        failures.append(
-            SepiError(f"{result}: {difference}, as {path} is read here; {advice}{f' ({_BARE})' if bare else ''}")
-        )
     raise failures[0]
 
 
@@ -339,8 +322,7 @@ def _as_it_was(origin: Origin, reading: Reading) -> Reading:
     given, names = reading.options, [field.name for field in fields(ReadOptions)]
     unsaid = [name for name in names if getattr(given, name) == getattr(ReadOptions(), name)]
     changed = {name: getattr(origin.options, name) for name in unsaid}
-    known = Reading(reading.file_format or origin.file_format, replace(given, **changed))
-    return _as_it_is(origin, known)
+    return _as_it_is(origin, Reading(reading.file_format or origin.file_format, replace(given, **changed)))
 
 
 def _as_it_is(origin: Origin, reading: Reading) -> Reading:

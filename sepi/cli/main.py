@@ -11,9 +11,10 @@ import click
 from sepi.process.command import SepiGroup, shown_errors
 from sepi.registry import Known
 
-# NumPy reads these when imported. Products are small here, so threads of OpenBLAS would only wait. Pages of 2 MB take
-# time and memory, since arrays live shortly
-for _name, _value in {"OPENBLAS_NUM_THREADS": "1", "NUMPY_MADVISE_HUGEPAGE": "0"}.items():
+# Libraries read these when imported. Products are small here, so threads of OpenBLAS would only wait. Pages of 2 MB
+# take time and memory, since arrays live shortly. Plugins of pydantic would be searched in all packages
+_SETTINGS = {"OPENBLAS_NUM_THREADS": "1", "NUMPY_MADVISE_HUGEPAGE": "0", "PYDANTIC_DISABLE_PLUGINS": "1"}
+for _name, _value in _SETTINGS.items():
     os.environ.setdefault(_name, _value)
 
 _MODULES = {
@@ -44,9 +45,8 @@ class _Imported(Known[Any]):
         return [(name, super(_Imported, self).__getitem__(name)[1]) for name in sorted(self)]
 
 
-_COMMANDS = _Imported(
-    "commands", {name: (f"{__package__}.{module}", text) for name, (module, text) in _MODULES.items()}
-)
+_PLACES = {name: (f"{__package__}.{module}", text) for name, (module, text) in _MODULES.items()}
+_COMMANDS = _Imported("commands", _PLACES)
 
 
 class _Commands(SepiGroup):
@@ -61,27 +61,8 @@ class _Commands(SepiGroup):
             return super().get_command(ctx, cmd_name)
 
 
-def _tell_version(context: click.Context, _: click.Parameter, asked: bool) -> None:
-    if asked and not context.resilient_parsing:
-        from sepi import __version__
-
-        click.echo(f"{context.find_root().info_name} {__version__}")
-        context.exit()
-
-
-@click.group(
-    cls=_Commands,
-    commands=_COMMANDS,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-@click.option(
-    "--version",
-    is_flag=True,
-    is_eager=True,
-    expose_value=False,
-    callback=_tell_version,
-    help="Show the version and exit.",
-)
+@click.group(cls=_Commands, commands=_COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="sepi", message="%(prog)s %(version)s")
 def main() -> None:
     """Depth from light fields by stitched epipolar plane images.
 

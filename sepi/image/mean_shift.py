@@ -14,10 +14,9 @@ References
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from sepi.kernels import mean_shift as kernels
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 
 _ROOM = 16
 """Columns behind the picture and its margins: pixels are looked at eight at a time."""
@@ -27,7 +26,7 @@ _UNLIKE = np.float32(1e4)
 
 
 def patch_modes(
-    image: FloatMap, disparity: FloatMap, mask: BoolMap, *, radius: int, sigma_colour: float, sigma_disparity: float
+    image: FloatMap, disparity: FloatMap, mask: BoolMap, radius: int, sigma_colour: float, sigma_disparity: float
 ) -> FloatMap:
     """Disparity of each masked pixel's mode in colour and disparity.
 
@@ -60,7 +59,7 @@ def patch_modes(
     return modes
 
 
-def sample_modes(samples: npt.NDArray[np.float64], bandwidth: float) -> npt.NDArray[np.float64]:
+def sample_modes(samples: FloatArray, bandwidth: float) -> FloatArray:
     """Mode of each of a few thousand samples, by a Gaussian kernel.
 
     Parameters

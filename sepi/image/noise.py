@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.process.workspace import OfViews, kept_of
+from sepi.process.workspace import kept
 
 BLACK, SATURATED = 0.01, 254 / 255
 """Values beyond which a pixel counts as black or overexposed: the limits of the range cut its noise off."""
@@ -57,19 +55,9 @@ def median(values: npt.NDArray[np.floating]) -> float:
     return float(parted[middle] if values.size % 2 else (parted[:middle].max() + parted[middle]) / 2)
 
 
-@dataclass
-class _Kept(OfViews):
-    """Noise of the reference view, kept in a workspace."""
-
-    noise: float | None = None
-
-
 def noise_of_reference_view(light_field: LightField) -> float:
     """:func:`noise_level` of the reference view; a workspace keeps it."""
-    kept = kept_of(light_field, _Kept)
-    if kept.noise is None:
-        kept.noise = noise_level(light_field.reference_view)
-    return kept.noise
+    return kept(light_field, "noise", lambda: noise_level(light_field.reference_view))
 
 
 def mask_energy(image: FloatMap) -> FloatMap:
@@ -96,14 +84,14 @@ def _with_signal(image: FloatMap) -> BoolMap:
 
 def residual_variance(image: FloatMap) -> float:
     """Expected squared residual, summed over channels, of two views of the same surface by the noise of both."""
-    return variance_of_residuals(noise_level(image), image.shape[2])
+    return variance_of_residuals(noise_level(image))
 
 
 def reference_residual_variance(light_field: LightField) -> float:
     """:func:`residual_variance` of the reference view; a workspace keeps its noise."""
-    return variance_of_residuals(noise_of_reference_view(light_field), light_field.reference_view.shape[2])
+    return variance_of_residuals(noise_of_reference_view(light_field))
 
 
-def variance_of_residuals(noise: float, channels: int) -> float:
-    """Expected squared residual, summed over channels, of two views with this noise."""
-    return float(2 * channels * noise**2)
+def variance_of_residuals(noise: float) -> float:
+    """Expected squared residual, summed over three channels, of two views with this noise."""
+    return float(6 * noise**2)

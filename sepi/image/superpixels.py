@@ -16,9 +16,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
@@ -107,13 +106,8 @@ def superpixels(reference_view: FloatMap, size: int, compactness: float) -> Supe
     step = size | 1
     beyond = [(n + step * (n % 2)) // 2 for n in (-turned.shape[0] % step, -turned.shape[1] % step)]
     padded = np.pad(turned, [(n, n) for n in (*beyond, 0)], "edge")
-    found = slic(
-        padded,
-        n_segments=padded.shape[0] * padded.shape[1] // step**2,
-        compactness=compactness,
-        start_label=0,
-        channel_axis=2,
-    )
+    number = padded.shape[0] * padded.shape[1] // step**2
+    found = slic(padded, n_segments=number, compactness=compactness, start_label=0, channel_axis=2)
     inside = (slice(n, n + length) for n, length in zip(beyond, turned.shape, strict=False))
     labels = turned_back(found[tuple(inside)])
     labels = np.unique(labels, return_inverse=True)[1].reshape(H, W).astype(np.int64)

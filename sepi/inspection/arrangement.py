@@ -11,7 +11,6 @@ and beside it, for each spacing and layout tried: in the right one, all views ag
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
@@ -19,20 +18,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sepi.errors import SepiError, SepiWarning
-from sepi.inspection.view_layouts import (
-    AT_END,
-    FEWEST_POINTS,
-    MATCHED,
-    MOVEMENT,
-    Baseline,
-    Views,
-    baselines_under,
-    is_clear,
-    matched,
-    ring,
-    search_distances,
-)
+from sepi.errors import SepiError, warn
+from sepi.inspection import view_layouts
+from sepi.inspection.view_layouts import AT_END, FEWEST_POINTS, MATCHED, MOVEMENT, Baseline, Views, is_clear, matched
 from sepi.inspection.view_order import odd_views
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_grid import arrange_numbers
@@ -121,19 +109,10 @@ def arrange(light_field: LightField, options: ReadOptions) -> LightField:
         )
     best, reason = tried[ranked[0]], "in which they fit together"
     if len(tried) > 1 and not _CLEAR_RATIO * costs[ranked[0]] + _LEAST_DIFFERENCE <= costs[ranked[1]] < math.inf:
-        square = next(
-            (way for way in tried if way.grid[0] == way.grid[1] and len(way.positions) == way.grid[0] ** 2), None
-        )
+        square = next((one for one in tried if one.grid[0] ** 2 == len(one.positions) == one.grid[1] ** 2), None)
         if square is None:
-            raise SepiError(
-                f"{source}: {count} views without row and column, and their arrangement is unclear "
-                f"({names}); give --grid ROWSxCOLUMNS"
-            )
-        warnings.warn(
-            f"{source}: the grid of the views is unclear; taken for {square.name}, set another by --grid",
-            SepiWarning,
-            stacklevel=2,
-        )
+            raise SepiError(f"{source}: {count} views whose arrangement is unclear ({names}); give --grid ROWSxCOLUMNS")
+        warn(f"{source}: the grid of the views is unclear; taken for {square.name}, set another by --grid")
         best, reason = square, "since the views are unclear"
     note = f"{count} numbered views taken for {best.name}, {reason}; set another by --grid"
     return _placed(light_field, best, options, note)
@@ -200,15 +179,15 @@ def _cost(views: Views, present: npt.NDArray[np.bool_], positions: Positions, re
         near = _neighbours(positions, present, place, reach)
         if not present[place] or not near:
             continue
-        offsets = np.stack([baselines_under(order, positions[near] - positions[place]) for order in _ORDERS])
+        away = positions[near] - positions[place]
+        offsets = np.stack([view_layouts.baselines_under(order, away) for order in _ORDERS])
         here, *others = (_baseline(views, n) for n in (place, *near))
         found = matched(views, here, others, factor, offsets, most_points=_POINTS)
         if found is not None:
             costs.append(found[0].mean(axis=0))
     if not costs:
         return math.inf
-    worst = np.sort(np.stack(costs), axis=0)[-math.ceil(len(costs) / _WORST) :]
-    return float(worst.mean(axis=0).min())
+    return float(np.sort(np.stack(costs), axis=0)[-math.ceil(len(costs) / _WORST) :].mean(axis=0).min())
 
 
 def _neighbours(positions: Positions, present: npt.NDArray[np.bool_], place: int, reach: int) -> list[int]:
@@ -237,10 +216,8 @@ def _placed(light_field: LightField, way: Arrangement, options: ReadOptions, not
     files = None if light_field.files is None else np.where(present, light_field.files[0][order], "")
     views = light_field.views[0][order]
     views[~present] = 0
-    notes = (*light_field.notes, note)
-    return replace(
-        light_field, views=views, present=present, view=options.view, arranged=True, files=files, notes=notes
-    )
+    known = {"views": views, "present": present, "files": files, "notes": (*light_field.notes, note)}
+    return replace(light_field, view=options.view, arranged=True, **known)
 
 
 # Spacings tried, and how many between one and its double
@@ -303,7 +280,7 @@ def estimate_row_spacing(views: Views) -> float | None:
         For the order in which the light field was read. None if rows are as far apart as columns, there is only one
         row or column, or the spacing is unclear.
     """
-    for reach, factor in search_distances(views):
+    for reach, factor in view_layouts.search_distances(views):
         trial = _tried(views, reach, factor)
         if trial is not None:
             measured = _measured(views, trial) if trial.clear else 1.0
@@ -319,7 +296,7 @@ def _tried(views: Views, reach: int, factor: int) -> _Trial | None:
 
     It is clear if it fits clearly better than equal spacing in any layout.
     """
-    baselines = views.worth_matching(ring(views.baselines, reach))
+    baselines = views.worth_matching(view_layouts.ring(views.baselines, reach))
     if not any(t for t, _ in baselines) or not any(s for _, s in baselines) or views.is_too_small(factor):
         return None
     count = round(_PER_OCTAVE * math.log2(_MOST))
@@ -342,8 +319,7 @@ def _tried(views: Views, reach: int, factor: int) -> _Trial | None:
     if moved.size < FEWEST_POINTS or np.quantile(moved, 1 - AT_END) > 0.95 * MOVEMENT:
         return None
     order, spacing = hypotheses[best]
-    clear = is_clear(cost[:, best], cost[:, usual])
-    return _Trial(spacing, order, baselines, factor * float(moved.max()), clear)
+    return _Trial(spacing, order, baselines, factor * float(moved.max()), is_clear(cost[:, best], cost[:, usual]))
 
 
 def _measured(views: Views, trial: _Trial) -> float:
@@ -393,5 +369,6 @@ def _is_seen_in_movements(views: Views, trial: _Trial, spacing: float) -> bool:
 
 def _offsets(baselines: list[Baseline], hypotheses: list[tuple[str, float]]) -> npt.NDArray[np.float64]:
     """Baselines (L, V, 2) under each order and spacing, in units of the longest: all search the same movement."""
-    laid = [baselines_under(order, np.array(baselines, np.float64) * (spacing, 1)) for order, spacing in hypotheses]
+    on_grid = np.array(baselines, np.float64)
+    laid = [view_layouts.baselines_under(order, on_grid * (spacing, 1)) for order, spacing in hypotheses]
     return np.stack([offsets / abs(offsets).max() for offsets in laid])

@@ -17,12 +17,7 @@ from sepi.lightfield import BoolMap, FloatMap
 
 
 def coarse_sweep(
-    reference: FloatMap,
-    views: FloatMap,
-    offsets: FloatMap,
-    candidates: FloatMap,
-    truncation: float,
-    radius: int,
+    reference: FloatMap, views: FloatMap, offsets: FloatMap, candidates: FloatMap, truncation: float, radius: int
 ) -> tuple[FloatMap, FloatMap, FloatMap, FloatMap]:
     """Match the reference view against other views at each candidate disparity.
 
@@ -90,8 +85,7 @@ def dark_corners(reference_view: FloatMap, shape: tuple[int, ...], reach: int) -
     black = brightness < _BLACK * np.quantile(brightness, 0.99)
     if black.mean() > _MOST_BLACK:
         return np.zeros(shape, bool)
-    reduced = cv2.resize(black.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_AREA)
-    _, labels = cv2.connectedComponents(reduced)
+    _, labels = cv2.connectedComponents(cv2.resize(black.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_AREA))
     corners = set(labels[[0, 0, -1, -1], [0, -1, 0, -1]].tolist()) - {0}
     dark = np.isin(labels, list(corners)).astype(np.uint8)
     return np.asarray(cv2.dilate(dark, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) > 0)

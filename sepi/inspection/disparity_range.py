@@ -12,13 +12,12 @@ A third sweep checks whether the scene lies within a given range.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 
 import cv2
 import numpy as np
 
-from sepi.errors import SepiError, SepiWarning
+from sepi.errors import SepiError, warn
 from sepi.image.noise import noise_of_reference_view
 from sepi.inspection.coarse_sweep import agreeing, coarse_sweep, dark_corners
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float, require_light_field
@@ -138,11 +137,8 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     # two more digits than the margin's first one, for readable numbers
     digits = max(2, 1 - math.floor(math.log10(margin)))
     scale = 10**digits
-    return DisparityRange(
-        math.floor(scale * (low - margin)) / scale,
-        math.ceil(scale * (high + margin)) / scale,
-        "estimated",
-    )
+    low, high = math.floor(scale * (low - margin)) / scale, math.ceil(scale * (high + margin)) / scale
+    return DisparityRange(low, high, "estimated")
 
 
 def settle_range(light_field: LightField, given: tuple[float, float] | None = None) -> LightField:
@@ -168,12 +164,10 @@ def settle_range(light_field: LightField, given: tuple[float, float] | None = No
         )
     share = unmatched(light_field)
     if share > _MOST_UNMATCHED:
-        warnings.warn(
+        warn(
             f"{light_field.source or light_field.name}: {100 * share:.0f} % of the textured pixels match nowhere in "
             f"the disparity range ({known.source}) of {known.minimum:g} to {known.maximum:g} pixels per view step; "
-            "if the views are in the right order, give another range by --disparity-range",
-            SepiWarning,
-            stacklevel=2,
+            "if the views are in the right order, give another range by --disparity-range"
         )
     return light_field
 
@@ -209,8 +203,7 @@ def unmatched(light_field: LightField) -> float:
         return 0.0
     alone = (counted & ~(cost < _MISFIT * texture)[y:-y, x:-x]).astype(np.uint8)
     # without the narrow bands beside edges that are hidden from some views
-    patches = cv2.morphologyEx(alone, cv2.MORPH_OPEN, np.ones((_HOLE, _HOLE), np.uint8))
-    return float(patches.sum() / counted.sum())
+    return float(cv2.morphologyEx(alone, cv2.MORPH_OPEN, np.ones((_HOLE, _HOLE), np.uint8)).sum() / counted.sum())
 
 
 class _Views:
@@ -238,11 +231,8 @@ class _Views:
     def positions(self, reach: int, distances: Sequence[int]) -> _Positions:
         """Grid positions in the row and the column of the reference view; any others without those."""
         t0, s0 = self._own
-        present = [
-            (int(t), int(s))
-            for t, s in np.argwhere(self.light_field.present)
-            if 0 < max(abs(t - t0), abs(s - s0)) <= reach
-        ]
+        places = [(int(t), int(s)) for t, s in np.argwhere(self.light_field.present)]
+        present = [(t, s) for t, s in places if 0 < max(abs(t - t0), abs(s - s0)) <= reach]
         cross = [(t, s) for t, s in present if t == t0 or s == s0]
         if len(cross) < 2:
             return self._bright(present[:: math.ceil(len(present) / _MOST_VIEWS)])
@@ -293,11 +283,9 @@ class _Views:
         low, high, usual = (self.factor * float(value) for value in found)
         return low, high, usual
 
-    def _matches_back(
-        self, positions: _Positions, candidates: FloatMap, disparity: FloatMap, tolerance: float
-    ) -> BoolMap:
+    def _matches_back(self, places: _Positions, candidates: FloatMap, disparity: FloatMap, tolerance: float) -> BoolMap:
         """Whether the first other view, matched with all others, has the same disparity there; shape (H, W)."""
-        first, *others = positions
+        first, *others = places
         back = self.sweep([self._own, *others], candidates, first)[-1]
         down, across = self.offsets([first])[0]
         y, x = np.indices(disparity.shape, np.float32)

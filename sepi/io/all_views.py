@@ -160,10 +160,8 @@ def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result
         rig = hdf5.read_rig(file)
         maps = hdf5.float_maps(file_path, file, position)
         extended, picture = (hdf5.read_dataset(file_path, file[name], position) for name in (_MARK, "picture"))
-        unknown, rig = (
-            extended.astype(bool) | (maps["confidence"] == 0),
-            None if rig is None else rig.seen_from(baseline),
-        )
+        unknown = extended.astype(bool) | (maps["confidence"] == 0)
+        rig = None if rig is None else rig.seen_from(baseline)
         scene, camera = str(hdf5.attribute(file, "scene")), hdf5.read_camera(file)
         return Result(scene, picture, **maps, unknown=unknown, camera=camera, from_centre=(down, across), rig=rig)
 

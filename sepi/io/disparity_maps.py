@@ -68,8 +68,7 @@ def read_pfm(path: str | Path) -> FloatMap:
         body = memoryview(data)[header.end() :]
         if not scale or not 0 < 4 * width * height == len(body):
             raise SepiError(f"damaged PFM: expected {4 * width * height} bytes after the header, got {len(body)}")
-        values = np.frombuffer(body, "<f4" if scale < 0 else ">f4").reshape(height, width)
-        return values[::-1].astype(np.float32)
+        return np.frombuffer(body, "<f4" if scale < 0 else ">f4").reshape(height, width)[::-1].astype(np.float32)
 
 
 def write_pfm(path: str | Path, values: FloatMap) -> None:
@@ -251,8 +250,7 @@ class TruthFile:
     @property
     def step(self) -> float:
         """Quantisation step of the disparity, pixels per view step; 0 if the file holds floats."""
-        stored = _stored(map_file(self.path), self.scale is not None)
-        return 0.0 if stored.dtype.kind == "f" else self.scale or 1.0
+        return 0.0 if _stored(map_file(self.path), self.scale is not None).dtype.kind == "f" else self.scale or 1.0
 
 
 def _scaled(stored: npt.NDArray[Any], scale: float | None, offset: float = 0.0) -> FloatMap:

@@ -258,8 +258,8 @@ def read_light_field(path: Path) -> LightField:
     with open_hdf5(path, "light field of this package") as file:
         if "render" in file.attrs:
             raise SepiError(f"{path}: light of a path-traced scene, not a light field; give the scene's folder instead")
-        known_arrays = ("views", "present", "missing", "positions", RIG)
-        arrays = {name: read_dataset(path, file[name]) for name in known_arrays if name in file}
+        own_arrays = ("views", "present", "missing", "positions")
+        arrays: dict[str, Any] = {name: read_dataset(path, file[name]) for name in own_arrays if name in file}
         known = {key: attribute(file, key) for key in _KNOWN if key in file.attrs}
         ground_truth, masks = truth_in(path, file)
         searched = None
@@ -267,24 +267,21 @@ def read_light_field(path: Path) -> LightField:
             low, high = map(float, known["disparity_range"])
             searched = DisparityRange(low, high, str(known["disparity_range_source"]))
             require_known("disparity range", [searched.source], RANGE_SOURCES)
-        positions, missing, view = arrays.get("positions"), arrays.get("missing"), known.get("view")
-        texts: dict[str, Any] = {key: str(known[key]) for key in ("name", "source")}
+        rig = read_dataset(path, file[RIG]).tobytes().decode("utf-8", "replace") if RIG in file else None
         return LightField(
-            views=arrays["views"],
-            **texts,
+            **arrays,
+            name=str(known["name"]),
+            source=str(known["source"]),
             reading=str(known.get("reading", "")),
-            present=arrays["present"].astype(bool),
-            view=None if view is None else (int(view[0]), int(view[1])),
+            view=known.get("view"),
             row_spacing=float(known.get("row_spacing", 1.0)),
             settled="row_spacing" in known,
-            positions=None if positions is None else positions.astype(np.float64),
             camera=read_camera(file),
             notes=tuple(note.decode("utf-8", "replace") for note in known.get("notes", ())),
             disparity_range=searched,
             ground_truth=ground_truth,
             masks=masks,
-            rig=Rig.from_text(arrays[RIG].tobytes().decode("utf-8", "replace")) if RIG in arrays else None,
-            missing=None if missing is None else missing.astype(bool),
+            rig=None if rig is None else Rig.from_text(rig),
         )
 
 

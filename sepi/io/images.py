@@ -352,7 +352,8 @@ def _pillow_pixels(plugin: str, path: Path, data: bytes) -> Pixels:
 def _codec_pixels(codec: str, path: Path, data: bytes) -> Pixels:
     import imagecodecs
 
-    if codec == "png" and b"IEND" + _checksum(b"IEND") not in data:
+    # searched from the end
+    if codec == "png" and data.rfind(b"IEND" + _checksum(b"IEND")) < 0:
         raise ValueError("its end is missing")
     # its warnings do not concern the pixels
     logging.getLogger("imagecodecs").addHandler(_SILENT)

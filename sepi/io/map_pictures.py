@@ -91,8 +91,7 @@ def in_colours(unit: npt.NDArray[np.floating[Any]], unknown: BoolMap | None = No
 
 def levels(unit: npt.NDArray[np.floating[Any]]) -> Picture:
     """0..1 as 0..255; 0 where not finite."""
-    known = np.nan_to_num(unit, posinf=0, neginf=0)
-    return np.asarray(np.rint(255 * np.clip(known, 0, 1)), np.uint8)
+    return np.asarray(np.rint(255 * np.clip(np.nan_to_num(unit, posinf=0, neginf=0), 0, 1)), np.uint8)
 
 
 def write_16bit(path: Path, disparity: FloatMap) -> None:
@@ -187,8 +186,7 @@ def sigma_picture(sigma: FloatMap, unknown: BoolMap | None = None) -> Picture:
     low, high = _span(sigma[counted])
     with np.errstate(divide="ignore", invalid="ignore"):
         unit = np.log(sigma / np.float32(low)) / np.float32(math.log(high / low))
-    colours = in_colours(np.where(finite, np.clip(unit, 0, 1), np.nan), unknown)
-    return _beside_scale(colours, low, high)
+    return _beside_scale(in_colours(np.where(finite, np.clip(unit, 0, 1), np.nan), unknown), low, high)
 
 
 def _span(values: FloatMap) -> tuple[float, float]:

@@ -20,10 +20,10 @@ is a third of the image width. A relief does not have the proportions of the sce
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +35,6 @@ from sepi.io.files import atomic_path, reading
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.validation import require_map, require_path, require_type
 
-Positions = npt.NDArray[np.float32]
 Colours = npt.NDArray[np.uint8]
 View = npt.NDArray[np.generic]
 
@@ -78,7 +77,7 @@ class PointCloud:
     ('x right, y up, z towards the viewer', 'metres; origin: camera of the view')
     """
 
-    positions: Positions
+    positions: npt.NDArray[np.float32]
     colours: Colours
     metric: bool
     stretch: float = 1.0
@@ -187,8 +186,7 @@ def point_cloud(
     """
     require_type("point cloud: picture", picture, np.ndarray, "a view")
     require_map("point cloud: disparity", disparity)
-    given = {"disparity": disparity, "confidence": confidence, "unknown": unknown, "sigma": sigma}
-    for name, values in given.items():
+    for name, values in {"disparity": disparity, "confidence": confidence, "unknown": unknown, "sigma": sigma}.items():
         require_type(f"point cloud: {name}", values, (np.ndarray, NoneType), "an array")
         if values is not None and values.shape != picture.shape[:2]:
             raise SepiError(f"point cloud: {name} is {values.shape}, the view {picture.shape[:2]} (height, width)")
@@ -201,7 +199,7 @@ def point_cloud(
             raise SepiError(f"point cloud: expected a positive largest {name}, got {most:g}")
     if max_sigma is not None and sigma is None:
         raise SepiError("point cloud: a largest sigma needs a map of it")
-    used = np.zeros(disparity.shape, bool)
+    used: BoolMap = np.zeros(disparity.shape, bool)
     used[::step, ::step] = True
     used &= np.isfinite(disparity)
     if unknown is not None:
@@ -215,49 +213,29 @@ def point_cloud(
         depth = camera.depth(disparity)
         used &= np.isfinite(depth) & (depth > 0) & (depth <= (max_depth or np.inf))
         sigma = None if sigma is None else camera.depth_sigma(disparity, sigma)
-        if sigma is not None and max_sigma is not None:
-            # a comparison with NaN is false: pixels of unknown error are left out
-            used &= sigma <= max_sigma
-        cloud = _metric(picture, disparity, used, camera, from_centre)
-        cloud = replace(cloud, sigma=None if sigma is None else sigma[used])
-        if rig is None:
-            return cloud
-        # from axes right, up, back to right, down, forward
-        points = rig.to_world(cloud.positions.astype(np.float64) * (1, -1, -1))
-        return replace(cloud, positions=points.astype(np.float32), units=rig.units)
-    if max_depth is not None:
+    elif max_depth is not None:
         raise SepiError("point cloud: a largest depth in metres needs the camera's geometry, which is not known")
     if sigma is not None and max_sigma is not None:
+        # a comparison with NaN is false: pixels of unknown error are left out
         used &= sigma <= max_sigma
-    return replace(_relief(picture, disparity, used), sigma=None if sigma is None else sigma[used].astype(np.float32))
-
-
-def _metric(
-    picture: View, disparity: FloatMap, used: BoolMap, camera: Camera, from_centre: tuple[float, float]
-) -> PointCloud:
-    across, down = _from_middle(used)
-    depth = camera.depth(disparity[used]).astype(np.float64)
-    x = (across - camera.right - from_centre[1] * camera.offset) * depth / camera.focal_px
-    y = (down - camera.down - from_centre[0] * camera.offset) * depth / camera.focal_px
-    return PointCloud(_stacked(x, -y, -depth), _colours(picture[used]), metric=True)
-
-
-def _relief(picture: View, disparity: FloatMap, used: BoolMap) -> PointCloud:
-    across, down = _from_middle(used)
-    values = disparity[used].astype(np.float64)
-    low, high = np.quantile(values, (_BEYOND, 1 - _BEYOND)) if values.size else (0.0, 0.0)
-    stretch = float(_RELIEF * used.shape[1] / (high - low)) if high > low else 1.0
-    return PointCloud(_stacked(across, -down, stretch * values), _colours(picture[used]), metric=False, stretch=stretch)
-
-
-def _from_middle(used: BoolMap) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Columns and rows of each used pixel, counted from the middle of the image."""
     y, x = np.nonzero(used)
-    return x - (used.shape[1] - 1) / 2, y - (used.shape[0] - 1) / 2
-
-
-def _stacked(*axes: npt.NDArray[np.float64]) -> Positions:
-    return np.stack(axes, axis=1).astype(np.float32)
+    across, down = x - (used.shape[1] - 1) / 2, y - (used.shape[0] - 1) / 2
+    stretch, units = 1.0, None
+    if camera is None:
+        near = disparity[used].astype(np.float64)
+        low, high = np.quantile(near, (_BEYOND, 1 - _BEYOND)) if near.size else (0.0, 0.0)
+        stretch = float(_RELIEF * used.shape[1] / (high - low)) if high > low else 1.0
+        points = np.stack([across, -down, stretch * near], axis=1).astype(np.float32)
+    else:
+        away = depth[used].astype(np.float64)
+        right = (across - camera.right - from_centre[1] * camera.offset) * away / camera.focal_px
+        below = (down - camera.down - from_centre[0] * camera.offset) * away / camera.focal_px
+        points = np.stack([right, -below, -away], axis=1).astype(np.float32)
+        if rig is not None:
+            # from axes right, up, back to right, down, forward
+            points, units = rig.to_world(points.astype(np.float64) * (1, -1, -1)).astype(np.float32), rig.units
+    kept = None if sigma is None else sigma[used].astype(np.float32)
+    return PointCloud(points, _colours(picture[used]), camera is not None, stretch, units, kept)
 
 
 def _colours(pixels: npt.NDArray[Any]) -> Colours:
@@ -270,22 +248,7 @@ def _colours(pixels: npt.NDArray[Any]) -> Colours:
     return np.repeat(levels, 3, axis=1) if levels.shape[1] == 1 else levels
 
 
-class Cloud(Protocol):
-    """Coloured points, such as :class:`sepi.io.point_cloud.PointCloud`; may have a ``sigma`` for each point."""
-
-    @property
-    def positions(self) -> npt.NDArray[np.floating]:
-        """Coordinates, shape (N, 3)."""
-
-    @property
-    def colours(self) -> npt.NDArray[np.uint8]:
-        """RGB, shape (N, 3)."""
-
-    def comments(self) -> tuple[str, ...]:
-        """Axes and units, for the file's header."""
-
-
-def write_ply(path: str | Path, cloud: Cloud, comments: Sequence[str] | None = None) -> None:
+def write_ply(path: str | Path, cloud: PointCloud, comments: Sequence[str] | None = None) -> None:
     """Write coloured points as a binary little-endian PLY, whole or not at all; equal content gives equal bytes.
 
     Parameters
@@ -293,8 +256,8 @@ def write_ply(path: str | Path, cloud: Cloud, comments: Sequence[str] | None = N
     path : str or Path
         MeshLab, CloudCompare, Blender and others open it; comments in its header name the units. If the cloud has a
         sigma, each vertex has a property of that name, which CloudCompare shows as a scalar field.
-    cloud : Cloud
-        Such as a :class:`~sepi.io.point_cloud.PointCloud`.
+    cloud : PointCloud
+        Or an object that has its arrays.
     comments : sequence of str, optional
         Axes and units; default: those of the cloud.
 
@@ -321,7 +284,7 @@ def write_ply(path: str | Path, cloud: Cloud, comments: Sequence[str] | None = N
     from plyfile import PlyData, PlyElement
 
     columns = dict(zip("xyz", np.asarray(cloud.positions, "<f4").T, strict=True))
-    columns |= dict(zip(("red", "green", "blue"), np.asarray(cloud.colours, np.uint8).T, strict=True))
+    columns |= zip(("red", "green", "blue"), np.asarray(cloud.colours, np.uint8).T, strict=True)
     # a user's own class need not have it
     if (sigma := getattr(cloud, "sigma", None)) is not None:
         columns["sigma"] = np.asarray(sigma, "<f4")

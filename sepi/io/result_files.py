@@ -177,19 +177,16 @@ def _require_error_bars(name: str, maps: StageMaps) -> None:
     if len(given) < len(ERROR_BARS):
         raise SepiError(f"{name}: error bars are the maps sigma, low and high, got only {' and '.join(given)}")
     sigma, low, high = (maps.extra[key].astype(np.float64) for key in (SIGMA, LOW, HIGH))
-    told = np.isfinite(maps.disparity)
-    bad = told & ~(np.isfinite(sigma) & (sigma >= 0))
-    if bad.any():
-        raise SepiError(f"{name}: sigma must be finite and not negative, got {sigma[bad][0]:g}")
-    bad = told & ~(low <= high)
-    if bad.any():
-        raise SepiError(f"{name}: low must be no more than high, got {low[bad][0]:g} and {high[bad][0]:g}")
-    disparity = maps.disparity.astype(np.float64)
+    told, disparity = np.isfinite(maps.disparity), maps.disparity.astype(np.float64)
     slack = _ROUNDING * (1 + np.abs(np.where(told, disparity, 0)))
-    # an unknown pixel has the whole range as its interval, and its disparity is a guess
-    outside = told & ~maps.mask(UNKNOWN) & ~((low - slack <= disparity) & (disparity <= high + slack))
-    if outside.any():
-        y, x = np.argwhere(outside)[0]
-        raise SepiError(
-            f"{name}: low and high must enclose the disparity, not {low[y, x]:g}, {high[y, x]:g} at {y},{x}"
-        )
+    sound = {
+        "sigma must be finite and not negative": np.isfinite(sigma) & (sigma >= 0),
+        "low must be no more than high": low <= high,
+        # an unknown pixel has the whole range as its interval, and its disparity is a guess
+        "low and high must enclose the disparity": maps.mask(UNKNOWN)
+        | ((low - slack <= disparity) & (disparity <= high + slack)),
+    }
+    for what, holds in sound.items():
+        for y, x in np.argwhere(told & ~holds)[:1]:
+            got = f"sigma {sigma[y, x]:g}, low {low[y, x]:g}, high {high[y, x]:g} at {y},{x}"
+            raise SepiError(f"{name}: {what}, got {got}")

@@ -321,11 +321,10 @@ def write_as_taken(
     """
     if light_field.camera is None or light_field.rig is None:
         return
-    from sepi.camera.as_taken import as_taken, sigma_as_taken
+    from sepi.camera.as_taken import as_taken
 
     t, s = position or light_field.reference_position
     down, across = (light_field.baselines[t, s] + light_field.from_centre).tolist()
-    where = light_field.camera, light_field.rig, (t, s), (down, across)
-    maps = [*as_taken(disparity, *where), *([] if sigma is None else [sigma_as_taken(sigma, *where)])]
+    maps = as_taken(disparity, sigma, light_field.camera, light_field.rig, (t, s), (down, across))
     for name, values in zip(names_as_taken(position, with_sigma=sigma is not None), maps, strict=True):
         write_pfm(folder / name, values)

@@ -154,8 +154,7 @@ def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
     """Write an evaluation into an empty group or a file's root; reading and writing it again gives the same bytes."""
     if evaluation.scores:
         # as JSON, since thousands of attributes in groups would take seconds to read
-        text = json.dumps(evaluation.scores, sort_keys=True)
-        put(group, _SCORES, np.frombuffer(text.encode(), np.uint8))
+        put(group, _SCORES, np.frombuffer(json.dumps(evaluation.scores, sort_keys=True).encode(), np.uint8))
     if evaluation.error is not None:
         put(group, "error", evaluation.error)
     if evaluation.reliability is not None:
@@ -236,8 +235,7 @@ class ExternalSource(BaseModel):
         expected = [f"{scene}{suffix}" for suffix in SUFFIXES]
         exact = [name for name in expected if name in names]
         alike = [other for name in expected for other in names if other.casefold() == name.casefold()]
-        files = (path / name for name in (*exact, *alike))
-        return next(filter(os.path.isfile, files), path / expected[0])
+        return next(filter(os.path.isfile, (path / name for name in (*exact, *alike))), path / expected[0])
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -26,10 +25,14 @@ from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.denoising import LEFT, DenoisedLightField
 from sepi.matching.row_bands import Rows
 from sepi.matching.softening import SofteningParameters
-from sepi.process.workspace import OfViews, kept_of
+from sepi.process.workspace import forget, kept
 
 DETAIL_UNIT = 1 / 32000
 """Unit of the detail, which is stored as int16: colours differ by at most 1."""
+
+# bilateral window of 2 r + 1 pixels that takes the detail out, its width in pixels, and the sum of RGB differences at
+# an edge of the base, colours in 0..1
+_RADIUS, _WIDTH, _EDGE = 4, 4.0, 0.05
 
 ColourScale = Annotated[
     float,
@@ -54,16 +57,6 @@ class BaseDetailParameters(SofteningParameters):
     )
     use_detail: bool = Field(True, description="whether the detail is compared, or colours alone")
     detail_share: float = Field(0.6, gt=0, le=1, description="share of the detail in the cost")
-    base_radius: int = Field(4, ge=1, le=20, description="bilateral window of 2 r + 1 pixels that takes detail out")
-    base_sigma_colour: float = Field(
-        0.05, gt=0, le=2, description="sum of RGB differences at an edge of the base, colours in 0..1"
-    )
-    base_sigma_space: float = Field(4.0, gt=0, le=20, description="width of the base's window, in pixels")
-
-    @property
-    def base(self) -> tuple[float, ...]:
-        """Parameters that the detail depends on, apart from the views."""
-        return self.base_radius, self.base_sigma_colour, self.base_sigma_space
 
     @property
     def shares(self) -> FloatMap:
@@ -151,9 +144,9 @@ def base_detail_decomposition(
     unit = np.float32(1 / full_scale(views.dtype))
     noise = reference_noise(light_field)
     detail, missing = _detail_so_far(light_field, parameters, rows, present)
-    edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise))
+    edge = float(np.hypot(_EDGE, 3 * noise))
     if detail.size and missing.any():
-        _make_detail(views, unit, missing, parameters, edge, rows, detail)
+        kernels.detail_of_views(views, float(unit), missing, rows.low, *_window(edge), DETAIL_UNIT, detail)
     return BaseDetail(
         views,
         unit,
@@ -162,35 +155,11 @@ def base_detail_decomposition(
         rows.low,
         present,
         *light_field.reference_position,
-        variance_of_residuals(noise, guide.shape[2]),
+        variance_of_residuals(noise),
         guide,
         detail[light_field.reference_position],
         edge,
     )
-
-
-def detail_of(picture: FloatMap, parameters: BaseDetailParameters, edge: float, rows: Rows) -> npt.NDArray[np.int16]:
-    """Detail of a picture, computed like that of a view.
-
-    Parameters
-    ----------
-    picture : ndarray, shape (H, W, 3), float32
-        Colours, 0..1.
-    parameters : BaseDetailParameters
-    edge : float
-        Sum of the RGB differences that counts as an edge of the base.
-    rows : Rows
-        That are wanted.
-
-    Returns
-    -------
-    ndarray, shape (n, W), int16
-        In :data:`DETAIL_UNIT`.
-    """
-    detail = np.zeros((1, 1, rows.high - rows.low, picture.shape[1]), np.int16)
-    _make_detail(picture[None, None], np.float32(1), np.ones((1, 1), bool), parameters, edge, rows, detail)
-    made: npt.NDArray[np.int16] = detail[0, 0]
-    return made
 
 
 def compared_with(views: BaseDetail, picture: FloatMap, parameters: BaseDetailParameters, rows: Rows) -> BaseDetail:
@@ -212,42 +181,22 @@ def compared_with(views: BaseDetail, picture: FloatMap, parameters: BaseDetailPa
     """
     detail = views.reference_detail
     if parameters.use_detail:
-        detail = detail_of(picture, parameters, views.edge, rows)
+        made, window = np.zeros((1, 1, *detail.shape), np.int16), _window(views.edge)
+        kernels.detail_of_views(picture[None, None], 1.0, np.ones((1, 1), bool), rows.low, *window, DETAIL_UNIT, made)
+        detail = made[0, 0]
     return views._replace(guide=picture, reference_detail=detail, noise=views.noise / 2)
 
 
-def _make_detail(
-    views: npt.NDArray[Any],
-    unit: np.float32,
-    wanted: BoolMap,
-    parameters: BaseDetailParameters,
-    edge: float,
-    rows: Rows,
-    out: npt.NDArray[np.int16],
-) -> None:
-    radius = parameters.base_radius
-    squared = np.arange(radius + 1) ** 2
-    nearness = np.exp(-0.5 * (squared[:, None] + squared) / parameters.base_sigma_space**2)
-    window = nearness.astype(np.float32), 1 / (64 * edge * edge)
-    kernels.detail_of_views(views, float(unit), wanted, rows.low, *window, DETAIL_UNIT, out)
-
-
-@dataclass
-class _Kept(OfViews):
-    """The detail of some views so far.
-
-    Only the detail of whole views is kept. Detail computed in bands, if memory is short, is kept only if all rows fit.
-    """
-
-    made_with: tuple[float, ...] = ()
-    detail: npt.NDArray[np.int16] | None = None
-    made: BoolMap | None = None
+def _window(edge: float) -> tuple[FloatMap, float]:
+    """Weights of the bilateral filter by distance, and what it multiplies squared sums of differences with."""
+    squared = np.arange(_RADIUS + 1) ** 2
+    nearness = np.exp(-0.5 * (squared[:, None] + squared) / _WIDTH**2)
+    return nearness.astype(np.float32), 1 / (64 * edge * edge)
 
 
 def forget_detail(light_field: LightField) -> None:
     """Free the cached detail; it is recomputed on demand."""
-    kept = kept_of(light_field, _Kept)
-    kept.detail = kept.made = None
+    forget(light_field, "detail")
 
 
 def _all_rows_fit(light_field: LightField) -> bool:
@@ -267,13 +216,10 @@ def _detail_so_far(
     shape = (*light_field.grid, rows.high - rows.low if with_detail else 0, width)
     if not with_detail or rows != (0, height):
         return np.zeros(shape, np.int16), present
-    kept = kept_of(light_field, _Kept)
-    if kept.detail is None or kept.made is None or kept.made_with != parameters.base:
-        kept.made_with = parameters.base
-        kept.detail, kept.made = np.zeros(shape, np.int16), np.zeros(light_field.grid, bool)
-    missing = present & ~kept.made
-    kept.made |= present
-    return kept.detail, missing
+    detail, made = kept(light_field, "detail", lambda: (np.zeros(shape, np.int16), np.zeros(light_field.grid, bool)))
+    missing = present & ~made
+    made |= present
+    return detail, missing
 
 
 def reference_noise(light_field: LightField) -> float:

@@ -29,7 +29,7 @@ from sepi.image.noise import noise_level
 from sepi.kernels import denoising as kernels
 from sepi.lightfield import FloatMap, LightField, full_scale
 from sepi.matching.view_noise import PARTS, ViewNoise, part_of_picture, view_noise
-from sepi.process.workspace import OfViews, kept_of
+from sepi.process.workspace import kept
 from sepi.stage import Parameters
 
 LEAST_NOISE = 1.25 / 255
@@ -103,22 +103,20 @@ def denoised(light_field: LightField, least: float, least_noise: float = 0.0) ->
     """
     if least == 0:
         return light_field
-    kept = kept_of(light_field, _Kept)
-    of_views = _noise(light_field, kept)
+    of_views = measured_noise(light_field)
     if of_views.usual < least_noise:
         return light_field
-    if kept.least != least:
-        kept.least, kept.made = least, _denoised_views(light_field, of_views, least)
-    if kept.made is None:
+    views = kept(light_field, "denoised views", lambda: _denoised_views(light_field, of_views, least), least)
+    if views is None:
         return light_field
     others = {field.name: getattr(light_field, field.name) for field in fields(LightField) if field.name != "views"}
     noise = _noise_of_parts(light_field.reference_view)
-    return DenoisedLightField(kept.made, **others, noise=noise, of_views=of_views)
+    return DenoisedLightField(views, **others, noise=noise, of_views=of_views)
 
 
 def measured_noise(light_field: LightField) -> ViewNoise:
     """:func:`sepi.matching.view_noise.view_noise` of the original views; computed once per workspace."""
-    return _noise(light_field, kept_of(light_field, _Kept))
+    return kept(light_field, "noise of views", lambda: view_noise(light_field))
 
 
 def sure_noise(light_field: LightField) -> ViewNoise | None:
@@ -140,21 +138,6 @@ def _noise_of_parts(image: FloatMap) -> float:
     """Noise of the noisiest parts of an image; a scale that tolerates noise must tolerate theirs."""
     parts = [image[part_of_picture(number, image.shape[:2])] for number in np.ndindex(PARTS, PARTS)]
     return float(np.quantile([noise_level(part) for part in parts], _NOISIEST))
-
-
-@dataclass
-class _Kept(OfViews):
-    """Noise of some views, and the denoised views; None if they stay unchanged."""
-
-    noise: ViewNoise | None = None
-    least: float = 0.0
-    made: npt.NDArray[Any] | None = None
-
-
-def _noise(light_field: LightField, kept: _Kept) -> ViewNoise:
-    if kept.noise is None:
-        kept.noise = view_noise(light_field)
-    return kept.noise
 
 
 def _denoised_views(light_field: LightField, noise: ViewNoise, least: float) -> npt.NDArray[Any] | None:

@@ -16,11 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.image.noise import BLACK, SATURATED
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatArray, FloatMap, LightField
 from sepi.matching.sweep_arrays import Candidates, ExpectedCosts
 from sepi.matching.view_noise import WINDOW, ViewNoise, expected_variance
-
-FloatArray = npt.NDArray[np.float64]
 
 ANYWHERE = 4 / 9, 49 / 225
 """Means of the sum of squared bilinear weights, and of its square, over all places between pixels."""

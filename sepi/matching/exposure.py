@@ -10,9 +10,8 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from sepi.lightfield import HIGHEST, LOWEST, BoolMap, FloatMap, LightField, full_scale
+from sepi.lightfield import HIGHEST, LOWEST, BoolMap, FloatArray, FloatMap, LightField, full_scale
 
 # values that count, full range = 1: neither black nor overexposed
 _DARKEST, _BRIGHTEST = 0.03, 0.97
@@ -66,9 +65,7 @@ def equally_bright(light_field: LightField) -> LightField:
     return replace(light_field, views=views, notes=(*light_field.notes, note))
 
 
-def brightness_factors(
-    light_field: LightField, side: int = _FINE_SIDE
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def brightness_factors(light_field: LightField, side: int = _FINE_SIDE) -> tuple[FloatArray, FloatArray]:
     """Factors that make each view's channels as bright as the reference view's, and their errors.
 
     Both have shape (T, S, C) and are the :func:`gains` of views reduced to about this side; missing views have 1 and 0.
@@ -84,9 +81,7 @@ def brightness_factors(
     return factors, errors
 
 
-def gains(
-    reference: FloatMap, view: FloatMap, shown: BoolMap
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def gains(reference: FloatMap, view: FloatMap, shown: BoolMap) -> tuple[FloatArray, FloatArray]:
     """Factors that make each channel of a view as bright as the reference view's.
 
     The best single shift aligns the pictures. The factor is the median ratio over all pixels, so that hidden pixels, or
@@ -137,7 +132,7 @@ def _means_are_alike(light_field: LightField) -> bool:
     return all((np.abs(_mean(light_field, place) - own) <= _MEANS_ALIKE * own).all() for place in places)
 
 
-def _mean(light_field: LightField, place: tuple[int, ...]) -> npt.NDArray[np.float64]:
+def _mean(light_field: LightField, place: tuple[int, ...]) -> FloatArray:
     """Mean colour over some rows of a view; the rows are symmetric, so that a flipped view has the same mean."""
     rows = np.arange(light_field.shape[0])
     view = light_field.views[place][np.minimum(rows, rows[::-1]) % _STRIDE == 0]

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from sepi.kernels import gaps as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale, without_reference
 from sepi.matching.denoising import guide_of
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import row_bands
@@ -72,8 +72,7 @@ def with_open_gaps(
     asked = farther != disparity
     if not asked.any():
         return disparity
-    others = present.copy()
-    others[light_field.reference_position] = False
+    others = without_reference(light_field, present)
     there, here, seeing = compared_depths(light_field, disparity, farther, others, parameters.occlusion_margin)
     better = there < np.float32(parameters.gap_gain) * here
     # only in uniform colours: at edges, residuals come from interpolation

@@ -76,7 +76,7 @@ class GaussNewton(AlignedViews):
     @cached_property
     def colour_variance(self) -> float:
         """Divisor of the squared residuals of colours, in gradients and curvatures."""
-        return self._parameters.colour_scale**2 + variance_of_residuals(reference_noise(self._light_field), 3)
+        return self._parameters.colour_scale**2 + variance_of_residuals(reference_noise(self._light_field))
 
     def gradient_and_hessian(
         self, mean: FloatMap, disparity: FloatMap, slopes: tuple[FloatMap, FloatMap] | None = None
@@ -189,17 +189,8 @@ def windowed_step(
     nearer = cv2.dilate(disparity, np.ones((3, 3), np.uint8)) - disparity
     share = np.clip(np.float32(1.5) - nearer / width, np.float32(BESIDE_NEARER), np.float32(1))
     sums = np.empty((2, *disparity.shape), np.float32)
-    surface_windows.sums_of_surface(
-        gradient * share,
-        curvature * share,
-        disparity,
-        surfaces.colours,
-        radius,
-        float(width),
-        surfaces.colour_width,
-        OF_OTHER_COLOUR,
-        sums,
-    )
+    like = radius, float(width), surfaces.colour_width, OF_OTHER_COLOUR
+    surface_windows.sums_of_surface(gradient * share, curvature * share, disparity, surfaces.colours, *like, sums)
     # as a window full of the surface would have them, but for what lies beyond the picture
     rows, columns = (_within(length, radius) for length in disparity.shape)
     sums /= rows[:, None] * columns

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.image.noise import residual_variance
+from sepi.image.noise import reference_residual_variance
 from sepi.kernels import LANES
 from sepi.kernels import plane_sweep as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
@@ -33,6 +33,7 @@ from sepi.matching.nearest_surfaces import shown_columns
 from sepi.matching.softening import Softening, softened
 from sepi.matching.sweep_arrays import ViewStack, Window, sampled_candidates
 from sepi.matching.view_noise import ViewNoise
+from sepi.matching.view_subsets import ViewSubsets
 from sepi.process.threads import threads_used
 from sepi.stage import Progress, no_progress
 
@@ -140,8 +141,7 @@ def sweep(
     light_field: LightField,
     parameters: SweepParameters,
     *,
-    groups: npt.NDArray[np.int64] | None = None,
-    subsets: BoolMap | None = None,
+    subsets: ViewSubsets | None = None,
     mask: BoolMap | None = None,
     progress: Progress = no_progress,
 ) -> SweepResult:
@@ -155,10 +155,8 @@ def sweep(
     light_field : LightField
         With a known disparity range.
     parameters : SweepParameters
-    groups : ndarray, shape (T, S), int, optional
-        Group of each view, 0..G-1; -1 leaves a view out. Default: one group of all.
-    subsets : ndarray, shape (N, G), bool, optional
-        Which groups make up each subset. Default: each group by itself.
+    subsets : ViewSubsets, optional
+        Default: all views.
     mask : ndarray, shape (H, W), bool, optional
         Pixels to compute. Default: all.
     progress : callable, optional
@@ -173,27 +171,27 @@ def sweep(
         If the disparity range is unknown.
     """
     H, W = light_field.shape
-    groups = np.zeros(light_field.grid, np.int64) if groups is None else groups
-    groups = np.where(light_field.present, groups, -1)
+    all_views = ViewSubsets(np.zeros(light_field.grid, np.int64), np.ones((1, 1), bool), ("full",))
+    among = subsets or all_views
+    groups = np.where(light_field.present, among.groups, -1)
     groups[light_field.reference_position] = -1  # the reference view agrees with itself at every candidate
-    subsets = np.eye(groups.max() + 1, dtype=bool) if subsets is None else subsets
-    groups, subsets = _without_empty(groups, subsets)
+    groups, chosen = _without_empty(groups, among.subsets)
     mask = np.ones((H, W), bool) if mask is None else mask
     colours = planar(softened(light_field, parameters.softening))
-    noise = residual_variance(light_field.reference_view)
+    noise = reference_residual_variance(light_field)
     squared_scale = parameters.scale**2 + noise
     scale2 = np.float32(squared_scale * full_scale(colours.dtype) ** 2)
     shown = shown_columns(light_field)
-    views = ViewStack(colours, *light_field.reference_position, groups, subsets, scale2, shown)
+    views = ViewStack(colours, *light_field.reference_position, groups, chosen, scale2, shown)
     disparities = parameters.candidates(light_field)
     candidates = sampled_candidates(disparities, light_field.baselines)
     to_correct = parameters.noise_to_correct(light_field)
-    expected = expected_costs(light_field, to_correct, candidates, groups, subsets, squared_scale, LANES)
+    expected = expected_costs(light_field, to_correct, candidates, groups, chosen, squared_scale, LANES)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     # the kernel takes one for each pixel
     variance = np.full((H, W), parameters.window_sigma**2 + noise, np.float32)
     window = Window(guide, parameters.window_radius, variance)
-    best, cost, mean = maps = np.full((3, len(subsets), H, W), np.nan, np.float32)
+    best, cost, mean = maps = np.full((3, len(chosen), H, W), np.nan, np.float32)
     height = _rows_at_a_stretch(H, threads_used())
     strip = height * threads_used()
     for begin in range(0, H, strip):

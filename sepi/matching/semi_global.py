@@ -13,7 +13,6 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, NamedTuple, Self
 
 import cv2
@@ -23,7 +22,7 @@ from pydantic import Field
 
 from sepi.kernels import semi_global as kernels
 from sepi.lightfield import FloatMap
-from sepi.stage import Parameters
+from sepi.stage import Parameters, StageMaps
 
 SAME_MINIMUM = 0.25
 """Candidates this close to the winner belong to the same minimum, pixels per view step..."""
@@ -92,23 +91,6 @@ class SmoothingParameters(Parameters):
             radius += 1
         penalties = {name: getattr(self, name) * ENOUGH_VIEWS / views for name in ("small_penalty", "large_penalty")}
         return self.model_copy(update={"window_radius": radius, **penalties})
-
-
-@dataclass(frozen=True)
-class SmoothedResult:
-    """Disparity and confidence from the smoothed volume.
-
-    Attributes
-    ----------
-    disparity : ndarray, shape (H, W), float32
-        Winner, refined by a parabola; pixels per view step.
-    confidence : ndarray, shape (H, W), float32
-        0..1: ``m / (m + HALF_CONFIDENT)`` of the margin ``m`` by which the averaged cost of every other minimum
-        exceeds that of the winner's; 0 where it does not.
-    """
-
-    disparity: FloatMap
-    confidence: FloatMap
 
 
 class Places(NamedTuple):
@@ -216,8 +198,12 @@ class AveragedCosts:
         self._costs[:, : kept.stop - kept.start] = self._costs[:, kept].copy()
         self._top, self._done = self._top + kept.start, end
 
-    def smoothed(self) -> SmoothedResult:
-        """Smooth the averaged costs, and take the best candidate of each pixel."""
+    def smoothed(self) -> StageMaps:
+        """Smooth the averaged costs, and take the best candidate of each pixel, refined by a parabola.
+
+        The confidence is ``m / (m + HALF_CONFIDENT)`` of the margin ``m`` by which the averaged cost of every other
+        minimum exceeds that of the winner's; 0 where it does not.
+        """
         parameters, disparities = self._parameters, self._disparities
         penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
         band = max(1, BAND_BYTES * self._height // (2 * self._averaged.nbytes))
@@ -226,4 +212,4 @@ class AveragedCosts:
         disparity, margin = np.empty((2, *self._colours.shape[1:]), np.float32)
         kernels.choose(self._smoothed, self._averaged, disparities, self._places, same, disparity, margin)
         margin = np.maximum(margin, 0)
-        return SmoothedResult(disparity, (margin / (margin + np.float32(HALF_CONFIDENT))).astype(np.float32))
+        return StageMaps(disparity, (margin / (margin + np.float32(HALF_CONFIDENT))).astype(np.float32))

@@ -10,7 +10,7 @@ sharp.
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 import cv2
@@ -22,7 +22,7 @@ from sepi.lightfield import FloatMap, LightField, as_unit_float, full_scale
 from sepi.matching.denoising import DenoisingParameters, denoised, measured_noise
 from sepi.matching.view_noise import ViewNoise, expected_variance
 from sepi.process.threads import threads_used
-from sepi.process.workspace import OfViews, kept_of
+from sepi.process.workspace import kept
 
 SHARP, SHARPEST = 0.295, 0.32
 """Sharpness at which the blur begins, and at which it is complete. Dots averaged over each pixel have 0.33; most
@@ -56,14 +56,6 @@ class SofteningParameters(DenoisingParameters):
     """Parameters of the views for matching."""
 
     softening: Softening = 0.7
-
-
-@dataclass
-class _Kept(OfViews):
-    """Softened views; None if they stay unchanged."""
-
-    blur: float = 0.0
-    made: npt.NDArray[Any] | None = None
 
 
 def compared_views(light_field: LightField, parameters: SofteningParameters, least_noise: float = 0.0) -> LightField:
@@ -117,11 +109,9 @@ def softened(light_field: LightField, blur: float, noise: ViewNoise | None = Non
     """
     if blur == 0:
         return light_field
-    kept = kept_of(light_field, _Kept)
-    if kept.blur != blur:
-        made = _softened_views(light_field, measured_noise(light_field) if noise is None else noise, blur)
-        kept.made, kept.blur = made, blur
-    return light_field if kept.made is None else replace(light_field, views=kept.made)
+    told = measured_noise(light_field) if noise is None else noise
+    views = kept(light_field, "softened views", lambda: _softened_views(light_field, told, blur), blur)
+    return light_field if views is None else replace(light_field, views=views)
 
 
 def sharpness(picture: FloatMap, variance: FloatMap) -> FloatMap:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.kernels import splines as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField, without_reference
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail
 from sepi.matching.row_bands import Rows
-from sepi.process.workspace import OfViews, kept_of
+from sepi.process.workspace import forget, kept
 
 SPLINE_UNIT = np.float32(1 / 3400)
 """Unit of the spline coefficients, stored as int16; a checkerboard of -0.5 and 1.5 has some of +-9.5."""
@@ -103,8 +102,7 @@ def spline_views(
     if rows == (0, height) and parameters.use_detail and (present == light_field.present).all():
         # the splines of all views take its place
         forget_detail(light_field)
-    others = present.copy()
-    others[reference] = False
+    others = without_reference(light_field, present)
     scales = parameters.colour_scale, parameters.detail_scale
     return SplineViews(
         splines,
@@ -118,29 +116,9 @@ def spline_views(
     )
 
 
-@dataclass
-class _Kept(OfViews):
-    """The splines of some views so far; of whole views alone, as detail is kept.
-
-    Attributes
-    ----------
-    made_with : tuple of float
-        How the detail is made.
-    splines : ndarray, shape (T, S, H + 2 MARGIN, W + 2 MARGIN, 4), int16
-    colours, detail : ndarray, shape (T, S), bool
-        The views of which they have them.
-    """
-
-    made_with: tuple[float, ...] = ()
-    splines: npt.NDArray[np.int16] | None = None
-    colours: BoolMap | None = None
-    detail: BoolMap | None = None
-
-
 def forget_splines(light_field: LightField) -> None:
     """Free the cached splines; they are recomputed on demand."""
-    kept = kept_of(light_field, _Kept)
-    kept.splines = kept.colours = kept.detail = None
+    forget(light_field, "splines")
 
 
 def _splines_so_far(
@@ -159,14 +137,15 @@ def _splines_so_far(
         return room, present, with_detail
     if rows != (0, height):
         return np.zeros(shape, np.int16), present, with_detail
-    kept = kept_of(light_field, _Kept)
+
+    def so_far() -> tuple[npt.NDArray[np.int16], BoolMap]:
+        return kept(light_field, "splines", lambda: (np.zeros(shape, np.int16), np.zeros((2, *light_field.grid), bool)))
+
     # callers without detail expect its channel to be empty
-    same_detail = parameters.use_detail and kept.made_with == parameters.base
-    if kept.detail is not None and kept.detail.any() and not same_detail:
-        kept.splines = None
-    if kept.splines is None or kept.colours is None or kept.detail is None:
-        kept.splines, kept.colours, kept.detail = np.zeros(shape, np.int16), *np.zeros((2, *light_field.grid), bool)
-    kept.made_with = parameters.base
-    missing = present & ~kept.colours, with_detail & ~kept.detail
-    kept.colours, kept.detail = kept.colours | present, kept.detail | with_detail
-    return kept.splines, *missing
+    if not parameters.use_detail and so_far()[1][1].any():
+        forget_splines(light_field)
+    splines, made = so_far()
+    wanted = np.stack([present, with_detail])
+    missing = wanted & ~made
+    made |= wanted
+    return splines, *missing

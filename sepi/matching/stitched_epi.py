@@ -167,29 +167,3 @@ def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedE
     samples = (1 - weight).astype(np.float32) * above + weight.astype(np.float32) * below
     rows = np.where(inside[..., None, None], samples, np.float32(0))
     return StitchedEpi(rows.reshape(T * S, W, 3), offsets.ravel(), positions.ravel(), inside.ravel(), float(disparity))
-
-
-def line_cost(light_field: LightField, y: int, x: int, disparity: float, scale: float) -> float:
-    """Mean robust colour difference along the SEPI's line to the centre-view pixel (Eq. 3, robust kernel).
-
-    Parameters
-    ----------
-    light_field : LightField
-    y, x : int
-        Centre-view pixel.
-    disparity : float
-        Candidate, pixels per view step.
-    scale : float
-        Residual ``r`` at which the cost ``r^2 / (r^2 + scale^2)`` is one half; colours in 0..1.
-
-    Returns
-    -------
-    float
-        0..1; NaN if no view sees the pixel.
-    """
-    samples, valid = stitched_epi(light_field, y, disparity).along_line(x)
-    t0, s0 = light_field.reference_position
-    valid = valid.copy()
-    valid[t0 * light_field.grid[1] + s0] = False
-    squared = ((samples - light_field.reference_view[y, x]) ** 2).sum(axis=1)[valid]
-    return float(np.mean(squared / (squared + scale**2))) if squared.size else float("nan")

@@ -23,33 +23,24 @@ import math
 
 import cv2
 import numpy as np
-import numpy.typing as npt
-from pydantic import Field
 
 from sepi.errors import SepiError
-from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.lightfield import FloatArray, FloatMap, LightField, as_unit_float
 from sepi.matching.view_subsets import grid_steps
-from sepi.stage import Parameters
+
+# smoothing before the differences, and of the tensor, pixels
+_INNER, _OUTER = 0.7, 2.0
+# largest disparity relative to a shear that is trusted, pixels per view step
+_TRUSTED = 0.7
 
 
-class StructureTensorParameters(Parameters):
-    """Parameters of the structure tensor."""
-
-    inner_sigma: float = Field(0.7, gt=0, le=10, description="smoothing before the differences, in pixels")
-    outer_sigma: float = Field(2.0, gt=0, le=20, description="smoothing of the tensor, in pixels")
-    shear_reach: float = Field(
-        0.7, gt=0, le=2, description="largest disparity relative to a shear that is trusted, in pixels per view step"
-    )
-
-
-def structure_tensor_depth(light_field: LightField, parameters: StructureTensorParameters) -> tuple[FloatMap, FloatMap]:
+def structure_tensor_depth(light_field: LightField) -> tuple[FloatMap, FloatMap]:
     """Disparity and coherence of the more coherent EPI, horizontal or vertical.
 
     Parameters
     ----------
     light_field : LightField
         With a known disparity range; missing views are skipped.
-    parameters : StructureTensorParameters
 
     Returns
     -------
@@ -80,17 +71,17 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
             continue
         low, high = known.minimum * steps[axis], known.maximum * steps[axis]
         for shear in range(math.floor(low), math.ceil(high) + 1):
-            disparity, coherence = _sheared(baselines, images, shear, parameters)
+            disparity, coherence = _sheared(baselines, images, shear)
             if axis == 0:
                 disparity, coherence = disparity.T, coherence.T
-            trusted = (np.abs(disparity - shear) <= parameters.shear_reach) & (coherence > confidence)
+            trusted = (np.abs(disparity - shear) <= _TRUSTED) & (coherence > confidence)
             trusted &= (disparity >= low) & (disparity <= high)
             best[trusted] = disparity[trusted] / np.float32(steps[axis])
             confidence[trusted] = coherence[trusted]
     return best, confidence
 
 
-def _of_one_line(light_field: LightField, axis: int, step: float) -> tuple[npt.NDArray[np.float64], list[FloatMap]]:
+def _of_one_line(light_field: LightField, axis: int, step: float) -> tuple[FloatArray, list[FloatMap]]:
     """Views of the reference view's row (``axis`` 1) or column (0): baselines (N, 2) in ``step``, and pictures.
 
     For a column, pictures and baselines are transposed, so that its EPI is a horizontal one.
@@ -104,21 +95,19 @@ def _of_one_line(light_field: LightField, axis: int, step: float) -> tuple[npt.N
     return (baselines if axis else baselines[:, ::-1])[kept], images
 
 
-def _sheared(
-    baselines: npt.NDArray[np.float64], images: list[FloatMap], shear: int, parameters: StructureTensorParameters
-) -> tuple[FloatMap, FloatMap]:
+def _sheared(baselines: FloatArray, images: list[FloatMap], shear: int) -> tuple[FloatMap, FloatMap]:
     """Disparity and coherence at the reference view from horizontal EPIs sheared by a whole disparity."""
     # after the shear, a surface of disparity `shear` has the same position in all views
     moved = np.stack([_shifted(image, shear * baseline) for baseline, image in zip(baselines, images, strict=True)])
-    smooth = np.stack([_blurred(view, parameters.inner_sigma) for view in moved])
+    smooth = np.stack([_blurred(view, _INNER) for view in moved])
     along_x = np.stack([cv2.Sobel(view, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8) for view in smooth])
     along_s = np.gradient(smooth, baselines[:, 1].astype(np.float32), axis=0)
-    weight = np.exp(-0.5 * (baselines[:, 1] / parameters.outer_sigma) ** 2).astype(np.float32)
+    weight = np.exp(-0.5 * (baselines[:, 1] / _OUTER) ** 2).astype(np.float32)
 
     def tensor(a: FloatMap, b: FloatMap) -> FloatMap:
         # einsum, not tensordot: a BLAS product changes its last bits with the number of threads
         product = np.einsum("s,syxc->yx", weight / weight.sum(), (a * b).reshape(*moved.shape[:3], -1))
-        return _blurred(product.astype(np.float32), parameters.outer_sigma)
+        return _blurred(product.astype(np.float32), _OUTER)
 
     xx, ss, xs = tensor(along_x, along_x), tensor(along_s, along_s), tensor(along_x, along_s)
     spread = np.sqrt((ss - xx) ** 2 + 4 * xs**2)
@@ -129,7 +118,7 @@ def _sheared(
     return disparity.astype(np.float32), coherence.astype(np.float32)
 
 
-def _shifted(image: FloatMap, pixels: npt.NDArray[np.float64]) -> FloatMap:
+def _shifted(image: FloatMap, pixels: FloatArray) -> FloatMap:
     """Image moved by ``pixels`` down and to the right, by cubic convolution [2]_; its borders are repeated."""
     for axis, distance in enumerate(pixels.round(6)):
         if not distance:

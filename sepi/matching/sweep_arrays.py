@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 
 
 class ViewStack(NamedTuple):
@@ -136,7 +136,7 @@ class Visibility(NamedTuple):
     likely: npt.NDArray[np.int32]
 
 
-def sampled_candidates(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> Candidates:
+def sampled_candidates(disparities: FloatMap, baselines: FloatArray) -> Candidates:
     """Candidates ``(K,)`` and their sample positions in views of these baselines ``(T, S, 2)``."""
     (down, row), (across, column) = (np.unique(baselines[..., axis], return_inverse=True) for axis in (0, 1))
     entries = (*sample_offsets(disparities, down), *sample_offsets(disparities, across))
@@ -146,7 +146,7 @@ def sampled_candidates(disparities: FloatMap, baselines: npt.NDArray[np.float64]
     return Candidates(disparities, row.reshape(grid), column.reshape(grid), *entries, *moves, reach)
 
 
-def sample_offsets(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.int64], FloatMap]:
+def sample_offsets(disparities: FloatMap, baselines: FloatArray) -> tuple[npt.NDArray[np.int64], FloatMap]:
     """Whole and fractional pixels from a reference pixel to its sample, along one axis: ``-d`` times the baseline.
 
     Parameters

@@ -20,7 +20,15 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.image.noise import SATURATED, noise_level, noise_of_reference_view
-from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale, require_light_field
+from sepi.lightfield import (
+    BoolMap,
+    FloatMap,
+    LightField,
+    as_unit_float,
+    full_scale,
+    require_light_field,
+    without_reference,
+)
 from sepi.stage import HIGH, LOW, SIGMA, StageMaps
 from sepi.validation import require_map
 
@@ -192,8 +200,7 @@ def held_by_few(light_field: LightField, disparity: FloatMap) -> BoolMap:
 
 def _nearest_first(light_field: LightField) -> npt.NDArray[np.int64]:
     """Grid positions of the other views that are present, (N, 2)."""
-    others = light_field.present.copy()
-    others[light_field.reference_position] = False
+    others = without_reference(light_field, light_field.present)
     distance = (light_field.baselines[others] ** 2).sum(axis=1)
     return np.argwhere(others)[np.argsort(distance, kind="stable")]
 

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from sepi.image.noise import BLACK, SATURATED, mask_energy
 from sepi.kernels import view_noise as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.lightfield import BoolMap, FloatArray, FloatMap, LightField, full_scale, without_reference
 
 VIEWS = 12
 """Least number of other views that are compared, nearest first; equally distant views all take part."""
@@ -167,7 +167,7 @@ def _least_variance(dtype: npt.DTypeLike) -> float:
     return (_LEAST if dtype == np.float32 else _ROUNDING / full_scale(np.dtype(dtype))) ** 2
 
 
-def expected_variance(light_field: LightField, noise: ViewNoise) -> npt.NDArray[np.float64]:
+def expected_variance(light_field: LightField, noise: ViewNoise) -> FloatArray:
     """Variance of the noise of one channel at each pixel, by its brightness and place.
 
     Parameters
@@ -258,8 +258,7 @@ def whole_pixel_moves(light_field: LightField) -> npt.NDArray[np.int64]:
         Row and column of a view in the grid, pixels down and across.
     """
     known = light_field.require_disparity_range()
-    others = light_field.present.copy()
-    others[light_field.reference_position] = False
+    others = without_reference(light_field, light_field.present)
     places, baselines = np.argwhere(others), light_field.baselines[others]
     moves: list[tuple[int, ...]] = []
     distances, looked_at = (baselines**2).sum(axis=1), 0

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, LightField
+from sepi.lightfield import BoolMap, FloatArray, LightField
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ def _repetition(views: BoolMap) -> float:
     return float(spectrum[np.hypot(down[:, None], across) > 1].max() / views.sum())
 
 
-def grid_steps(light_field: LightField) -> npt.NDArray[np.float64]:
+def grid_steps(light_field: LightField) -> FloatArray:
     """Mean distance from row to row and from column to column, in view steps; shape (2,).
 
     By least squares if views stand off the grid; 1 along an axis without extent.

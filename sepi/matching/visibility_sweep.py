@@ -42,12 +42,11 @@ from sepi.matching.semi_global import (
     AveragedCosts,
     CostVolumes,
     SmallPenalty,
-    SmoothedResult,
     SmoothingParameters,
 )
 from sepi.matching.sweep_arrays import Visibility, sampled_candidates
 from sepi.matching.view_subsets import views_without_aliases
-from sepi.stage import Needs, Progress
+from sepi.stage import Needs, Progress, StageMaps
 
 CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**30)
 """Coarser than the paper's: the optimisation refines the disparity with the views."""
@@ -130,7 +129,7 @@ class FirstDepthParameters(VisibilitySweepParameters):
     small_penalty: SmallPenalty = 0.04
 
 
-def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, progress: Progress) -> SmoothedResult:
+def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, progress: Progress) -> StageMaps:
     """Depth from a few views, as if each saw every pixel.
 
     Parameters
@@ -142,7 +141,7 @@ def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, 
 
     Returns
     -------
-    SmoothedResult
+    StageMaps
 
     Raises
     ------
@@ -163,7 +162,7 @@ def depth_from_visible_views(
     parameters: VisibleViewsParameters,
     progress: Progress,
     mean_of: MeanOf | None = None,
-) -> SmoothedResult:
+) -> StageMaps:
     """Depth from the views that see a pixel, computed in several passes.
 
     Parameters
@@ -180,7 +179,7 @@ def depth_from_visible_views(
 
     Returns
     -------
-    SmoothedResult
+    StageMaps
 
     Raises
     ------
@@ -260,7 +259,7 @@ def _sweep(
     progress: Progress,
     *,
     refined: bool = False,
-) -> SmoothedResult:
+) -> StageMaps:
     """Smoothed map from some of the views, with candidates ``sampling`` times as far apart as usual.
 
     Pixels are compared with their ``mean``, where there is one, instead of the reference view; only at candidates near
@@ -269,7 +268,7 @@ def _sweep(
     disparities = light_field.require_disparity_range().candidates(parameters.fewer(light_field, sampling))
     likely = None if disparity is None else _likely_candidates(disparity, disparities)
     guide = guide_of(light_field, mean)
-    least = variance_of_residuals(_contrast_of_surfaces(light_field), guide.shape[2])
+    least = variance_of_residuals(_contrast_of_surfaces(light_field))
     contrast = variance_within_surface(guide, least, 1.0 if disparity is None else SHARE_AFTER_FIRST)
     shown = light_field.present
     if light_field.missing is not None:
@@ -277,10 +276,21 @@ def _sweep(
     smoothing = parameters.for_views(int(shown.sum()))
     costs = AveragedCosts(volumes, disparities, guide, contrast, smoothing, likely if refined else None)
     searched = np.zeros_like(present) if refined else _searched_views(light_field, present, parameters)
+    candidates = sampled_candidates(disparities, light_field.baselines)
     for band in row_bands(light_field, present, float(np.abs(disparities).max()), BYTES_PER_PIXEL):
         visibility = _visibility(light_field, present, disparity, searched, likely, parameters, band)
-        # the smoothing takes about a tenth of the time
-        _add_costs(light_field, present, visibility, mean, parameters, band, disparities, costs, progress)
+        views = base_detail_decomposition(light_field, parameters, band.rows, present)
+        if mean is not None:
+            views = compared_with(views, mean, parameters, band.rows)
+        scales = parameters.colour_scale, parameters.detail_scale
+        scales2 = np.array([views.squared_scale(scale) for scale in scales], np.float32)
+        for begin in range(band.begin, band.end, ROWS_AT_ONCE):
+            end = min(band.end, begin + ROWS_AT_ONCE)
+            room = costs.room(end - begin)
+            kernels.sweep_visible_rows(views, visibility, scales2, parameters.shares, candidates, begin, end, room)
+            costs.add(end - begin)
+            # the smoothing takes about a tenth of the time
+            progress(0.9 * end / light_field.shape[0])
     result = costs.smoothed()
     progress(1.0)
     return result
@@ -291,32 +301,6 @@ def _contrast_of_surfaces(light_field: LightField) -> float:
     noise = reference_noise(light_field)
     # denoising has taken noise and faint texture out of the guide
     return noise if isinstance(light_field, DenoisedLightField) else TEXTURE * noise
-
-
-def _add_costs(
-    light_field: LightField,
-    present: BoolMap,
-    visibility: Visibility,
-    mean: FloatMap | None,
-    parameters: VisibilitySweepParameters,
-    band: Band,
-    disparities: FloatMap,
-    costs: AveragedCosts,
-    progress: Progress,
-) -> None:
-    """Add the cost of every candidate for the rows of a band."""
-    views = base_detail_decomposition(light_field, parameters, band.rows, present)
-    if mean is not None:
-        views = compared_with(views, mean, parameters, band.rows)
-    scales = parameters.colour_scale, parameters.detail_scale
-    scales2 = np.array([views.squared_scale(scale) for scale in scales], np.float32)
-    candidates = sampled_candidates(disparities, light_field.baselines)
-    for begin in range(band.begin, band.end, ROWS_AT_ONCE):
-        end = min(band.end, begin + ROWS_AT_ONCE)
-        room = costs.room(end - begin)
-        kernels.sweep_visible_rows(views, visibility, scales2, parameters.shares, candidates, begin, end, room)
-        costs.add(end - begin)
-        progress(0.9 * end / light_field.shape[0])
 
 
 def _searched_views(light_field: LightField, present: BoolMap, parameters: VisibilitySweepParameters) -> BoolMap:

@@ -139,8 +139,7 @@ def shown_errors() -> Iterator[None]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("always", SepiWarning)
-            shown = warnings.showwarning
-            warnings.showwarning = functools.partial(_show_warning, shown)
+            warnings.showwarning = functools.partial(_show_warning, warnings.showwarning)
             yield
     except SepiError as error:
         raise _Shown(str(error)) from error
@@ -202,14 +201,8 @@ def peak_memory_mb() -> float:
         status = Path("/proc/self/status").read_text(encoding="ascii")
         # ru_maxrss below would count the parent's memory
         return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")) / 2**10
-    try:
-        import resource
-    except ImportError:
-        # Windows
-        import psutil
+    import resource
 
-        memory = psutil.Process().memory_info()
-        return float(getattr(memory, "peak_wset", memory.rss)) / 2**20
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
@@ -277,10 +270,7 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
         light_field = read_light_field(light_field_path)
         maps = None if previous is None else read_stage(previous)
         if maps is not None and maps.disparity.shape != light_field.shape:
-            raise SepiError(
-                f"{previous}: maps have shape {maps.disparity.shape}; expected {light_field.shape}, that of "
-                f"{light_field_path}"
-            )
+            raise SepiError(f"{previous}: maps have shape {maps.disparity.shape}; expected {light_field.shape}")
         known = COMPARABLE in read_attributes(light_field_path, check=False)
         compared = replace(light_field if known else comparable(light_field), workspace=Workspace())
         with progress_bar(f"{light_field.name} {stage}") as progress:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import TypeVar, cast
@@ -14,22 +14,32 @@ _END = object()
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
-class _Waiting:
-    """A signal handler that notes the first signal and passes later ones to another handler."""
+class _Delay:
+    """Handlers of signals, and the signals that came in their place; a second one is handled at once."""
 
-    def __init__(self, handler: Callable[[int, FrameType | None], object], came: list[int]) -> None:
-        self.handler, self.came = handler, came
+    def __init__(self) -> None:
+        # only the main thread gets signals and may ask for handlers; handlers that are no function raise nothing
+        numbers = _ENDING if threading.current_thread() is threading.main_thread() else []
+        self.handlers = {number: handler for number in numbers if callable(handler := signal.getsignal(number))}
+        self.came: list[int] = []
 
-    def __call__(self, number: int, frame: FrameType | None) -> None:
+    def note(self, number: int, frame: FrameType | None) -> None:
+        """Note a signal; as a handler."""
         self.came.append(number)
         if len(self.came) > 1:
-            self.handler(number, frame)
+            self.handlers[number](number, frame)
 
+    def begin(self) -> None:
+        """Note signals from now on."""
+        for number in self.handlers:
+            signal.signal(number, self.note)
 
-def _handlers() -> dict[int, object]:
-    # only the main thread gets signals and may ask for handlers
-    main = threading.current_thread() is threading.main_thread()
-    return {number: signal.getsignal(number) for number in _ENDING} if main else {}
+    def end(self) -> None:
+        """Handle signals again, and the first that came."""
+        for number, handler in self.handlers.items():
+            signal.signal(number, handler)
+        for number in self.came[:1]:
+            self.handlers[number](number, None)
 
 
 @contextmanager
@@ -39,41 +49,27 @@ def no_interrupt_lost() -> Iterator[None]:
     For libraries that call Python from C, such as h5py when it frees an object or writes to a Python file. They report
     and drop an exception there, and the program would go on as if nobody had pressed Ctrl-C.
     """
-    came: list[int] = []
-    # handlers that are no function raise nothing
-    waiting = {number: _Waiting(handler, came) for number, handler in _handlers().items() if callable(handler)}
+    delay = _Delay()
     try:
-        for number, instead in waiting.items():
-            signal.signal(number, instead)
+        delay.begin()
         yield
     finally:
-        for number, instead in waiting.items():
-            signal.signal(number, instead.handler)
-        if came:
-            waiting[came[0]].handler(came[0], None)
+        delay.end()
 
 
 def interruptibly(values: Iterable[_Value]) -> Iterator[_Value]:
     """The same values, computed so that signals raise at once, within a block of :func:`no_interrupt_lost`."""
     remaining = iter(values)
+    holders = [getattr(handler, "__self__", None) for handler in _Delay().handlers.values()]
+    delays = {holder for holder in holders if isinstance(holder, _Delay)}
     while True:
-        with _at_once():
+        for delay in delays:
+            delay.end()
+        try:
             value = next(remaining, _END)
+        finally:
+            for delay in delays:
+                delay.begin()
         if value is _END:
             return
         yield cast(_Value, value)
-
-
-@contextmanager
-def _at_once() -> Iterator[None]:
-    waiting = {number: handler for number, handler in _handlers().items() if isinstance(handler, _Waiting)}
-    try:
-        for number, instead in waiting.items():
-            signal.signal(number, instead.handler)
-        for number, instead in waiting.items():
-            if number in instead.came:
-                instead.handler(number, None)
-        yield
-    finally:
-        for number, instead in waiting.items():
-            signal.signal(number, instead)

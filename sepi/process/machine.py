@@ -10,16 +10,7 @@ from typing import Any
 from sepi.io.provenance import package_version, version_of
 from sepi.process.threads import available_cores
 
-LIBRARIES = (
-    "numpy",
-    "scipy",
-    "scikit-image",
-    "opencv-python-headless",
-    "h5py",
-    "pydantic",
-    "matplotlib",
-    "snakemake",
-)
+LIBRARIES = ("numpy", "scipy", "scikit-image", "opencv-python-headless", "h5py", "pydantic", "matplotlib", "snakemake")
 """Distributions whose versions are listed, if installed."""
 
 

@@ -6,11 +6,9 @@ or for other views, stages compute them again, with the same results.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
-
-import numpy as np
-import numpy.typing as npt
 
 if TYPE_CHECKING:
     from sepi.lightfield import LightField
@@ -19,15 +17,7 @@ USUAL_BAND_BYTES = 2**29
 """Default memory for bands of rows (:mod:`sepi.matching.row_bands`), bytes."""
 
 
-@dataclass
-class OfViews:
-    """Kept results for some views and a reference view; fields of subclasses are empty at first."""
-
-    views: npt.NDArray[np.generic]
-    reference: tuple[int, int]
-
-
-_Kept = TypeVar("_Kept", bound=OfViews)
+_T = TypeVar("_T")
 
 
 @dataclass
@@ -40,25 +30,35 @@ class Workspace:
         Approximate memory for a band of rows, bytes; a band takes more if it cannot take less.
     detail_bytes : int
         Memory for the detail of all views, which bands use repeatedly, bytes.
-    kept : mapping of type to object
-        Class to its only object; results of other views replace it.
+    kept : mapping of str to tuple
+        Name to views, reference view and settings, and the result of these; that of others replaces it.
     """
 
     band_bytes: int = USUAL_BAND_BYTES
     detail_bytes: int = 0
-    kept: dict[type, Any] = field(default_factory=dict)
+    kept: dict[str, tuple[Any, Any, Any]] = field(default_factory=dict)
 
 
-def kept_of(light_field: LightField, kind: type[_Kept]) -> _Kept:
-    """The object of this class in the light field's workspace, empty at first; without a workspace a new one."""
-    views, reference, workspace = light_field.views, light_field.reference_position, light_field.workspace
-    known: _Kept | None = None if workspace is None else workspace.kept.get(kind)
+def kept(light_field: LightField, what: str, make: Callable[[], _T], settings: object = None) -> _T:
+    """What was made of the light field's views with these settings: from its workspace, or made now."""
+    workspace = light_field.workspace
+    if workspace is None:
+        return make()
     # the same workspace may come with other views
-    if known is None or known.views is not views or known.reference != reference:
-        known = kind(views, reference)
-        if workspace is not None:
-            workspace.kept[kind] = known
-    return known
+    made_with = light_field.reference_position, settings
+    known = workspace.kept.get(what)
+    if known is None or known[0] is not light_field.views or known[1] != made_with:
+        # free its memory first
+        known = workspace.kept[what] = None, None, None
+        known = workspace.kept[what] = light_field.views, made_with, make()
+    found: _T = known[2]
+    return found
+
+
+def forget(light_field: LightField, what: str) -> None:
+    """Free what is kept; it is made again on demand."""
+    if light_field.workspace is not None:
+        light_field.workspace.kept.pop(what, None)
 
 
 def band_bytes_of(light_field: LightField) -> int:

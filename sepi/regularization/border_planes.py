@@ -16,27 +16,24 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
 from sepi.kernels import planes as kernels
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 from sepi.regularization.regions import Plane, basis_of
 from sepi.stage import Parameters
 
 _PIXELS_OF_A_PLANE = 12  # least to fit one to
 
-_Doubles = npt.NDArray[np.float64]
 
-
-def pixels_in_order(pixels: BoolMap, disparity: FloatMap) -> tuple[_Doubles, _Doubles]:
+def pixels_in_order(pixels: BoolMap, disparity: FloatMap) -> tuple[FloatArray, FloatArray]:
     """1, x and y of some pixels, (N, 3), and their disparities; in the same order in a mirrored picture."""
     positions, values = basis_of(pixels), disparity[pixels].astype(np.float64)
     order = np.lexsort(((positions[:, 1:] ** 2).sum(axis=1), values))
     return positions[order], values[order]
 
 
-def planes_through(positions: _Doubles, values: _Doubles, tried: int) -> _Doubles:
+def planes_through(positions: FloatArray, values: FloatArray, tried: int) -> FloatArray:
     """At most so many planes through three pixels each, (P, 3); none for too few pixels.
 
     The same ones every time, whatever else is asked.
@@ -49,8 +46,8 @@ def planes_through(positions: _Doubles, values: _Doubles, tried: int) -> _Double
 
 
 def support(
-    positions: _Doubles, values: _Doubles, planes: _Doubles, tolerance: float, behind_penalty: float
-) -> _Doubles:
+    positions: FloatArray, values: FloatArray, planes: FloatArray, tolerance: float, behind_penalty: float
+) -> FloatArray:
     """How many of N pixels agree with each of P planes, less a weight for each that lies behind it; (P,)."""
     places, levels, tried = (np.ascontiguousarray(each) for each in (positions.T, values, planes))
     found = np.empty(len(planes))
@@ -58,13 +55,7 @@ def support(
     return found
 
 
-def fitted(positions: _Doubles, values: _Doubles, plane: Plane, tolerance: float) -> Plane:
-    """The plane fitted to what agrees with a plane."""
-    agreeing = abs(residuals_of(positions, values, plane[None])[0]) < tolerance
-    return np.asarray(np.linalg.lstsq(positions[agreeing], values[agreeing], rcond=None)[0])
-
-
-def residuals_of(positions: _Doubles, values: _Doubles, planes: _Doubles) -> _Doubles:
+def residuals_of(positions: FloatArray, values: FloatArray, planes: FloatArray) -> FloatArray:
     """By how much each of N values is above each of P planes, (P, N)."""
     a, b, c = planes.T[..., None]
     # term by term: the rounding of a matrix product depends on the number of threads
@@ -147,4 +138,4 @@ def ransac_plane(border: BoolMap, disparity: FloatMap, parameters: BorderPlanePa
     agreeing = abs(residuals_of(positions, values, plane[None])[0]) < parameters.tolerance
     if agreeing.sum() < max(3, parameters.min_inlier_ratio * values.size):
         return None
-    return fitted(positions, values, plane, parameters.tolerance)
+    return np.asarray(np.linalg.lstsq(positions[agreeing], values[agreeing], rcond=None)[0])

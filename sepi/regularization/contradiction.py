@@ -10,7 +10,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField, without_reference
 from sepi.matching.gaps import compared_depths
 
 # pixels over which residuals are summed: what faint texture tells, many pixels tell together
@@ -53,8 +53,7 @@ def contradicted(
     -------
     ndarray, shape (H, W), bool
     """
-    others = present.copy()
-    others[light_field.reference_position] = False
+    others = without_reference(light_field, present)
     inside = cv2.erode(regions.astype(np.uint8), _RIM, borderValue=1) > 0
     # beside an occluder a view shows both
     occluders = np.asarray(cv2.dilate(after, np.ones((3, 3), np.uint8)), np.float32)

@@ -13,17 +13,13 @@ same disparity within their noise.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, full_scale
+from sepi.lightfield import BoolMap, DisparityRange, FloatArray, FloatMap, LightField, full_scale
+from sepi.matching.gauss_newton import GaussNewton
 from sepi.regularization.regions import Plane, Region, basis_of
-
-if TYPE_CHECKING:
-    from sepi.matching.gauss_newton import GaussNewton
 
 UNLIKE = 0.01 / 255
 """Least standard deviation of the brightness of whole views; colours in 0..1."""
@@ -57,10 +53,10 @@ class LitPlane:
     """
 
     plane: Plane
-    covariance: npt.NDArray[np.float64]
+    covariance: FloatArray
     misfit: float
 
-    def deviation(self, basis: npt.NDArray[np.float64]) -> float:
+    def deviation(self, basis: FloatArray) -> float:
         """Root mean square of the disparity's standard deviation over points ``basis`` (N, 3)."""
         mean = _weighted(basis, np.full(len(basis), 1 / len(basis)))
         return float(np.sqrt(np.maximum(np.sum(self.covariance * mean), 0)))
@@ -133,7 +129,7 @@ def lit_planes(
     return found
 
 
-def _within(region: Region, plane: Plane, known: DisparityRange) -> tuple[Plane, npt.NDArray[np.float64]]:
+def _within(region: Region, plane: Plane, known: DisparityRange) -> tuple[Plane, FloatArray]:
     """A plane moved so that its mean disparity lies in the range, and its disparities, cut to the range."""
     basis = region.basis
     middle = float(np.mean(basis @ plane))
@@ -161,7 +157,7 @@ def _unlike(
         axis + np.float32(side.start) for axis, side in zip(np.indices(region.shape, np.float32), place, strict=True)
     )
     scale, most = np.float32(1 / full_scale(light_field.views.dtype)), 16 * variance[..., None]
-    offsets: list[npt.NDArray[np.float64]] = []
+    offsets: list[FloatArray] = []
     for (v, u), view in zip(
         light_field.baselines[matching.present].astype(np.float32), light_field.rgb_views[matching.present], strict=True
     ):
@@ -182,10 +178,10 @@ class _Sums:
     """Gauss-Newton sums of the pixels of one region."""
 
     region: BoolMap
-    basis: npt.NDArray[np.float64]
-    gradient: npt.NDArray[np.float64]
-    curvature: npt.NDArray[np.float64]
-    information: npt.NDArray[np.float64]
+    basis: FloatArray
+    gradient: FloatArray
+    curvature: FloatArray
+    information: FloatArray
 
     @classmethod
     def of(cls, region: BoolMap, gradient: FloatMap, curvature: FloatMap) -> _Sums | None:
@@ -204,7 +200,7 @@ class _Sums:
 
     def spread(
         self, variance: FloatMap, slopes: FloatMap, unlike: float, field: LightField, matching: GaussNewton
-    ) -> tuple[npt.NDArray[np.float64], float]:
+    ) -> tuple[FloatArray, float]:
         """Covariance of the plane, and its misfit; ``unlike`` is the variance between whole views."""
         varied = self.curvature * variance[self.region] / matching.colour_variance
         sums = _weighted(self.basis, varied)
@@ -216,7 +212,7 @@ class _Sums:
         inverse = np.linalg.inv(self.information)
         return inverse @ sums @ inverse, self._misfit(varied)
 
-    def _misfit(self, varied: npt.NDArray[np.float64]) -> float:
+    def _misfit(self, varied: FloatArray) -> float:
         # squares are laid from the middle of the region, so that a rotated region has the same ones
         down, across = (
             (2 * at + 1 - size) // (2 * _PART) + size
@@ -230,7 +226,7 @@ class _Sums:
         return float(np.mean(asked[many] ** 2 / np.maximum(expected[many], 1e-30)))
 
 
-def _weighted(terms: npt.NDArray[np.float64], weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def _weighted(terms: FloatArray, weights: FloatArray) -> FloatArray:
     """Weighted sum of the outer products of terms (N, 3); shape (3, 3).
 
     einsum, not a matrix product: BLAS rounds depending on the number of threads.
@@ -238,7 +234,7 @@ def _weighted(terms: npt.NDArray[np.float64], weights: npt.NDArray[np.float64]) 
     return np.asarray(np.einsum("ni,n,nj->ij", terms, weights, terms))
 
 
-def _scaled(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def _scaled(matrix: FloatArray) -> FloatArray:
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     return np.asarray(matrix / np.outer(scale, scale))
 
@@ -247,7 +243,7 @@ def _slopes(region: BoolMap, mean: FloatMap, slopes: FloatMap) -> BoolMap:
     """Fit smooth colours in a region, into ``mean`` (h, w, 4), and their slopes; returns the mask of fitted pixels."""
     size = (2 * _SLOPE_RADIUS + 1,) * 2
 
-    def window(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def window(values: FloatArray) -> FloatArray:
         return np.asarray(cv2.boxFilter(values, -1, size, normalize=False, borderType=cv2.BORDER_CONSTANT))
 
     height, width = region.shape

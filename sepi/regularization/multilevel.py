@@ -25,7 +25,7 @@ import numpy.typing as npt
 from sepi.kernels import second_order as kernels
 from sepi.lightfield import FloatMap
 
-FloatArray = npt.NDArray[np.float64]
+FloatArray = npt.NDArray[Any]
 Inverse = Callable[[FloatArray], tuple[FloatArray, float]]
 
 LEVELS = 5
@@ -36,9 +36,6 @@ COUNTED = 2
 
 MARGIN: int = kernels.MARGIN
 """Reach of the stencil, pixels, and so the width of the zeros round the solver's pictures."""
-
-LEAST_SINGLE_RTOL = 1e-5
-"""Least residual for which single precision is enough."""
 
 LEAST_WEIGHT = 1e-9
 """Least weight of the data, which keeps the system solvable."""
@@ -51,15 +48,17 @@ def solve_smooth(
 
     Parameters
     ----------
-    smoothness : ndarray, shape (N, H + 2 MARGIN, W + 2 MARGIN), float64
-        ``A``: the first N <= 7 entries of each pixel with itself and with the pixels to the right by 1 and 2, below by
-        1 and 2, below to the right, and below to the left, in a margin of zeros. This function adds the data's weights.
+    smoothness : ndarray, shape (N, H + 2 MARGIN, W + 2 MARGIN), float32 or float64
+        ``A``, in the precision of the solver: the first N <= 7 entries of each pixel with itself and with the pixels
+        to the right by 1 and 2, below by 1 and 2, below to the right, and below to the left, in a margin of zeros.
+        This function adds the data's weights.
     weight, data : ndarray, shape (H, W), float32
         ``w`` and ``z``.
     start : ndarray, shape (H, W), float32
         Initial disparities.
     rtol : float
-        Residual at which the solver stops, relative to the data's deviations from their mean.
+        Residual at which the solver stops, relative to the data's deviations from their mean; in single precision at
+        least 1e-5.
     max_iterations : int
         Most steps of the solver.
 
@@ -70,20 +69,15 @@ def solve_smooth(
     if not weight.any():
         # without weights any plane is a solution
         return data
-    w = np.maximum(weight.astype(np.float64), LEAST_WEIGHT)
+    w = np.maximum(weight.astype(smoothness.dtype), LEAST_WEIGHT)
     # smoothness ignores constants: without the mean, rtol does not depend on the zero of disparity
-    mean = np.average(data, weights=w)
+    mean = np.average(data, weights=weight).astype(smoothness.dtype)
     inside = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
-    # single precision takes a third of the time; it changes the solution by a hundredth of its error
-    dtype: Any = np.float32 if rtol >= LEAST_SINGLE_RTOL else np.float64
     smoothness[0][inside] += w
-    packed = smoothness.astype(dtype)
-    inverse = multilevel_inverse(smoothness, dtype)
-    # frees its memory unless the caller holds it
-    del smoothness
-    right, first = np.zeros((2, *packed.shape[1:]), dtype)
+    right, first = np.zeros((2, *smoothness.shape[1:]), smoothness.dtype)
     right[inside], first[inside] = w * (data - mean), start - mean
-    solution = conjugate_gradients(packed, inverse, right, first, rtol, max_iterations)
+    inverse = multilevel_inverse(smoothness)
+    solution = conjugate_gradients(smoothness, inverse, right, first, rtol, max_iterations)
     return np.asarray(solution[inside] + mean, np.float32)
 
 
@@ -127,15 +121,13 @@ def conjugate_gradients(
     return solution
 
 
-def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
+def multilevel_inverse(stencil: FloatArray) -> Inverse:
     """Approximate inverse of a matrix, symmetric and positive.
 
     Parameters
     ----------
-    stencil : ndarray, shape (N, H + 2 MARGIN, W + 2 MARGIN), float64
+    stencil : ndarray, shape (N, H + 2 MARGIN, W + 2 MARGIN), float32 or float64
         The smoothness, as for :func:`solve_smooth`, plus the data's weights.
-    dtype : dtype
-        Type in which the inverse is applied, float32 or float64.
 
     Returns
     -------
@@ -143,13 +135,13 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
         Takes a picture with its margin and returns another one and the inner product of both. The next call overwrites
         the returned picture.
     """
-    inverse = _inverse(stencil[0], dtype)
+    inverse, dtype = _inverse(stencil[0]), stencil.dtype
     hats, levels = [], []
     for i, shape in enumerate(_shapes(stencil)):
-        diagonal = np.zeros(shape)
+        diagonal = np.zeros(shape, dtype)
         if i % COUNTED == 0:
             kernels.diagonal_of_hats(stencil, kernels.SPACING << i, diagonal)
-        hats.append(_inverse(diagonal, dtype))
+        hats.append(_inverse(diagonal))
         levels.append(np.empty(shape, dtype))
     nothing, out = np.zeros([n // 2 + 1 for n in levels[-1].shape], dtype), np.zeros(stencil.shape[1:], dtype)
 
@@ -171,6 +163,6 @@ def _shapes(stencil: FloatArray) -> list[tuple[int, int]]:
     return [((rows << i) + 1, (columns << i) + 1) for i in reversed(range(LEVELS))]
 
 
-def _inverse(diagonal: FloatArray, dtype: npt.DTypeLike) -> FloatArray:
+def _inverse(diagonal: FloatArray) -> FloatArray:
     """Reciprocals of a diagonal; 0 for hats without pixels."""
-    return np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0).astype(dtype)
+    return np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0)

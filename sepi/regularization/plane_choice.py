@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 from sepi.regularization.border_planes import BorderPlane
 from sepi.regularization.lit_planes import LitPlane
 from sepi.regularization.regions import Plane, Region, parts_of, widened
@@ -144,14 +143,14 @@ def own_plane(region: Region, disparity: FloatMap, lit: LitPlane) -> Plane | Non
     return plane if _spread(own, basis @ plane) < _OWN_SPREAD * deviation else None
 
 
-def _plane_of(basis: npt.NDArray[np.float64], values: npt.NDArray[np.float64]) -> Plane:
+def _plane_of(basis: FloatArray, values: FloatArray) -> Plane:
     """Of the least squares."""
     # the rounding of a matrix product would depend on the number of threads
     normal = np.einsum("ni,nj->ij", basis, basis), np.einsum("ni,n->i", basis, values)
     return np.asarray(np.linalg.lstsq(*normal, rcond=None)[0])
 
 
-def _spread(values: npt.NDArray[np.float64], expected: npt.NDArray[np.float64]) -> float:
+def _spread(values: FloatArray, expected: FloatArray) -> float:
     """Standard deviation about what is expected, by the median."""
     return float(np.median(np.abs(values - expected)) / 0.6745)
 

@@ -10,15 +10,13 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 
-from sepi.image.superpixels import Adjacency, FloatArray, Superpixels
+from sepi.image.superpixels import Adjacency, Superpixels
 from sepi.kernels import planes as kernels
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 from sepi.process.memory import take_blas_buffer
 
 UNIT = 15.0
@@ -27,24 +25,8 @@ UNIT = 15.0
 ITERATIONS = 10
 """Number of re-weightings of the absolute values; the tolerance shrinks with each."""
 
-
-@dataclass(frozen=True)
-class Coupling:
-    """Weights of the coupled energy.
-
-    Attributes
-    ----------
-    continuity : float
-        tau_out: weight of agreement between neighbours, relative to the data of a superpixel.
-    slope : float
-        Weight of equal slopes, relative to equal values at the common border.
-    tolerance : float
-        Disagreement beyond which data or a neighbour is an outlier, pixels per view step.
-    """
-
-    continuity: float
-    slope: float
-    tolerance: float
+EQUAL_SLOPES = 10.0
+"""Weight of equal slopes, relative to equal values at the common border."""
 
 
 def basis(segments: Superpixels) -> FloatArray:
@@ -100,7 +82,8 @@ def propagate(
     disparity: FloatMap,
     weight: FloatMap,
     design: FloatArray,
-    coupling: Coupling,
+    continuity: float,
+    tolerance: float,
 ) -> FloatArray:
     """Planes of least coupled energy (Eq. 7) for the free superpixels; the others keep theirs.
 
@@ -121,7 +104,10 @@ def propagate(
     disparity, weight : ndarray, shape (H, W), float32
         Data.
     design : ndarray, shape (H * W, 3)
-    coupling : Coupling
+    continuity : float
+        tau_out: weight of agreement between neighbours, relative to the data of a superpixel.
+    tolerance : float
+        Disagreement beyond which data or a neighbour is an outlier, pixels per view step.
 
     Returns
     -------
@@ -133,7 +119,7 @@ def propagate(
         np.column_stack([np.ones(len(affinity)), (adjacent.midpoints - segments.centroids[side]) / UNIT])
         for side in (adjacent.first, adjacent.second)
     )
-    strength = coupling.continuity * affinity * adjacent.lengths / UNIT
+    strength = continuity * affinity * adjacent.lengths / UNIT
     weight = np.where(free[segments.labels], weight, 0)
     unknown = np.repeat(free, 3)
     solution = planes.copy()
@@ -141,11 +127,11 @@ def propagate(
     data_weight = weight
     blocks = np.arange(len(segments))
     take_blas_buffer()
-    for spread in _shrinking(coupling.tolerance):
+    for spread in _shrinking(tolerance):
         left, right = _normal_equations(segments, disparity, data_weight, design)
-        continuity = _continuity(adjacent, at_first, at_second, strength * trust, coupling.slope, len(segments))
+        agreement = _agreement(adjacent, at_first, at_second, strength * trust, len(segments))
         data = sparse.bsr_array((left / UNIT**2, blocks, np.append(blocks, len(blocks)))).tocsr()
-        system = data + continuity + 1e-9 * sparse.eye_array(unknown.size)
+        system = data + agreement + 1e-9 * sparse.eye_array(unknown.size)
         system = system.tocsr()[unknown]
         known = system[:, ~unknown] @ solution.ravel()[~unknown]
         solved = spsolve(system[:, unknown].tocsc(), right.ravel()[unknown] / UNIT**2 - known)
@@ -178,8 +164,8 @@ def _normal_equations(
     return left, right
 
 
-def _continuity(
-    adjacent: Adjacency, at_first: FloatArray, at_second: FloatArray, strength: FloatArray, slope: float, count: int
+def _agreement(
+    adjacent: Adjacency, at_first: FloatArray, at_second: FloatArray, strength: FloatArray, count: int
 ) -> sparse.csr_array:
     """Quadratic form of the disagreement of neighbours in values at the border's middle, and in slopes."""
     number = len(strength)
@@ -188,7 +174,7 @@ def _continuity(
     for p in range(3):
         triples.append((rows, 3 * adjacent.first + p, at_first[:, p]))
         triples.append((rows, 3 * adjacent.second + p, -at_second[:, p]))
-    root = np.full(number, np.sqrt(slope))
+    root = np.full(number, np.sqrt(EQUAL_SLOPES))
     for p in (1, 2):
         triples.append((rows + p * number, 3 * adjacent.first + p, root))
         triples.append((rows + p * number, 3 * adjacent.second + p, -root))

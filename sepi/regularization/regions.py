@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap
+from sepi.lightfield import BoolMap, FloatArray
 
 Place = tuple[slice, slice]
 """Rows and columns of a picture."""
 
-Plane = npt.NDArray[np.float64]
+Plane = FloatArray
 """``a, b, c`` of the disparity ``a + b x + c y``, shape (3,), pixels per view step; ``x`` and ``y`` as in
 :func:`basis_of`."""
 
@@ -38,20 +38,9 @@ class Region(NamedTuple):
         return int(np.count_nonzero(self.pixels))
 
     @property
-    def basis(self) -> npt.NDArray[np.float64]:
+    def basis(self) -> FloatArray:
         """1, x and y of each pixel, from the middle of the place; shape (N, 3)."""
         return basis_of(self.pixels)
-
-
-def seen_from(plane: Plane, one: Region, other: Region) -> Plane:
-    """The plane of one region in the axes of another."""
-    down, across = (
-        there.start - here.start + (longer - length) / 2
-        for here, length, there, longer in zip(
-            one.place, one.pixels.shape, other.place, other.pixels.shape, strict=True
-        )
-    )
-    return np.array([plane[0] + plane[1] * across + plane[2] * down, *plane[1:]])
 
 
 class Parts(NamedTuple):
@@ -88,7 +77,7 @@ def widened(place: Place, margin: int) -> Place:
     return rows, columns
 
 
-def basis_of(pixels: BoolMap) -> npt.NDArray[np.float64]:
+def basis_of(pixels: BoolMap) -> FloatArray:
     """1, x and y of the pixels of a mask (h, w), from its middle; shape (N, 3)."""
     height, width = pixels.shape
     y, x = np.nonzero(pixels)

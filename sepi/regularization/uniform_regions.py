@@ -14,8 +14,6 @@ References
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import cv2
 import numpy as np
 from pydantic import Field
@@ -24,6 +22,7 @@ from sepi.image.noise import noise_of_reference_view
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.denoising import DenoisedLightField
+from sepi.matching.gauss_newton import GaussNewton
 from sepi.matching.softening import SofteningParameters, compared_views
 from sepi.matching.view_noise import variance_map
 from sepi.matching.view_subsets import spread_views
@@ -31,13 +30,9 @@ from sepi.process.memory import take_blas_buffer
 from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
 from sepi.regularization.contradiction import contradicted
 from sepi.regularization.lit_planes import LitPlane, lit_planes
-from sepi.regularization.plane_choice import LIT_AREA, Chosen, chosen_plane, kept_pixels
-from sepi.regularization.pockets import with_pockets
+from sepi.regularization.plane_choice import LIT_AREA, chosen_plane, kept_pixels
 from sepi.regularization.regions import Region, parts_of, widened
 from sepi.stage import OcclusionMarginParameters, StageMaps
-
-if TYPE_CHECKING:
-    from sepi.matching.gauss_newton import GaussNewton
 
 LEAST_NOISE = 1e-5
 """Least noise: rounding of float32. Integers have at least 0.3 levels."""
@@ -78,9 +73,6 @@ class UniformPlanesParameters(OcclusionMarginParameters, SofteningParameters, Bo
     min_area: int = Field(50, ge=1, description="least area of a region that may get a plane, in pixels")
     border_confidence: float = Field(0.3, ge=0, le=1, description="confidence above which a border pixel counts")
     light: bool = Field(True, description="whether the change of a region's light may tell its plane, too")
-    pockets: bool = Field(
-        True, description="whether a region may get the plane of a larger one beside it if its border tells none"
-    )
 
 
 def fill_uniform_regions(
@@ -106,8 +98,6 @@ def fill_uniform_regions(
     SepiError
         If the disparity range is unknown.
     """
-    from sepi.matching.gauss_newton import GaussNewton
-
     # before the views take the memory
     take_blas_buffer()
     field = compared_views(light_field, parameters)
@@ -125,20 +115,20 @@ def fill_uniform_regions(
     found = _with_borders(uniform, before, parameters)
     lit = _by_light(light_field, matching, before.disparity, found, variance, noisy) if parameters.light else {}
     known = light_field.require_disparity_range()
-    planes = _planes_of(found, lit, before.disparity, mean, noisy, parameters)
+    planes = [
+        chosen_plane(region, before.disparity[region.place], border, lit.get(n), noisy)
+        for n, (region, border) in enumerate(found)
+    ]
     disparity, held = before.disparity.copy(), np.zeros_like(core)
-    for (region, _), chosen in zip(found, planes, strict=True):
-        if chosen is not None:
-            # a plane known at one side only may leave the range at the other
-            values = np.clip(region.basis @ chosen.plane, known.minimum, known.maximum)
-            disparity[region.place][region.pixels] = values
+    known_planes = [(region, chosen) for (region, _), chosen in zip(found, planes, strict=True) if chosen is not None]
+    for region, chosen in known_planes:
+        # a plane known at one side only may leave the range at the other
+        values = np.clip(region.basis @ chosen.plane, known.minimum, known.maximum)
+        disparity[region.place][region.pixels] = values
     regions = disparity != before.disparity
     asked = compared, parameters.occlusion_margin, float(np.median(variance))
     against = contradicted(light_field, before.disparity, disparity, regions, *asked)
-    for (region, _), chosen in zip(found, planes, strict=True):
-        place, pixels = region
-        if chosen is None:
-            continue
+    for (place, pixels), chosen in known_planes:
         kept = pixels & against[place]
         if kept.sum() > MOST_CONTRADICTED * pixels.sum():
             kept = pixels
@@ -206,36 +196,6 @@ def _by_light(
     return {n: plane for n, plane in zip(asked, told, strict=True) if plane is not None}
 
 
-def _planes_of(
-    found: list[tuple[Region, BorderPlane | None]],
-    lit: dict[int, LitPlane],
-    disparity: FloatMap,
-    mean: FloatMap,
-    noisy: bool,
-    parameters: UniformPlanesParameters,
-) -> list[Chosen | None]:
-    """Plane of each region; pockets get the plane of a region beside them."""
-    regions = [region for region, _ in found]
-    planes = [
-        chosen_plane(region, disparity[region.place], border, lit.get(n), noisy)
-        for n, (region, border) in enumerate(found)
-    ]
-    if noisy or not parameters.pockets:
-        # in noise, faint texture may tell the depth of a region without a border's plane
-        return planes
-    pockets = [n for n, (region, border) in enumerate(found) if _tells_little(region, border, planes[n])]
-    # as far as regions grow
-    reach = parameters.window_radius + parameters.growth
-    return with_pockets(regions, planes, pockets, mean, reach, parameters.colour_tolerance)
-
-
-def _tells_little(region: Region, border: BorderPlane | None, chosen: Chosen | None) -> bool:
-    """Whether a region has no plane, or only its border's, most of which the plane does not fit."""
-    if border is None or chosen is None:
-        return border is None and chosen is None
-    return chosen.source == "border" and not chosen.confirmed and not border.is_one_plane(region.area)
-
-
 def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: UniformPlanesParameters) -> BoolMap:
     """Pixels round which the mean of the views varies no more than its noise.
 
@@ -269,7 +229,7 @@ def uniform_regions(
     parameters: UniformPlanesParameters,
     fewest: int,
 ) -> BoolMap:
-    """Plain pixels, and pixels of their colour around them.
+    """Plain pixels, and pixels of their colour around them, also in gaps too narrow for a plain window.
 
     Parameters
     ----------
@@ -280,7 +240,7 @@ def uniform_regions(
     confidence : ndarray, shape (H, W), float32
     parameters : UniformPlanesParameters
     fewest : int
-        Plain pixels within reach of a pixel of their colour.
+        Plain pixels within reach of a pixel of their colour; one is enough between pixels of the region.
 
     Returns
     -------
@@ -292,5 +252,8 @@ def uniform_regions(
     near = cv2.blur(core.astype(np.float32), (size, size))
     colour = cv2.blur(mean * core[..., None].astype(np.float32), (size, size)) / np.maximum(near, 1e-9)[..., None]
     alike = np.sum(cv2.split((mean - colour) ** 2), axis=0) < 27 * variance + parameters.colour_tolerance**2
+    alike &= confidence < parameters.grow_confidence
     # half a pixel is more than the rounding errors of a running sum
-    return np.asarray(core | ((near > (fewest - 0.5) / size**2) & alike & (confidence < parameters.grow_confidence)))
+    uniform = core | (alike & (near > (fewest - 0.5) / size**2))
+    between = cv2.morphologyEx(uniform.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)) > 0
+    return np.asarray(uniform | (alike & between & (near > 0.5 / size**2)))

@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 from sepi.regularization.multilevel import MARGIN, solve_smooth
 from sepi.stage import Parameters, relative_confidence
-
-FloatArray = npt.NDArray[np.float64]
 
 LEAST_CONFIDENCE = 0.01
 """Least confidence, which keeps the system solvable."""

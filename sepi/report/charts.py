@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -151,13 +152,9 @@ def stage_times(runs: Runs) -> pd.DataFrame:
     DataFrame
         Rows ``(scene, variant)``, columns ``(score, stage)``.
     """
-    return pd.DataFrame(
-        {
-            ("/".join(pair), variant): runs.took(pair, variant).fillna(0.0).unstack()
-            for pair in runs.plan.pairs
-            for variant in runs.plan.compared
-        }
-    ).T
+    every = itertools.product(runs.plan.pairs, runs.plan.compared)
+    times = {("/".join(pair), variant): runs.took(pair, variant).fillna(0.0).unstack() for pair, variant in every}
+    return pd.DataFrame(times).T
 
 
 def known(figure: float) -> float | None:

@@ -10,25 +10,14 @@ import pandas as pd
 from sepi.report import published
 from sepi.report.plan import BEST_VARIANT, Plan
 from sepi.report.published import PAPERS_METHOD
-from sepi.report.runs import (
-    AVERAGE,
-    EXTERNAL_NOTE,
-    LEARNED_NOTE,
-    PRINTED_AVERAGE,
-    PROTOCOL_NOTE,
-    REGIONS_NOTE,
-    SCENE,
-    Runs,
-    average_label,
-    count_note,
-    dataset_title,
-    datasets_of,
-    own_key,
-    own_names,
-    printed_label,
-)
+from sepi.report.runs import EXTERNAL_NOTE, PROTOCOL_NOTE, REGIONS_NOTE, Runs, count_note, datasets_of, own_key
 from sepi.report.table import Head, Kind, Section, Table, ranks, section, shown
 from sepi.scoring.scores import REGIONS
+
+SCENE, AVERAGE, PRINTED_AVERAGE = "scene", "average", "average printed"
+"""Kinds of rows in the CSV files."""
+
+LEARNED_NOTE = "* learned, supervised; ** learned, unsupervised."
 
 
 def scene_table(runs: Runs, score: str, paper: pd.DataFrame, title: str) -> Table:
@@ -66,6 +55,27 @@ def _counterparts(plan: Plan) -> str:
     """The methods whose published figures divide ours, for the caption."""
     papers = f"the paper's method, {published.methods()['label'][PAPERS_METHOD]}"
     return f"the same method, for this project's own variants {papers}" if plan.report else papers
+
+
+def own_names(plan: Plan) -> str:
+    """Names of the compared variants, for a caption."""
+    *names, last = (f"`{variant}`" for variant in plan.compared)
+    return f"{', '.join(names)} and {last}" if names else last
+
+
+def dataset_title(dataset: str) -> str:
+    """Title of a dataset, with the paper's name if it has one."""
+    return f"{dataset}: {published.DATASETS[dataset]}" if dataset in published.DATASETS else dataset
+
+
+def average_label(count: int) -> str:
+    """Name of the row with averages of our figures."""
+    return f"Average of {count} scene{'s' * (count != 1)} available"
+
+
+def printed_label(dataset: str) -> str:
+    """Name of the row with the paper's averages."""
+    return f"Average as printed ({len(published.scenes(dataset))} scenes)"
 
 
 def _dataset_section(
@@ -129,8 +139,7 @@ def _dataset_section(
 
 def _texts(figures: pd.DataFrame, kinds: pd.Series, decimals: int) -> pd.DataFrame:
     """Figures as texts, published ones with the two decimals that the paper prints."""
-    printed = kinds == Kind.PUBLISHED
-    return shown(figures, decimals).assign(**shown(figures.loc[:, printed]))
+    return shown(figures, decimals).assign(**shown(figures.loc[:, kinds == Kind.PUBLISHED]))
 
 
 def region_table(runs: Runs) -> Table:
@@ -157,11 +166,11 @@ def region_table(runs: Runs) -> Table:
         most = here.map({True: len(scenes), False: len(of_paper)})
         notes[column] = [count_note([n], m) for n, m in zip(found.fillna(0).astype(int), most, strict=True)]
         # ours rank among published averages only if the scenes are the same
-        compares = not of_paper or sorted(of_paper) == sorted(
-            filter(None, map(partial(published.paper_scene, dataset), scenes))
-        )
+        theirs = filter(None, map(partial(published.paper_scene, dataset), scenes))
+        compares = not of_paper or sorted(of_paper) == sorted(theirs)
         ranked[column] = (known["learning"] == "none") & (compares | ~here)
     texts = shown(figures)
+    named = texts.assign(name=known["head"])
     rows = pd.concat([shown(figures[here], 4).replace("n/a", ""), texts[~here]]).loc[known.index].join(counts)
     rows = known[["learning"]].join(rows[[name for pair in zip(figures, counts, strict=True) for name in pair]])
     available = "; ".join(f"{dataset}: {', '.join(runs.scored(dataset)) or 'none'}" for dataset in datasets)
@@ -172,11 +181,7 @@ def region_table(runs: Runs) -> Table:
         "where none or fewer are named. "
         f"{REGIONS_NOTE} {LEARNED_NOTE}" + (f" {EXTERNAL_NOTE}" if plan.external else ""),
         rows.reset_index(names="method"),
-        [
-            section(
-                "", heads, texts.assign(name=known["head"]), ranks(texts.where(ranked, "")), notes, list(known["kind"])
-            )
-        ],
+        [section("", heads, named, ranks(texts.where(ranked, "")), notes, list(known["kind"]))],
         "Marked: best and second best in a column, of the published methods that are not learned, and of this code "
         "where it ran on every scene that the published averages are over",
     )
@@ -204,8 +209,7 @@ def mean_by_region(runs: Runs, dataset: str, variants: list[str]) -> tuple[pd.Da
 
 
 def _of(runs: Runs, dataset: str, region: str, variants: list[str]) -> pd.DataFrame:
-    found = runs.of("mse100", dataset, region)
-    return found.reindex(columns=map(own_key, variants)).set_axis(variants, axis=1)
+    return runs.of("mse100", dataset, region).reindex(columns=map(own_key, variants)).set_axis(variants, axis=1)
 
 
 def _ablation_section(runs: Runs, dataset: str, variants: list[str]) -> tuple[pd.DataFrame, Section]:

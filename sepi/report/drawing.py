@@ -108,10 +108,8 @@ def write_curves(folder: Path, confidence: FloatMap, error: FloatMap) -> None:
     figure = new_figure(5, 3.5, layout=None)
     axis = figure.add_axes((0.14, 0.14, 0.83, 0.83))
     taken = np.arange(STEPS)
-    for name, curve, style in (
-        ("by confidence", sparsification(confidence, error), "-"),
-        ("oracle", oracle(error), "--"),
-    ):
+    curves = {"by confidence": (sparsification(confidence, error), "-"), "oracle": (oracle(error), "--")}
+    for name, (curve, style) in curves.items():
         axis.plot(taken, curve, style, label=f"{name}, area {curve.mean():.3f}")
     axis.set_xlabel("pixels taken away / %")
     axis.set_ylabel("mean absolute error x100 / px")

@@ -33,10 +33,7 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
     """All results of a scene that the report shows, from its files."""
     # variants with the same first stages share files
     read = cache(read_stage)
-    maps = {
-        variant: {stage: read(plan.stage_file(dataset, scene, variant, stage)) for stage in plan.stages}
-        for variant in plan.variants
-    }
+    maps = {v: {stage: read(plan.stage_file(dataset, scene, v, stage)) for stage in plan.stages} for v in plan.variants}
     light_field = read_with_truth(plan.files(dataset, scene).light_field, plan.files(dataset, scene).truth)
     for stages in maps.values():
         stages[plan.stages[-1]] = with_unknown(light_field, stages[plan.stages[-1]])
@@ -48,11 +45,7 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
         maps=maps,
         evaluations={variant: scored[key] for variant, key in keys.items()},
         detailed=plan.detailed,
-        external={
-            method: (found.disparity, found.evaluation)
-            for method, found in external.items()
-            if found.disparity is not None
-        },
+        external={name: (one.disparity, one.evaluation) for name, one in external.items() if one.disparity is not None},
         problems={method: found.problem for method, found in external.items() if found.disparity is None},
     )
 
@@ -77,17 +70,15 @@ def write_scene(results: SceneResults, panels: Sequence[Panel], title: str, fold
 
 @click.command(name="python -m sepi.report.figures", cls=SepiCommand)
 @click.option("--results", type=click.Path(path_type=Path), required=True, help="Folder of the results.")
-@click.option("--plan", "plan_text", required=True, help="JSON: scenes per dataset, choices per variant and stage.")
+@click.option("--plan", "text", required=True, help="JSON: scenes per dataset, choices per variant and stage.")
 @click.option("--dataset", required=True, help="Dataset of the scene.")
 @click.option("--scene", required=True, help="Scene to draw.")
 @click.option("--pixels", default="[]", show_default=True, help="JSON: pixels to look into, [[row, column], ...].")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")
 @click.option("--page", type=click.Path(path_type=Path), help="JSON file to write: the scene for a page.")
-def command(
-    results: Path, plan_text: str, dataset: str, scene: str, pixels: str, output: Path, page: Path | None
-) -> None:
+def command(results: Path, text: str, dataset: str, scene: str, pixels: str, output: Path, page: Path | None) -> None:
     """Write the pictures of one scene."""
-    plan = Plan.from_json(results, plan_text)
+    plan = Plan.from_json(results, text)
     found = read_results(plan, dataset, scene)
     panels, final_file = panels_of(found), plan.stage_file(dataset, scene, MAIN_VARIANT, plan.stages[-1])
     asked = [(int(y), int(x)) for y, x in json.loads(pixels)]

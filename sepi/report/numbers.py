@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
@@ -45,8 +46,8 @@ def pooled_q25(plan: Plan) -> Iterator[tuple[str, str, str, float]]:
     for level, scenes in levels.items():
         for variant in plan.compared:
             key = plan.stage_key(variant, plan.stages[-1])
-            found_of = (read_evaluations(plan.scores_file(DATASET, scene), [key])[key] for scene in scenes)
-            yield from ((level, variant, *quarter) for quarter in _quarters(found_of))
+            of_scenes = (read_evaluations(plan.scores_file(DATASET, scene), [key])[key] for scene in scenes)
+            yield from ((level, variant, *quarter) for quarter in _quarters(of_scenes))
         maps = [read_external(plan.files(DATASET, scene).external) for scene in scenes] if plan.external else []
         for method in plan.external:
             yield from ((level, method, *quarter) for quarter in _quarters(found[method].evaluation for found in maps))
@@ -58,24 +59,19 @@ def level_of(scene: str) -> str:
     return f"all scenes, noise {found.noise}, seed {found.seed}"
 
 
-def _quarters(evaluations: Iterable[Evaluation]) -> list[tuple[str, float]]:
-    """Regions and Q25 x100 over the pixels of several maps."""
+def _quarters(evaluations: Iterable[Evaluation]) -> Iterator[tuple[str, float]]:
+    """Regions and Q25 x100 over the pixels of several maps; errors that are not finite are the largest."""
     errors: dict[str, list[np.ndarray]] = {}
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     for found in evaluations:
         for region, scores in found.scores.get("paper", {}).items():
             assert found.error is not None
-            error = np.abs(found.error) if region == WHOLE_MAP else np.abs(found.error[found.regions[region]])
+            error = np.abs(found.error if region == WHOLE_MAP else found.error[found.regions[region]])
             errors.setdefault(region, []).append(error[np.isfinite(error)])
-            counts[region] = counts.get(region, 0) + int(scores["pixels"])
-    return [(region, _quarter(parts, counts[region])) for region, parts in errors.items()]
-
-
-def _quarter(errors: Sequence[np.ndarray], pixels: int) -> float:
-    """Q25 as in :func:`sepi.scoring.scores.score`; errors that are not finite are the largest."""
-    known = np.concatenate(errors)
-    place = pixels // 4
-    return 100 * float(np.partition(known, place)[place]) if place < known.size else float("nan")
+            counts[region] += int(scores["pixels"])
+    for region, parts in errors.items():
+        known, place = np.concatenate(parts), counts[region] // 4
+        yield region, 100 * float(np.partition(known, place)[place]) if place < known.size else float("nan")
 
 
 _Number = tuple[str, str, str, str, str, str, str, str, float]

@@ -45,8 +45,7 @@ def error_scale() -> ListedColormap:
     share = np.linspace(0, 1, 128)[:, None]
     half = [white + share * (end - white) for end in ends]
     # the middle occurs once, so that zero is exactly white
-    colours = np.concatenate([half[0][::-1], half[1][1:]])
-    return ListedColormap(np.clip(lab2rgb(colours), 0, 1).tolist(), name="error")
+    return ListedColormap(np.clip(lab2rgb(np.concatenate([half[0][::-1], half[1][1:]])), 0, 1).tolist(), name="error")
 
 
 def scale_colours(scale: str | Colormap) -> npt.NDArray[np.uint8]:

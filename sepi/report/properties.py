@@ -38,8 +38,7 @@ def property_table(runs: Runs, score: str) -> Table:
     """A section per level of noise, a row per method, a column per property, over the pixels of all scenes."""
     found = _final(runs)
     scenes, together = found[found["world"] != ""], found[found["world"] == ""]
-    first = scenes[(scenes[_LEVEL] == scenes[_LEVEL].iloc[0]).all(axis=1)]
-    pixels = first.groupby("region")["pixels"].sum()
+    pixels = scenes[(scenes[_LEVEL] == scenes[_LEVEL].iloc[0]).all(axis=1)].groupby("region")["pixels"].sum()
     titles = {region: title for region, title in PROPERTIES.items() if pixels.get(region)}
     # the squared error counts finite estimates only
     counted = scenes["pixels"] - (scenes["non_finite"] if score == "mse100" else 0)
@@ -110,10 +109,8 @@ def _table(
 def split_note(runs: Runs) -> str:
     """Sentence on the scenes on which parameters may be chosen."""
     parts = (("For choosing parameters", True), ("held out from that", False))
-    named = [
-        (title, [one for one in _worlds(runs) if (one in runs.plan.choosing) == chosen]) for title, chosen in parts
-    ]
-    return "; ".join(f"{title}: {', '.join(names)}" for title, names in named if names) + "."
+    named = {title: [one for one in _worlds(runs) if (one in runs.plan.choosing) == kept] for title, kept in parts}
+    return "; ".join(f"{title}: {', '.join(names)}" for title, names in named.items() if names) + "."
 
 
 def _worlds(runs: Runs) -> list[str]:
@@ -198,9 +195,6 @@ def _region_section(texts: pd.DataFrame, variant: str) -> Section:
     regions, titles = (list(dict.fromkeys(own[name])) for name in ("region", "title"))
     cells = own.pivot(index="title", columns="region", values=["coverage", "width"]).reindex(titles).fillna("")
     cells.columns = [f"{region} {name}" for name, region in cells.columns]
-    heads = {
-        f"{region} {name}": Head(f"{region}, {ERROR_BAR_SCORES[name]}")
-        for region in regions
-        for name in ("coverage", "width")
-    }
+    every = itertools.product(regions, ("coverage", "width"))
+    heads = {f"{region} {name}": Head(f"{region}, {ERROR_BAR_SCORES[name]}") for region, name in every}
     return section(f"Regions, variant {variant}", {"title": _HEADS["title"], **heads}, cells.reset_index())

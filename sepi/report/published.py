@@ -94,8 +94,7 @@ def scenes(dataset: str) -> list[str]:
 def averaged(table: pd.DataFrame, dataset: str) -> dict[str, int]:
     """Number of scenes in each method's printed average for a dataset of table 1 or 2."""
     known = table.loc[dataset].drop(AVERAGE).notna()
-    left_out = known.index.isin(_LEFT_OUT_OF_TABLE2 if table is table2() else [])
-    every, fewer = known.sum(), known[~left_out].sum()
+    every, fewer = known.sum(), known[~known.index.isin(_LEFT_OUT_OF_TABLE2 if table is table2() else [])].sum()
     return cast("dict[str, int]", every.where(every == len(known), fewer).to_dict())
 
 

@@ -20,11 +20,7 @@ from sepi.report.table import Kind
 from sepi.scoring.error_bars import ERROR_BAR_SCORES, Reliability
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, PROTOCOLS, WHOLE_MAP, score_heads
 
-SCENE, AVERAGE, PRINTED_AVERAGE = "scene", "average", "average printed"
-"""Kinds of rows in the CSV files."""
-
 PROTOCOL_NOTE = f"Protocol: paper (border {PROTOCOLS['paper']}, the whole map)."
-LEARNED_NOTE = "* learned, supervised; ** learned, unsupervised."
 EXTERNAL_NOTE = (
     "External: maps that other methods made, scored here as ours are; they are not ranked, since nothing says whether "
     "their method is learned."
@@ -67,30 +63,9 @@ def compared_methods(plan: Plan) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["key", "name", "head", "kind", "learning"]).set_index("key")
 
 
-def own_names(plan: Plan) -> str:
-    """Names of the compared variants, for a caption."""
-    *names, last = (f"`{variant}`" for variant in plan.compared)
-    return f"{', '.join(names)} and {last}" if names else last
-
-
 def datasets_of(plan: Plan) -> list[str]:
     """Available datasets, then the paper's others."""
     return list(dict.fromkeys([*plan.scenes, *published.DATASETS]))
-
-
-def dataset_title(dataset: str) -> str:
-    """Title of a dataset, with the paper's name if it has one."""
-    return f"{dataset}: {published.DATASETS[dataset]}" if dataset in published.DATASETS else dataset
-
-
-def average_label(count: int) -> str:
-    """Name of the row with averages of our figures."""
-    return f"Average of {count} scene{'s' * (count != 1)} available"
-
-
-def printed_label(dataset: str) -> str:
-    """Name of the row with the paper's averages."""
-    return f"Average as printed ({len(published.scenes(dataset))} scenes)"
 
 
 def count_note(counts: Sequence[int], scenes: int) -> str:
@@ -197,8 +172,7 @@ class Runs:
     def problem(self, dataset: str, scenes: Sequence[str], method: str) -> str:
         """Why an external method has no scores of scenes, or of how many it has some; empty if of all."""
         problems = [self.scenes[dataset, scene]["external"][method]["problem"] for scene in scenes]
-        alike = len(set(problems)) < 2
-        return "".join(problems[:1]) if alike else f"{problems.count('')} of {len(scenes)} scenes"
+        return "".join(problems[:1]) if len(set(problems)) < 2 else f"{problems.count('')} of {len(scenes)} scenes"
 
     def problems(self, dataset: str, scenes: Sequence[str]) -> pd.Series:
         """The :meth:`problem` of every method in the tables, empty but for external ones."""
@@ -217,8 +191,7 @@ class Runs:
 
 def weighted_means(values: pd.DataFrame, pixels: pd.Series, by: Any) -> pd.DataFrame:
     """Means over the pixels of several maps, with their number in the column ``pixels``; NaN over none."""
-    products = values.mul(pixels, axis=0)[pixels > 0]
-    sums = products.groupby(by, sort=False).agg(lambda column: column.sum(skipna=False))
+    sums = values.mul(pixels, axis=0)[pixels > 0].groupby(by, sort=False).agg(lambda column: column.sum(skipna=False))
     every = pixels.groupby(by, sort=False).sum()
     return sums.reindex(every.index).div(every, axis=0).assign(pixels=every)
 

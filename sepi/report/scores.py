@@ -16,17 +16,7 @@ from sepi.report.plan import MAIN_VARIANT
 from sepi.report.runs import EXTERNAL, KEYS, PROTOCOL_NOTE, REGIONS_NOTE, Runs, own_key
 from sepi.report.table import Head, Kind, Section, Table, ranks, section, shown
 from sepi.scoring.regions import LEAST_DISCONTINUITY, REACH
-from sepi.scoring.scores import (
-    COUNTS,
-    DISCONTINUITIES,
-    EDGE_SCORES,
-    PROTOCOLS,
-    REGIONS,
-    SCORES,
-    WHOLE_MAP,
-    own_bad_pixel,
-    score_heads,
-)
+from sepi.scoring.scores import COUNTS, DISCONTINUITIES, EDGE_SCORES, PROTOCOLS, REGIONS, SCORES, WHOLE_MAP, score_heads
 from sepi.variants.built_in import PARTS_OF_BEST
 
 _PARTS = [region for region in REGIONS if region != WHOLE_MAP]
@@ -43,9 +33,8 @@ def computed_methods_table(runs: Runs) -> Table:
     heads |= _score_heads(runs, ["badpix007"])
     heads |= {region: Head(f"{SCORES['mse100']}, {region}", Kind.OURS) for region in _PARTS}
     ranked = [key for key, head in heads.items() if head.kind == Kind.OURS]
-    rows, sections = _by_scene(
-        runs, heads | {"seconds": Head("time / s"), "peak_memory_mb": Head("peak memory / MB")}, ranked
-    )
+    heads |= {"seconds": Head("time / s"), "peak_memory_mb": Head("peak memory / MB")}
+    rows, sections = _by_scene(runs, heads, ranked)
     return Table(
         "Methods, computed and published",
         f"{PROTOCOL_NOTE} Every row is computed here, by this project's implementation of the method; beside it what "
@@ -61,9 +50,8 @@ def computed_methods_table(runs: Runs) -> Table:
 def parts_table(runs: Runs) -> Table:
     """Scores and seconds of the best variant and of the variants with one part switched off or replaced."""
     heads = {"variant": Head("variant", Kind.TEXT), "difference": Head("what differs", Kind.TEXT)}
-    rows, sections = _by_scene(
-        runs, heads | _score_heads(runs, ["mse100", "q25", "badpix007"]) | {"seconds": Head("seconds")}
-    )
+    heads |= _score_heads(runs, ["mse100", "q25", "badpix007"]) | {"seconds": Head("seconds")}
+    rows, sections = _by_scene(runs, heads)
     return Table(
         "Ablation of variant best",
         f"{PROTOCOL_NOTE} Each row switches one part of `best` off, or puts the paper's in its place. Seconds: "
@@ -76,8 +64,8 @@ def parts_table(runs: Runs) -> Table:
 
 def _score_heads(runs: Runs, scores: Iterable[str]) -> dict[str, Head]:
     """Heads of scores, and of those for the user's thresholds."""
-    own = runs.plan.bad_thresholds
-    return {name: Head(score_heads(own)[name], Kind.OURS) for name in (*scores, *own_bad_pixel(own))}
+    heads = score_heads(runs.plan.bad_thresholds)
+    return {name: Head(heads[name], Kind.OURS) for name in (*scores, *[one for one in heads if one not in SCORES])}
 
 
 def _by_scene(runs: Runs, heads: Mapping[str, Head], ranked: Iterable[str] = ()) -> tuple[pd.DataFrame, list[Section]]:
@@ -97,9 +85,8 @@ def _variant_rows(runs: Runs, pair: tuple[str, str]) -> pd.DataFrame:
     counterparts = [published.counterpart(variant) for variant in variants]
     found = scores.xs(WHOLE_MAP, axis=1, level="region")
     found = found.assign(dataset=pair[0], scene=pair[1], variant=variants)
-    found = found.assign(
-        method=list(published.methods()["label"][counterparts]), difference=found["variant"].map(PARTS_OF_BEST)
-    )
+    labels = list(published.methods()["label"][counterparts])
+    found = found.assign(method=labels, difference=found["variant"].map(PARTS_OF_BEST))
     place = (pair[0], published.paper_scene(*pair))
     for score, table in _PUBLISHED.items():
         theirs = table().reindex(index=[place], columns=counterparts).iloc[0].to_numpy()
@@ -130,10 +117,8 @@ _EDGES = {
 def edge_table(runs: Runs) -> Table:
     """Scores beside depth discontinuities and away from them, of the compared variants and external methods' maps."""
     plan, external = runs.plan, runs.methods[runs.methods["kind"] == Kind.EXTERNAL]
-    columns = {
-        dataset: [key for key, name in external["name"].items() if runs.has_column(dataset, name)]
-        for dataset in plan.scenes
-    }
+    names = list(external["name"].items())
+    columns = {one: [key for key, name in names if runs.has_column(one, name)] for one in plan.scenes}
     maps = [(*pair, key) for pair in runs.scored_pairs for key in (*map(own_key, plan.compared), *columns[pair[0]])]
     names = ["dataset", "scene", "method", "region"]
     whole, there = (
@@ -170,9 +155,8 @@ def edge_budget(whole: pd.DataFrame, there: pd.DataFrame) -> pd.DataFrame:
     """
     finite_whole, finite_there = (scores["pixels"] - scores["non_finite"] for scores in (whole, there))
     # a score over no pixels adds nothing
-    squared_whole, squared_there = (
-        (f * s["mse100"]).fillna(0.0) for f, s in ((finite_whole, whole), (finite_there, there))
-    )
+    squared = [(f * s["mse100"]).fillna(0.0) for f, s in ((finite_whole, whole), (finite_there, there))]
+    squared_whole, squared_there = squared
     bad_whole, bad_there = ((scores["pixels"] * scores["badpix007"]).fillna(0.0) for scores in (whole, there))
     figures = {
         "area": (100 * there["pixels"], whole["pixels"]),
@@ -240,9 +224,7 @@ def runtime_table(runs: Runs) -> Table:
     # published seconds belong to the paper's method only, and to light fields of one size
     theirs = rows["stage"].map(paper).where(rows["variant"] == MAIN_VARIANT)
     sizes = {pair: (one["light_field"]["shape"], one["light_field"]["grid"]) for pair, one in runs.scenes.items()}
-    of_size = pd.Series(
-        [sizes[dataset, scene] == _PUBLISHED_SIZE for dataset, scene, *_ in index], rows.index, dtype=bool
-    )
+    of_size = pd.Series([sizes[index_of[:2]] == _PUBLISHED_SIZE for index_of in index], rows.index, dtype=bool)
     rows.insert(4, "choice", [plan.variants[variant].get(step, "") for *_, variant, step in index])
     rows["published_seconds"] = shown(theirs.to_frame())
     rows["ratio"] = (theirs / rows["seconds"].where(rows["seconds"] > 0)).where(of_size)
@@ -251,9 +233,8 @@ def runtime_table(runs: Runs) -> Table:
         totals = found[found["stage"] == "total"].set_index("variant")
         seconds = found.pivot(index="variant", columns="stage", values="seconds").loc[totals.index]
         cells = shown(seconds.join(totals[["ratio", "peak_memory_mb"]]).reset_index())
-        printed = pd.DataFrame(
-            [{"variant": "paper, as published"} | {step: f"{took:.2f}" for step, took in paper.items()}]
-        )
+        took = {step: f"{seconds:.2f}" for step, seconds in paper.items()}
+        printed = pd.DataFrame([{"variant": "paper, as published"} | took])
         cells = pd.concat([cells, printed], ignore_index=True).fillna("")
         sections.append(section(f"{dataset}/{scene}", heads, cells, rows=[*[""] * len(totals), Kind.PUBLISHED]))
     return Table(

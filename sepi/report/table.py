@@ -219,10 +219,8 @@ def _environment(table: Table, section: Section, label: str) -> str:
     if averages and averages[0]:
         cells.iloc[averages[0], 0] = f"\\midrule\n{cells.iloc[averages[0], 0]}"
     wide = _is_wide(section)
-    heads = [
-        rf"\rotatebox{{90}}{{{_escaped(text)}}}" if wide and kind != Kind.TEXT else _escaped(text)
-        for text, kind in section.heads
-    ]
+    turned = r"\rotatebox{{90}}{{{}}}".format if wide else str
+    heads = [_escaped(text) if kind == Kind.TEXT else turned(_escaped(text)) for text, kind in section.heads]
     text = (
         cells.set_axis(heads, axis=1)
         .style.hide(axis="index")

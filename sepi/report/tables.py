@@ -62,9 +62,7 @@ _PATH = click.Path(path_type=Path)
 
 @click.command(name="python -m sepi.report.tables", cls=SepiCommand)
 @click.option("--results", type=_PATH, required=True, help="Folder of the results.")
-@click.option(
-    "--plan", "path", type=_PATH, required=True, help="JSON: scenes per dataset, choices per variant and stage."
-)
+@click.option("--plan", "path", type=_PATH, required=True, help="JSON: scenes of datasets, choices of variants.")
 @click.option("--output", type=_PATH, required=True, help="JSON file to write, a CSV beside it.")
 @click.option("--tables", "folder", type=_PATH, required=True, help="Folder for the tables.")
 @click.option("--charts", "figures", type=_PATH, help="Folder for the charts; default: none are drawn.")

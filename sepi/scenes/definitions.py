@@ -227,10 +227,8 @@ def _pyramids() -> list[Surface]:
             faces += pyramid(base, (x + shift[0], y + shift[1]), height, plane, texture)
             if height < 0:
                 holes.append(base)
-    return [
-        Surface([everywhere(), *holes], plane, photograph("immunohistochemistry", (0.85, 0.9, 0.9), seed=10)),
-        *faces,
-    ]
+    ground = photograph("immunohistochemistry", (0.85, 0.9, 0.9), seed=10)
+    return [Surface([everywhere(), *holes], plane, ground), *faces]
 
 
 def _stripes() -> list[Surface]:
@@ -267,7 +265,7 @@ def _wall() -> list[Surface]:
     ]
 
 
-def _curved_occluders() -> list[Surface]:
+def _curved() -> list[Surface]:
     ground = Surface([everywhere()], Plane(-2.2, across=0.4, down=0.2), photograph("grass", (1.05, 1.0, 0.85), seed=30))
     return [
         ground,
@@ -334,9 +332,7 @@ DEFINITIONS: dict[str, Scene] = {
     "pyramids": Scene("slanted pyramids, two standing and two sunk", _pyramids),
     "stripes": Scene("stripes before a plane, each of lower contrast than the one before", _stripes),
     "wall": Scene("textured objects before a large slanted wall without texture", _wall, (0.004, 0.004)),
-    "curved_occluders": Scene(
-        "occluders with curved outlines and a disparity discontinuity of up to 4", _curved_occluders
-    ),
+    "curved_occluders": Scene("occluders with curved outlines and a disparity discontinuity of up to 4", _curved),
     "rack": Scene("plates that hide each other, behind rods with narrow gaps", _rack),
     "pencils": Scene("crossing pencils before paper and a wall with next to no texture", _pencils, (0.006, 0.006)),
 }

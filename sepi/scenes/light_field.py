@@ -272,5 +272,4 @@ def render_shot(name: str, shot: Shot, *, camera: Camera, size: int = 192) -> Po
     shape = shot.lens.height, shot.lens.width
     mean = met(_SAMPLES)[1].reshape(shape[0], _SAMPLES, shape[1], _SAMPLES, 3).mean(axis=(1, 3))
     # rays have z = 1, so that their lengths are depths
-    depth = met(1)[0].reshape(shape).astype(np.float32)
-    return Posed(np.round(np.clip(mean, 0, 1) * 255).astype(np.uint8), depth)
+    return Posed(np.round(np.clip(mean, 0, 1) * 255).astype(np.uint8), met(1)[0].reshape(shape).astype(np.float32))

@@ -48,10 +48,7 @@ class Drawing(NamedTuple):
 
 def drawing(surfaces: Sequence[Surface], size: int, *, textured: bool = True) -> Drawing:
     """Surfaces in pixels of an image of ``size`` by ``size``; without textures if only positions are needed."""
-    edges = [
-        np.concatenate([np.hstack([outline, np.roll(outline, -1, axis=0)]) for outline in surface.outlines])
-        for surface in surfaces
-    ]
+    edges = [np.concatenate([np.hstack([o, np.roll(o, -1, axis=0)]) for o in one.outlines]) for one in surfaces]
     planes = []
     for at_centre, across, down in (surface.plane for surface in surfaces):
         b, c = across / size, down / size

@@ -67,9 +67,8 @@ def misfit(estimate: FloatMap, truth: FloatMap, grid: tuple[int, int] | None = N
     for values in (truth, inverse) if (truth[known] > 0).all() else (truth,):
         factor, more = _line(values[known], estimate[known])
         if abs(factor) * float(np.ptp(values[known])) > close:
-            tried[_line_text(factor, more, close, values is not truth, grid)] = np.float32(
-                factor
-            ) * values + np.float32(more)
+            line = np.float32(factor) * values + np.float32(more)
+            tried[_line_text(factor, more, close, values is not truth, grid)] = line
     how = min(tried, key=lambda name: off(tried[name]))
     return how if off(tried[how])[0] < _BETTER * as_it_is else None
 

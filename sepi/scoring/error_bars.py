@@ -101,8 +101,7 @@ def oracle(error: FloatMap) -> FloatArray:
 
 def _by_confidence(confidence: FloatMap, error: FloatMap) -> FloatArray:
     known = np.isfinite(error)
-    order = np.argsort(-confidence[known], kind="stable")
-    return np.asarray(error[known][order], np.float64)
+    return np.asarray(error[known][np.argsort(-confidence[known], kind="stable")], np.float64)
 
 
 ERROR_BAR_SCORES: dict[str, str] = {

@@ -36,10 +36,7 @@ MIN_AREA = 225
 """Pixels: smaller patches are dropped and smaller holes filled (one superpixel of the paper, 15 x 15)."""
 
 
-def occluded(
-    ground_truth: FloatMap,
-    baselines: npt.NDArray[np.float64],
-) -> BoolMap:
+def occluded(ground_truth: FloatMap, baselines: npt.NDArray[np.float64]) -> BoolMap:
     """Pixels of the reference view that are hidden in at least one other view.
 
     A pixel is hidden in a view if a nearer pixel is projected to within half a pixel of it, as in a z-buffer. A buffer

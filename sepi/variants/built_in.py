@@ -33,14 +33,7 @@ ENTRIES: dict[str, dict[str, Any]] = {
     "fast": {
         "initial": {"choice": "semi_global", "first_views": 9, "first_sampling": 3},
         # in a single pass, the mean reference takes a tenth longer and gains next to nothing
-        "occlusion": {
-            "choice": "visibility",
-            "passes": 1,
-            "views": 25,
-            "sampling": 2,
-            "mean_noise": 1,
-            "share_views": 27,
-        },
+        "occlusion": {"choice": "visibility", "passes": 1, "views": 25, "sampling": 2, "mean_noise": 1},
         "textureless": {"choice": "uniform_planes", "views": 9},
         # with so few views, faint detail in noise does more harm than good
         "optimize": {"choice": "second_order", "views": 25, "solves": 1, "least_noise": 0},
@@ -65,7 +58,6 @@ ENTRIES: dict[str, dict[str, Any]] = {
     "best_no_mixture": {"base": "best", "occlusion": {"use_mixture": False}},
     "best_no_lines": {"base": "best", "occlusion": {"use_lines": False}},
     "best_no_light": {"base": "best", "textureless": {"light": False}},
-    "best_no_pockets": {"base": "best", "textureless": {"pockets": False}},
     "best_no_planes": {"base": "best", "textureless": "none"},
     "best_no_refinements": {"base": "best", "optimize": {"noisy_refinements": 0}},
     "best_no_surfaces": {"base": "best", "optimize": {"one_surface": False}},
@@ -90,7 +82,6 @@ PARTS_OF_BEST: dict[str, str] = {
     "best_no_mixture": "edges decided without colours of the reference view",
     "best_no_lines": "edges decided pixel by pixel",
     "best_no_light": "planes of uniform regions by their border alone",
-    "best_no_pockets": "no planes from neighbouring regions",
     "best_no_planes": "no planes in uniform regions",
     "best_no_refinements": "no Gauss-Newton before smoothing in noise",
     "best_no_surfaces": "windows across depth steps and colours",

@@ -177,8 +177,7 @@ def _python_code(source: bytes) -> _Code:
     tree = ast.parse(source)
     tree.body = [node for node in tree.body if not (isinstance(node, ast.If) and ast.unparse(node.test) in _NOT_RUN)]
     named: list[tuple[int, str, list[str]]] = []
-    text = _dumped(tree, named)
-    return hashlib.sha256(text.encode()).hexdigest(), named
+    return hashlib.sha256(_dumped(tree, named).encode()).hexdigest(), named
 
 
 def _dumped(node: Any, named: list[tuple[int, str, list[str]]]) -> str:
@@ -236,8 +235,7 @@ def keep(folder: Path) -> None:
     They only save time, so nothing is kept if the folder is not writable.
     """
     files = {file for file, _, _ in _read.values()}
-    others = {key: code for key, code in _before.items() if code[0] not in files and Path(code[0]).is_file()}
-    kept = others | _read
+    kept = {key: code for key, code in _before.items() if code[0] not in files and Path(code[0]).is_file()} | _read
     if folder.is_dir() and kept != _before:
         with suppress(OSError, SepiError), atomic_path(folder / _KEPT) as temporary:
             temporary.write_text(json.dumps(kept), encoding="utf-8")

@@ -201,10 +201,8 @@ def _with_paths(values: Mapping[str, Any]) -> Mapping[str, Any]:
     external = values.get("external")
     if not isinstance(external, Mapping):
         return values
-    return {
-        **values,
-        "external": {name: {"path": entry} if isinstance(entry, str) else entry for name, entry in external.items()},
-    }
+    known = {name: {"path": entry} if isinstance(entry, str) else entry for name, entry in external.items()}
+    return {**values, "external": known}
 
 
 def _with_numbers(value: Any, top: bool = True) -> Any:

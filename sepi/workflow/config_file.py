@@ -83,19 +83,13 @@ def _comment(field: FieldInfo, indent: str) -> list[str]:
 
 def _bounds(field: FieldInfo) -> str:
     signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
-    found = [
-        f"{sign} {getattr(item, name)}"
-        for item in field.metadata
-        for name, sign in signs.items()
-        if hasattr(item, name)
-    ]
+    found = [f"{signs[name]} {getattr(one, name)}" for one in field.metadata for name in signs if hasattr(one, name)]
     return ", ".join(found)
 
 
 def _flow(value: Any) -> str:
     """A value as YAML on one line."""
-    plain = json.loads(json.dumps(value))
-    text = yaml.safe_dump(plain, default_flow_style=True, width=10**6, sort_keys=False)
+    text = yaml.safe_dump(json.loads(json.dumps(value)), default_flow_style=True, width=10**6, sort_keys=False)
     # after a bare scalar, PyYAML writes a line "..."
     return text.split("\n")[0]
 

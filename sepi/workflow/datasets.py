@@ -287,9 +287,7 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str, truth
 
 def _require_plain(name: str, where: str) -> None:
     if not _NAME.fullmatch(name):
-        raise SepiError(
-            f"{where}: a scene must be named with letters, digits and _ . + - only, at most {LONGEST_NAME}: '{name}'"
-        )
+        raise SepiError(f"{where}: a scene is named with letters, digits and _ . + -, at most {LONGEST_NAME}: '{name}'")
 
 
 def _benchmark_scenes(folder: Path, depth: int = _DEPTH) -> Iterator[Scene]:

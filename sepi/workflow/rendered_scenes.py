@@ -51,5 +51,4 @@ def rendered_scene(name: str) -> RenderedScene:
 
 def exposed_name(scene: str, noise: str = WITHOUT_NOISE, seed: int = 1) -> str:
     """Name of a scene at a noise level: ``sticks``, ``sticks_low``, or with another seed ``sticks_low_2``."""
-    parts = [scene] if noise == WITHOUT_NOISE else [scene, noise, *([str(seed)] if seed != 1 else [])]
-    return "_".join(parts)
+    return "_".join([scene] if noise == WITHOUT_NOISE else [scene, noise, *([str(seed)] if seed != 1 else [])])

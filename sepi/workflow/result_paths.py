@@ -6,7 +6,6 @@ With wildcards instead of names, as in ``scene_files("{dataset}", "{scene}")``, 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from sepi.variants import HANDED_ON, STAGES
@@ -15,7 +14,6 @@ RESULTS = Path("results")
 """Folder of the results, relative to the workflow's working directory."""
 
 
-@dataclass(frozen=True)
 class SceneFiles:
     """The files of one scene.
 
@@ -23,29 +21,20 @@ class SceneFiles:
     ----------
     folder : Path
         ``results/DATASET/SCENE``.
+    light_field : Path
+        The light field.
+    truth : Path
+        Ground truth and masks, if available.
+    external : Path
+        The maps of all external methods and their scores.
+    stages : Path
+        The folder of the stage files.
     """
 
-    folder: Path
-
-    @property
-    def light_field(self) -> Path:
-        """The light field."""
-        return self.folder / "lightfield.h5"
-
-    @property
-    def truth(self) -> Path:
-        """Ground truth and masks, if available."""
-        return self.folder / "truth.h5"
-
-    @property
-    def external(self) -> Path:
-        """The maps of all external methods and their scores."""
-        return self.folder / "external.h5"
-
-    @property
-    def stages(self) -> Path:
-        """The folder of the stage files."""
-        return self.folder / "stages"
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.stages = folder, folder / "stages"
+        files = (folder / f"{name}.h5" for name in ("lightfield", "truth", "external"))
+        self.light_field, self.truth, self.external = files
 
     def stage(self, labels: Mapping[str, str], stage: str, ending: str = "h5") -> Path:
         """The file with the maps after a stage, or with another ``ending`` its companion, such as ``"time.json"``.

@@ -88,8 +88,7 @@ class Report(CheckedModel):
         "failures",
     )
     parts_of_best: bool = Field(
-        False,
-        description="whether the page also shows the ablation of 'best'; 'all' then runs its variants too",
+        False, description="whether the page also shows the ablation of 'best'; 'all' then runs its variants too"
     )
 
 
@@ -201,6 +200,5 @@ class Settings:
     def external_json(self, dataset: str, name: str) -> str:
         """Input of ``python -m sepi.external`` for a scene, in the order of the configuration."""
         files = self.external_files(dataset, name)
-        return json.dumps(
-            {method: source.model_dump() | {"path": str(files[method])} for method, source in self.external.items()}
-        )
+        found = self.external.items()
+        return json.dumps({method: source.model_dump() | {"path": str(files[method])} for method, source in found})

@@ -43,6 +43,16 @@ def test_edges_are_found_again(name: str, change: str) -> None:
     assert wrong(assigned_to_surfaces(scene, changed, USUAL), truth) < 0.35 * before
 
 
+def test_only_what_changed_is_decided_again() -> None:
+    """Beside a wall that moved back the edge is found; elsewhere what was decided stays."""
+    scene, left = render("curved_occluders", size=96), np.s_[:, :40]
+    wide = cv2.dilate(scene.ground_truth, AROUND)
+    before = wide + np.where(np.arange(96) < 40, np.float32(1), np.float32(0))
+    again = assigned_to_surfaces(scene, wide, USUAL, before)
+    assert wrong(again[left], scene.ground_truth[left]) < 0.35 * wrong(wide[left], scene.ground_truth[left])
+    np.testing.assert_array_equal(again[:, 42:], wide[:, 42:])
+
+
 def test_each_pixel_can_be_decided_alone() -> None:
     """The ablation without edges: other pixels than with them, and much better than a map a pixel too narrow."""
     scene = render("dots", size=96)

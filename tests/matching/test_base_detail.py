@@ -36,11 +36,10 @@ def test_detail_equals_a_plain_twin(dtype: type, channels: int) -> None:
     colours = np.random.default_rng(0).random((1, 2, 20, 37, channels), np.float32) * 0.2
     views = colours if dtype == np.float32 else np.round(colours * np.iinfo(dtype).max).astype(dtype)
     field = LightField(views, "random")
-    parameters = BaseDetailParameters(base_radius=3, base_sigma_space=2.5, base_sigma_colour=0.1)
-    edge = float(np.hypot(0.1, 3 * noise_level(field.reference_view)))
-    found = base_detail_decomposition(field, parameters).detail * DETAIL_UNIT
+    edge = float(np.hypot(0.05, 3 * noise_level(field.reference_view)))
+    found = base_detail_decomposition(field, BaseDetailParameters()).detail * DETAIL_UNIT
     for s in range(2):
-        expected = detail_twin(as_unit_float(field.rgb_views[0, s]), 3, edge, 2.5)
+        expected = detail_twin(as_unit_float(field.rgb_views[0, s]), 4, edge, 4.0)
         np.testing.assert_allclose(found[0, s], expected, atol=1.5 * DETAIL_UNIT)
 
 
@@ -62,9 +61,9 @@ def test_what_is_kept_of_views_changes_nothing() -> None:
     few, all_views = np.zeros((5, 5), bool), np.ones((5, 5), bool)
     few[::2, ::2] = True
     asked = [
-        (field, BaseDetailParameters(base_radius=radius), views)
+        (field, BaseDetailParameters(use_detail=use_detail), views)
         for field in (first, second, first)
-        for radius, views in ((4, few), (4, all_views), (3, few), (4, few))
+        for use_detail, views in ((True, few), (True, all_views), (False, few), (True, few))
     ]
     alone = [base_detail_decomposition(field, parameters, None, views) for field, parameters, views in asked]
     workspace = Workspace()

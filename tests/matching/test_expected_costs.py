@@ -49,7 +49,7 @@ def test_noise_alone_costs_the_same_at_every_disparity(channels: int) -> None:
     of_all = []
     for disparity in WHOLE_TO_HALF:
         here = noisy.with_range(DisparityRange(disparity, disparity + 1e-4, "given"))
-        found = sweep(here, parameters, groups=views.groups, subsets=views.subsets)
+        found = sweep(here, parameters, subsets=views)
         of_all.append(found.mean[:, *inside].mean(axis=(1, 2)))
     costs = np.array(of_all)
     # as they are they spread by a fifth
@@ -59,9 +59,7 @@ def test_noise_alone_costs_the_same_at_every_disparity(channels: int) -> None:
     assert found.of_noise[8:-8, 60:-8].mean() < 0.85 * found.of_noise[inside].mean()
     # grey stored as colours is grey
     colours = replace(here, views=np.ascontiguousarray(here.rgb_views))
-    np.testing.assert_array_equal(
-        sweep(colours, parameters, groups=views.groups, subsets=views.subsets).mean, found.mean
-    )
+    np.testing.assert_array_equal(sweep(colours, parameters, subsets=views).mean, found.mean)
 
 
 def test_each_candidate_has_the_mean_of_what_its_views_make_of_noise() -> None:

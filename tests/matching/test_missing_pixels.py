@@ -17,6 +17,7 @@ from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.gauss_newton import GaussNewton
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.unknown import unknown_pixels
+from sepi.matching.view_subsets import ViewSubsets
 from sepi.matching.visibility_sweep import (
     FirstDepthParameters,
     VisibleViewsParameters,
@@ -56,7 +57,8 @@ def _swept(light_field, **more):
 
 def _halves(light_field):
     groups = np.add.outer(np.arange(VIEWS) // 3, 2 * (np.arange(VIEWS) // 3))
-    return _swept(light_field, groups=groups, subsets=np.array([[1, 1, 0, 0], [0, 1, 0, 1]], bool))
+    halves = np.array([[1, 1, 0, 0], [0, 1, 0, 1]], bool)
+    return _swept(light_field, subsets=ViewSubsets(groups, halves, ("left", "right")))
 
 
 def _first(light_field):

@@ -14,7 +14,7 @@ from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.denoising import sure_noise
 from sepi.matching.expected_costs import expected_costs
 from sepi.matching.plane_sweep import TILE_WIDTH, SweepParameters, sweep
-from sepi.matching.stitched_epi import line_cost, stitched_epi
+from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.sweep_arrays import sampled_candidates
 from sepi.matching.view_subsets import HALVES_AND_QUARTERS, halves_and_quarters
 from sepi.scenes import render
@@ -90,7 +90,7 @@ def twin(light_field, parameters, of_groups, groups, subset):
 def sweep_and_twin(light_field, parameters, numbers):
     """Disparities of the sweep and of its twin, of subsets of the views; their costs are the same."""
     views = halves_and_quarters(light_field)
-    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    result = sweep(light_field, parameters, subsets=views)
     of_groups = twin_sums(light_field, parameters, views.groups)
     disparities = []
     for n in numbers:
@@ -153,7 +153,12 @@ def test_sweep_visits_the_samples_of_the_stitched_epi(disparity, geometry):
     scale = float(np.sqrt(parameters.scale**2 + residual_variance(light_field.reference_view)))
     result = sweep(light_field, parameters)
     for y, x in [(6, 7), (0, 3), (11, 14), (5, 1)]:
-        costs = [line_cost(light_field, y, x, disparity + offset, scale) for offset in (-0.5, 0, 0.5)]
+        costs = []
+        for candidate in (disparity - 0.5, disparity, disparity + 0.5):
+            samples, valid = stitched_epi(light_field, y, candidate).along_line(x)
+            valid[np.ravel_multi_index(light_field.reference_position, light_field.grid)] = False
+            squared = ((samples - light_field.reference_view[y, x]) ** 2).sum(axis=1)[valid]
+            costs.append(np.mean(squared / (squared + scale**2)) if squared.size else np.nan)
         assert result.cost[0, y, x] == pytest.approx(np.nanmin(costs), abs=1e-5)
 
 
@@ -216,7 +221,7 @@ def test_subset_without_views_matches_nothing():
     light_field = random_light_field(grid=(3, 3), shape=(40, 44)).seen_from((0, 0))
     views = halves_and_quarters(light_field)
     parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=1, window_sigma=0.5, softening=0)
-    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    result = sweep(light_field, parameters, subsets=views)
     empty = views.names.index("left-up")
     assert (result.cost[empty] == 1).all()
     assert (result.mean[empty] == 1).all()

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.sparse import diags
 
-from sepi.regularization.local_inverse import inverse_diagonal
 from sepi.regularization.multilevel import MARGIN
-from sepi.regularization.second_order import second_difference_stencil
+from sepi.regularization.second_order import inverse_diagonal, second_difference_stencil
 
 SIZE = 40
 INNER = np.s_[7:-7, 7:-7]

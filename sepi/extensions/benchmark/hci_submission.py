@@ -19,7 +19,7 @@ import tempfile
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -196,76 +196,63 @@ def problems_of(path: str | Path, *, partial: bool = False) -> list[str]:
         if path.is_dir():
             # files and folders of the first two levels
             inner = {*path.glob("*/*"), *(entry for entry in path.iterdir() if not entry.is_dir())}
-            names = sorted(file.relative_to(path).as_posix() for file in inner)
-            return _strangers(names) + _problems_in(path, names, {}, partial)
+            return _problems_in(path, sorted(file.relative_to(path).as_posix() for file in inner), {}, partial)
         if path.is_file():
-            return _problems_of_archive(path, partial)
+            with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory(prefix="sepi-") as folder:
+                return _problems_in(Path(folder), archive.namelist(), _unpack(archive, Path(folder)), partial)
     except OSError as error:
         raise SepiError(f"{path}: cannot be read ({error.strerror or error})") from error
-    raise SepiError(f"{path}: no such file or folder")
-
-
-def _problems_of_archive(path: Path, partial: bool) -> list[str]:
-    try:
-        archive = zipfile.ZipFile(path)
     except (zipfile.BadZipFile, ValueError, OverflowError, struct.error, NotImplementedError) as error:
         return [f"{path}: not a readable zip archive ({error})"]
-    with archive, tempfile.TemporaryDirectory(prefix="sepi-") as folder:
-        damaged = _unpack(archive, Path(folder))
-        names = archive.namelist()
-        twice = [f"{_shown(name)}: {count} files of this name" for name, count in Counter(names).items() if count > 1]
-        return twice + _strangers(names) + _problems_in(Path(folder), names, damaged, partial)
+    raise SepiError(f"{path}: no such file or folder")
 
 
 def _unpack(archive: zipfile.ZipFile, folder: Path) -> dict[str, str]:
     """Unpack only the files of a submission; returns name to problem for those that cannot be unpacked."""
     damaged: dict[str, str] = {}
-    for part in _NAMES:
-        (folder / part).mkdir()
     for info in archive.infolist():
-        if info.filename not in _EXPECTED:
+        name = info.filename
+        if name not in _EXPECTED:
             continue
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            damaged[info.filename] = f"compressed by method {info.compress_type}; expected 'deflated' or none"
+            damaged[name] = f"compressed by method {info.compress_type}; expected 'deflated' or none"
         # zipfile never unpacks more than the declared size
-        elif problem := _size_problem(info.filename, info.file_size):
-            damaged[info.filename] = problem
+        elif problem := _size_problem(name, info.file_size):
+            damaged[name] = problem
         else:
             try:
-                (folder / info.filename).write_bytes(archive.read(info))
+                content = archive.read(info)
             except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError, OSError) as error:
-                damaged[info.filename] = f"cannot be unpacked ({error})"
+                damaged[name] = f"cannot be unpacked ({error})"
+            else:
+                (folder / name).parent.mkdir(exist_ok=True)
+                (folder / name).write_bytes(content)
     return damaged
 
 
-def _strangers(names: Collection[str]) -> list[str]:
-    """Problems with names that do not belong to a submission."""
+def _problems_in(folder: Path, names: Sequence[str], damaged: Mapping[str, str], partial: bool) -> list[str]:
+    """Problems with a submission: ``names`` of its files, which lie in ``folder`` unless they are ``damaged``."""
+    problems = [f"{_shown(name)}: {count} files of this name" for name, count in Counter(names).items() if count > 1]
     # some programs write entries for folders, which are harmless
     strange = {name: name.split("/") for name in names if name not in _EXPECTED and not name.endswith("/")}
     # disp_maps/ and runtimes/ one level too low; macOS adds __MACOSX/
     wrapping = {parts[0] for parts in strange.values() if parts[1:2] and parts[1] in _NAMES} - {"", "__MACOSX"}
-    lines = [f"{folder}/: expected {MAPS}/ and {RUNTIMES}/ at the root, not in this folder" for folder in wrapping]
-    others = [name for name, parts in strange.items() if parts[0] not in wrapping]
-    lines = sorted(map(_shown, lines))
-    lines += [f"{_shown(name)}: does not belong to a submission; leave it out" for name in others[:_MOST_LINES]]
-    more = len(others) - _MOST_LINES
-    return lines + ([f"...: {more} more files that do not belong"] if more > 0 else [])
-
-
-def _problems_in(folder: Path, names: Collection[str], damaged: Mapping[str, str], partial: bool) -> list[str]:
-    """Problems with the required files: ``names`` in ``folder``, and the reasons for the ``damaged`` ones."""
+    for wrapper in sorted(map(_shown, wrapping)):
+        problems.append(f"{wrapper}/: expected {MAPS}/ and {RUNTIMES}/ at the root, not in this folder")
+    others = [_shown(name) for name, parts in strange.items() if parts[0] not in wrapping]
+    problems += [f"{name}: does not belong to a submission; leave it out" for name in others[:_MOST_LINES]]
+    if len(others) > _MOST_LINES:
+        problems.append(f"...: {len(others) - _MOST_LINES} more files that do not belong")
     known = _EXPECTED.intersection(names)
-    problems = []
     for part, expected in _NAMES.items():
         if known.isdisjoint(expected):
             problems.append(f"{part}/: no such folder with files of the benchmark's scenes")
             continue
         for name, *both in zip(expected, *_NAMES.values(), strict=True):
-            if name in known:
-                problem = damaged.get(name) or _problem_in(folder / name, name)
-            else:
-                problem = None if partial and known.isdisjoint(both) else "missing"
-            problems += [f"{name}: {problem}"] if problem else []
+            if name in known and (problem := damaged.get(name) or _problem_in(folder / name, name)):
+                problems.append(f"{name}: {problem}")
+            elif name not in known and not (partial and known.isdisjoint(both)):
+                problems.append(f"{name}: missing")
     return problems
 
 
@@ -289,13 +276,17 @@ def _read_seconds(path: Path) -> float:
     if problem := _size_problem(RUNTIMES, path.stat().st_size):
         raise SepiError(f"{path}: {problem}")
     text = path.read_bytes().decode("ascii", "replace").strip()
-    try:
-        seconds = float(text)
-    except ValueError as error:
-        raise SepiError(f"{path}: expected the run time in seconds as a number, got {text!r}") from error
-    if not 0 < seconds < math.inf:
-        raise SepiError(f"{path}: expected a positive number of seconds, got {text}")
+    seconds = _seconds(text)
+    if seconds is None:
+        raise SepiError(f"{path}: expected the run time in seconds as a number, got {text!r}; it must be positive")
     return seconds
+
+
+def _seconds(text: str) -> float | None:
+    with suppress(ValueError):
+        if 0 < (seconds := float(text)) < math.inf:
+            return seconds
+    return None
 
 
 def _size_problem(name: str, size: int) -> str | None:
@@ -330,7 +321,13 @@ def submission(results: tuple[Path, ...], output: Path, runtimes: tuple[str, ...
       for scene in stratified/* training/* test/*; do sepi depth "$scene" --timing; done
       sepi submission *-depth -o submission.zip
     """
-    seconds = dict(_runtime(text) for text in runtimes)
+    seconds: dict[str, float] = {}
+    for text in runtimes:
+        scene, _, number = text.partition("=")
+        given = _seconds(number)
+        if not scene or given is None:
+            raise SepiError(f"--runtime {text}: expected SCENE=SECONDS with a positive number, such as cotton=12.5")
+        seconds[scene] = given
     entries: dict[str, Entry] = {}
     for folder in results:
         scene, entry = entry_of(folder, seconds)
@@ -359,12 +356,3 @@ def check_submission(context: click.Context, path: Path, partial: bool) -> None:
     if problems:
         context.exit(1)
     click.echo(f"{path}: no problems")
-
-
-def _runtime(text: str) -> tuple[str, float]:
-    """Scene and seconds from ``SCENE=SECONDS``."""
-    scene, _, number = text.partition("=")
-    with suppress(ValueError):
-        if scene and 0 < float(number) < math.inf:
-            return scene, float(number)
-    raise SepiError(f"--runtime {text}: expected SCENE=SECONDS with a positive number, such as cotton=12.5")

@@ -150,6 +150,7 @@ def calibrate(
     require_known("cameras", [cameras], CAMERAS)
     pycolmap = require_pycolmap(str(folder))
     pictures = pictures_in(folder)
+    names = [path.name for path in pictures]
     finding = Finding(lens, cameras == "each", threads or available_cores(), _SIDE)
     with atomic_folder(output) as temporary, colmap(folder):
         if not force:
@@ -157,19 +158,11 @@ def calibrate(
         work = temporary / "work"
         work.mkdir()
         database = work / "database.db"
-        write_features(pycolmap, database, pictures, finding, lambda done: progress(_FOUND * done))
-        with pycolmap.Database.open(str(database)) as file:
-            camera = file.read_all_cameras()[0]
-        match(
-            pycolmap,
-            database,
-            pairs_of([path.name for path in pictures]),
-            tolerance(camera.width, camera.height),
-            finding.threads,
-            lambda done: progress(_FOUND + (_MATCHED - _FOUND) * done),
-        )
-        model = _placed(pycolmap, folder, database, camera, len(pictures), progress)
-        model = _with_free_lens(pycolmap, model)
+        camera, _ = write_features(pycolmap, database, pictures, finding, lambda done: progress(_FOUND * done))
+        pairs = pairs_of(names)
+        share = _MATCHED - _FOUND
+        match(pycolmap, database, pairs, tolerance(camera), finding.threads, lambda n: progress(_FOUND + share * n))
+        model = _with_free_lens(pycolmap, _placed(pycolmap, folder, database, camera, len(pictures), progress))
         sparse = temporary / "sparse" / "0"
         sparse.mkdir(parents=True)
         model.write_text(str(sparse))
@@ -178,11 +171,16 @@ def calibrate(
         (temporary / PROJECT).write_text(f"image_path = {beside}\n", "utf-8")
         shutil.rmtree(work)
     placed = {image.name for image in model.images.values() if image.has_pose}
-    notes, unusable = _checked(output)
+    notes: tuple[str, ...] = ()
+    unusable = None
+    try:
+        notes = rectification_of(read_model(output)).notes
+    except SepiError as error:
+        unusable = str(error)
     return Calibration(
         output,
-        tuple(path.name for path in pictures if path.name in placed),
-        tuple(path.name for path in pictures if path.name not in placed),
+        tuple(name for name in names if name in placed),
+        tuple(name for name in names if name not in placed),
         float(model.compute_mean_reprojection_error()),
         notes,
         unusable,
@@ -206,12 +204,9 @@ def pictures_in(folder: Path) -> list[Path]:
     odd = next((path for path in found if not path.name.isprintable() or re.search(r"\s", path.name)), None)
     if odd is not None:
         raise SepiError(f"{odd}: the name has spaces, which COLMAP's files cannot hold; expected a name without them")
-    return sorted(found, key=lambda path: [int(part) if part.isdigit() else part for part in _parts(path.name)])
-
-
-def _parts(name: str) -> list[str]:
     # words and numbers by turns, beginning with a word
-    return re.split(r"([0-9]+)", name)
+    parts = {path: re.split(r"([0-9]+)", path.name) for path in found}
+    return sorted(found, key=lambda path: [int(part) if part.isdigit() else part for part in parts[path]])
 
 
 def pairs_of(names: Sequence[str]) -> list[tuple[str, str]]:
@@ -223,13 +218,12 @@ def pairs_of(names: Sequence[str]) -> list[tuple[str, str]]:
 
 def _placed(pycolmap: Any, folder: Path, database: Path, camera: Any, count: int, progress: Progress) -> Any:
     """The model with most pictures, with the lenses of the database."""
-    best: Any = None
+    models: list[Any] = []
     for attempt, angle in enumerate(_FIRST_ANGLES):
-        model = _mapped(pycolmap, folder, database, camera, angle, count, progress)
-        if model is not None and (best is None or model.num_reg_images() > best.num_reg_images()):
-            best = model
+        models += _mapped(pycolmap, folder, database, camera, angle, count, progress)
+        best = max(models, key=lambda model: model.num_reg_images(), default=None)
         if best is not None and best.num_reg_images() >= _ENOUGH * count:
-            break
+            return best
         progress(_MATCHED + (1 - _MATCHED) * attempt / len(_FIRST_ANGLES))
     if best is None:
         raise SepiError(
@@ -241,9 +235,9 @@ def _placed(pycolmap: Any, folder: Path, database: Path, camera: Any, count: int
 
 def _mapped(
     pycolmap: Any, folder: Path, database: Path, camera: Any, angle: float, count: int, progress: Progress
-) -> Any:
-    """The largest model whose first two pictures see points at a least angle in degrees; None without one."""
-    size = tolerance(camera.width, camera.height)
+) -> list[Any]:
+    """Models whose first two pictures see points at a least angle in degrees."""
+    size = tolerance(camera)
     least = min(_MOST_ANGLE, float(np.degrees(_POINT_ANGLE * size / camera.mean_focal_length())))
     options = pycolmap.IncrementalPipelineOptions()
     # on one thread, sums are the same in each run
@@ -272,7 +266,7 @@ def _mapped(
     made = database.parent / "models"
     made.mkdir(exist_ok=True)
     found = pycolmap.incremental_mapping(str(database), str(folder), str(made), options, next_image_callback=one_more)
-    return max(found.values(), key=lambda model: model.num_reg_images(), default=None)
+    return list(found.values())
 
 
 def _with_free_lens(pycolmap: Any, model: Any) -> Any:
@@ -290,11 +284,3 @@ def _with_free_lens(pycolmap: Any, model: Any) -> Any:
     model.update_point_3d_errors()
     closer = freed.compute_mean_reprojection_error() < (1 - _CLEARLY) * model.compute_mean_reprojection_error()
     return freed if closer else model
-
-
-def _checked(output: Path) -> tuple[tuple[str, ...], str | None]:
-    """Notes on the cameras as :func:`sepi.read_cameras` gives them, and its error if any."""
-    try:
-        return rectification_of(read_model(output)).notes, None
-    except SepiError as error:
-        return (), str(error)

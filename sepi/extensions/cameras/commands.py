@@ -88,7 +88,10 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
 )
 @click.option("-o", "--output", type=_PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
 @click.option(
-    "--min-confidence", type=float, metavar="X", help="Least confidence of points; default: the median of all pixels."
+    "--min-confidence",
+    type=click.FloatRange(0, 1),
+    metavar="X",
+    help="Least confidence of points; default: the median of all pixels.",
 )
 @click.option(
     "--points", type=click.IntRange(min=0), default=10000, show_default=True, metavar="N", help="At most N points."
@@ -145,4 +148,4 @@ def poses(
             "positions and depth are neither in metres nor to scale"
         )
     units = posed.units.partition(",")[0]
-    click.echo(f"written: {folder}/ ({len(posed.poses)} views, {posed.chosen.sum()} points, {units})")
+    click.echo(f"written: {folder}/ ({len(posed.positions)} views, {posed.chosen.sum()} points, {units})")

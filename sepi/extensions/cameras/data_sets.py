@@ -50,8 +50,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
-from sepi.camera.rig import WORLD
+from sepi.camera.rig import WORLD, Rig
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.images import write_png
 from sepi.io.point_cloud import PointCloud, write_ply
@@ -59,8 +60,7 @@ from sepi.lightfield import FloatMap
 from sepi.stage import Progress, no_progress
 
 if TYPE_CHECKING:
-    from sepi.extensions.cameras.posed_views import Points, PosedViews
-
+    from sepi.extensions.cameras.posed_views import PosedViews
 
 Flags = npt.NDArray[np.bool_]
 """Which of the views sees which of the points, (N, P)."""
@@ -87,19 +87,20 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
     SepiError
         If the folder exists and is not empty, or cannot be written.
     """
+    missing = posed.light_field.missing
     with atomic_folder(Path(folder)) as temporary:
-        sees = np.zeros((len(posed.poses), int(posed.chosen.sum())), bool)
+        sees = np.zeros((len(posed.positions), int(posed.chosen.sum())), bool)
         for view, name in enumerate(posed.names):
             carried = posed.carried(view)
             sees[view] = posed.sees(view, carried)
             write_png(temporary / "images" / f"{name}.png", posed.picture(view))
-            if posed.incomplete:
+            if missing is not None:
                 # the names that ``--ImageReader.mask_path`` and ``--StereoFusion.mask_path`` look for
-                write_png(temporary / "masks" / f"{name}.png.png", posed.shown(view))
+                write_png(temporary / "masks" / f"{name}.png.png", ~missing[posed.positions[view]])
             stereo = f"{name}.png.geometric.bin"
             _write_maps(temporary / "stereo/depth_maps" / stereo, posed.depth(carried)[None])
             _write_maps(temporary / "stereo/normal_maps" / stereo, posed.normals(view, carried))
-            progress((view + 1) / len(posed.poses))
+            progress((view + 1) / len(posed.positions))
         for name, lines in {
             "sparse/0/cameras.txt": _cameras(posed),
             "sparse/0/images.txt": _images(posed, sees),
@@ -120,20 +121,18 @@ def _write_maps(path: Path, maps: FloatMap) -> None:
 
 
 def _cameras(posed: PosedViews) -> Iterator[str]:
-    height, width = posed.poses.shape
-    focal = posed.poses.focal_px
+    (height, width), focal = posed.light_field.shape, posed.camera.focal_px
     yield "# Camera list with one line of data per camera:"
     yield _CAMERAS
-    for number, (x, y) in enumerate(posed.poses.from_corner.tolist(), 1):
+    for number, (x, y) in enumerate((posed.principal_points + 0.5).tolist(), 1):
         yield f"{number} PINHOLE {width} {height} {focal!r} {focal!r} {x!r} {y!r}"
 
 
 def _images(posed: PosedViews, sees: Flags) -> Iterator[str]:
-    numbers = np.arange(1, sees.shape[1] + 1)
-    points = posed.points
-    # without rotation the translation is the negative camera centre
-    places = posed.poses.centres if posed.rig is None else posed.in_world(posed.poses.centres) @ posed.rotation.T
-    turn = "1 0 0 0" if posed.rig is None else _quaternion(posed.rotation)
+    turn, places = "1 0 0 0", posed.centres
+    if posed.rig is not None:
+        x, y, z, w = Rotation.from_matrix(posed.rig.rotation).as_quat(canonical=True).tolist()
+        turn, places = f"{w!r} {x!r} {y!r} {z!r}", posed.rig.to_world(places) @ posed.rig.rotation.T
     yield "# Image list with two lines of data per image:"
     yield _IMAGES
     yield f"# units: {posed.units}"
@@ -141,18 +140,9 @@ def _images(posed: PosedViews, sees: Flags) -> Iterator[str]:
         # adding zero makes -0 a 0
         x, y, z = (0.0 - places[view]).tolist()
         yield f"{view + 1} {turn} {x!r} {y!r} {z!r} {view + 1} {name}.png"
-        there = posed.poses.project(points[sees[view]], view) + 0.5
-        yield " ".join(
-            f"{column!r} {row!r} {number}"
-            for (row, column), number in zip(there.tolist(), numbers[sees[view]].tolist(), strict=True)
-        )
-
-
-def _quaternion(rotation: Points) -> str:
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = Rotation.from_matrix(rotation).as_quat(canonical=True).tolist()
-    return f"{w!r} {x!r} {y!r} {z!r}"
+        numbers = np.flatnonzero(sees[view])
+        there = posed.project(posed.points[numbers], view) + 0.5
+        yield " ".join(f"{x!r} {y!r} {n + 1}" for (x, y), n in zip(there.tolist(), numbers.tolist(), strict=True))
 
 
 def _points(posed: PosedViews, sees: Flags) -> Iterator[str]:
@@ -160,12 +150,10 @@ def _points(posed: PosedViews, sees: Flags) -> Iterator[str]:
     places = np.cumsum(sees, axis=1) - 1
     yield "# 3D point list with one line of data per point:"
     yield _POINTS
-    errors = posed.pixel_errors(sees).tolist()
-    for point, ((x, y, z), (r, g, b), error) in enumerate(
-        zip(posed.in_world(posed.points).tolist(), posed.colours.tolist(), errors, strict=True)
-    ):
-        views = np.flatnonzero(sees[:, point])
-        track = " ".join(f"{view + 1} {places[view, point]}" for view in views.tolist())
+    world = posed.points if posed.rig is None else posed.rig.to_world(posed.points)
+    told = world.tolist(), posed.colours.tolist(), posed.pixel_errors(sees).tolist()
+    for point, ((x, y, z), (r, g, b), error) in enumerate(zip(*told, strict=True)):
+        track = " ".join(f"{view + 1} {places[view, point]}" for view in np.flatnonzero(sees[:, point]).tolist())
         yield f"{point + 1} {x!r} {y!r} {z!r} {r} {g} {b} {error:.6g} {track}"
 
 
@@ -191,6 +179,7 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
     SepiError
         If the folder exists and is not empty, or cannot be written.
     """
+    missing = posed.light_field.missing
     with atomic_folder(Path(folder)) as temporary:
         for view, name in enumerate(posed.names):
             carried = posed.carried(view)
@@ -198,15 +187,17 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
             if posed.sure:
                 _write_millimetres(temporary / "depth_sigmas" / f"{name}.npy", posed.depth_sigma(view, carried))
             write_png(temporary / "images" / f"{name}.png", posed.picture(view))
-            if posed.incomplete:
-                write_png(temporary / "masks" / f"{name}.png", posed.shown(view))
-            progress((view + 1) / len(posed.poses))
+            if missing is not None:
+                write_png(temporary / "masks" / f"{name}.png", ~missing[posed.positions[view]])
+            progress((view + 1) / len(posed.positions))
+        # without calibrated cameras, the world's axes are right, forward, up
+        rig = posed.rig or Rig(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.zeros(3), 1.0, posed.units, {})
         if posed.chosen.any():
-            cloud = PointCloud(_world(posed, posed.points).astype(np.float32), posed.colours, metric=True)
+            cloud = PointCloud(rig.to_world(posed.points).astype(np.float32), posed.colours, metric=True)
             axes = _AXES, f"{posed.units}; origin: camera of the reference view"
             write_ply(temporary / _CLOUD, cloud, axes if posed.rig is None else (WORLD, posed.units))
         with atomic_path(temporary / "transforms.json") as path:
-            path.write_text(json.dumps(_transforms(posed), indent=1) + "\n", encoding="ascii")
+            path.write_text(json.dumps(_transforms(posed, rig), indent=1) + "\n", encoding="ascii")
 
 
 def _write_millimetres(path: Path, metres: FloatMap) -> None:
@@ -214,37 +205,22 @@ def _write_millimetres(path: Path, metres: FloatMap) -> None:
         np.save(file, (metres * np.float32(_MILLIMETRES)).astype("<f4"), allow_pickle=False)
 
 
-def _transforms(posed: PosedViews) -> dict[str, Any]:
-    height, width = posed.poses.shape
-    focal = posed.poses.focal_px
-    frames = [
-        {
-            "file_path": f"images/{name}.png",
-            "depth_file_path": f"depths/{name}.npy",
-            # nerfstudio wants it for all views or for none
-            **({"depth_sigma_file_path": f"depth_sigmas/{name}.npy"} if posed.sure else {}),
-            **({"mask_path": f"masks/{name}.png"} if posed.incomplete else {}),
-            **dict(zip(("w", "h", "fl_x", "fl_y", "cx", "cy"), (width, height, focal, focal, x, y), strict=True)),
-            "transform_matrix": _camera_to_world(posed, centre),
-        }
-        for name, (x, y), centre in zip(
-            posed.names, posed.poses.from_corner.tolist(), _world(posed, posed.poses.centres).tolist(), strict=True
-        )
-    ]
+def _transforms(posed: PosedViews, rig: Rig) -> dict[str, Any]:
+    (height, width), focal = posed.light_field.shape, posed.camera.focal_px
+    # the camera's right, up and back in the world; adding zero makes -0 a 0
+    axes = (rig.rotation * [[1], [-1], [-1]]).T + 0.0
+    frames = []
+    for name, (x, y), centre in zip(
+        posed.names, posed.principal_points + 0.5, rig.to_world(posed.centres), strict=True
+    ):
+        frame: dict[str, Any] = {"file_path": f"images/{name}.png", "depth_file_path": f"depths/{name}.npy"}
+        # nerfstudio wants it for all views or for none
+        if posed.sure:
+            frame["depth_sigma_file_path"] = f"depth_sigmas/{name}.npy"
+        if posed.light_field.missing is not None:
+            frame["mask_path"] = f"masks/{name}.png"
+        frame |= {"w": width, "h": height, "fl_x": focal, "fl_y": focal, "cx": float(x), "cy": float(y)}
+        frame["transform_matrix"] = [*np.column_stack([axes, centre]).tolist(), [0.0, 0.0, 0.0, 1.0]]
+        frames.append(frame)
     cloud = {"ply_file_path": _CLOUD} if posed.chosen.any() else {}
     return {"camera_model": "OPENCV", "units": posed.units, **cloud, "frames": frames}
-
-
-def _world(posed: PosedViews, points: Points) -> Points:
-    """Points from the reference view's axes to those of the world: the calibrated cameras', or right, forward, up."""
-    if posed.rig is not None:
-        return posed.in_world(points)
-    return np.column_stack([points[:, 0], points[:, 2], 0.0 - points[:, 1]])
-
-
-def _camera_to_world(posed: PosedViews, centre: list[float]) -> list[list[float]]:
-    """Camera-to-world matrix; columns: the camera's right, up and back in the world, and its centre."""
-    axes = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
-    if posed.rig is not None:
-        axes = (posed.rotation * [[1], [-1], [-1]]).T.tolist()
-    return [*([*axis, place] for axis, place in zip(axes, centre, strict=True)), [0.0, 0.0, 0.0, 1.0]]

@@ -15,7 +15,7 @@ import json
 import math
 import signal
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import prod
 from pathlib import Path, PureWindowsPath
@@ -26,10 +26,11 @@ import yaml
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
-from sepi.camera.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Lens, Shot
+from sepi.camera.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Shot
 from sepi.errors import SepiError
 from sepi.extensions.cameras.model import UNITS_OF_MODEL, CameraModel, Picture, Pictures, mask_of
 from sepi.io.files import naming, reading
+from sepi.io.point_cloud import read_positions
 from sepi.validation import require_known
 from sepi.validation.models import AS_PAIR, CheckedModel, validated
 
@@ -41,30 +42,27 @@ _NEARLY = 1e-2
 # numbers may be text, since YAML reads 1e-4 as text
 _Number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=False)]
-_PLACE = ("x", "y", "z")
-_ROTATION = ("qw", "qx", "qy", "qz")
+_REQUIRED = ("file", "x", "y", "z", "fx")
+# key of a table, its columns in a CSV file, and how many of them must be given for the key to be given
+_PARTS = (
+    ("position", ("x", "y", "z"), 0),
+    ("rotation", ("qw", "qx", "qy", "qz"), 1),
+    ("focal", ("fx", "fy"), 0),
+    ("principal", ("cx", "cy"), 2),
+    ("size", ("w", "h"), 2),
+)
 _DISTORTION = {PINHOLE: ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"), FISHEYE: ("k1", "k2", "k3", "k4")}
-_COLUMNS = ("file", *_PLACE, *_ROTATION, "fx", "fy", "cx", "cy", "w", "h", "lens", *_DISTORTION[PINHOLE])
+_COLUMNS = ("file", *(name for _, names, _ in _PARTS for name in names), "lens", *_DISTORTION[PINHOLE])
 
-_LENSES = {"OPENCV": PINHOLE, "PINHOLE": PINHOLE, "SIMPLE_PINHOLE": PINHOLE, "OPENCV_FISHEYE": FISHEYE}
-"""Lens models of a ``transforms.json``."""
 # right, up, back to right, down, forward
 _TURN = np.diag([1.0, -1.0, -1.0])
 
-_COLMAP: dict[str, tuple[str, tuple[int, int, int, int], tuple[int, ...]]] = {
-    "SIMPLE_PINHOLE": (PINHOLE, (0, 0, 1, 2), ()),
-    "PINHOLE": (PINHOLE, (0, 1, 2, 3), ()),
-    "SIMPLE_RADIAL": (PINHOLE, (0, 0, 1, 2), (3,)),
-    "RADIAL": (PINHOLE, (0, 0, 1, 2), (3, 4)),
-    "OPENCV": (PINHOLE, (0, 1, 2, 3), (4, 5, 6, 7)),
-    "FULL_OPENCV": (PINHOLE, (0, 1, 2, 3), (4, 5, 6, 7, 8, 9, 10, 11)),
-    "OPENCV_FISHEYE": (FISHEYE, (0, 1, 2, 3), (4, 5, 6, 7)),
-    "SIMPLE_RADIAL_FISHEYE": (FISHEYE, (0, 0, 1, 2), (3,)),
-    "RADIAL_FISHEYE": (FISHEYE, (0, 0, 1, 2), (3, 4)),
+_LENSES = {
+    **dict.fromkeys(("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"), PINHOLE),
+    **dict.fromkeys(("OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE"), FISHEYE),
 }
-"""COLMAP's models: lens, and indices of its parameters: fx, fy, cx, cy, then OpenCV's coefficients."""
-LENS_MODELS = tuple(_COLMAP)
-"""COLMAP's names of the lens models that can be read."""
+LENS_MODELS = tuple(_LENSES)
+"""COLMAP's names of the lens models that can be read; their last parameters are OpenCV's first coefficients."""
 
 
 class _Camera(CheckedModel):
@@ -77,13 +75,11 @@ class _Camera(CheckedModel):
     lens: Literal["pinhole", "fisheye"] = "pinhole"
     distortion: list[_Number] = Field([], max_length=MOST_COEFFICIENTS[PINHOLE])
 
-    def shot(self, pictures: Pictures, file: Path) -> Shot:
+    def picture(self, pictures: Pictures) -> Picture:
+        file = pictures.find(self.file)
         focal = self.focal if isinstance(self.focal, tuple) else (self.focal, self.focal)
-        width, height = map(int, self.size or pictures.size(file))
-        principal = self.principal or ((width - 1) / 2, (height - 1) / 2)
-        lens = Lens(width, height, focal, principal, self.lens, tuple(self.distortion))
-        fitted = pictures.fitted(file, lens, self.size)
-        return Shot(self.file, fitted, rotation_of(self.rotation), np.array(self.position))
+        lens = pictures.lens(file, self.size, focal, self.principal, self.lens, self.distortion)
+        return Picture(Shot(self.file, lens, rotation_of(self.rotation), np.array(self.position)), file)
 
 
 class _Table(CheckedModel):
@@ -114,9 +110,9 @@ def read_table(path: Path, pictures: Pictures) -> CameraModel:
     entries = [{**table.shared, **entry} for entry in table.cameras]
     cameras = [validated(_Camera, entry, f"{path}: camera {n}") for n, entry in enumerate(entries, 1)]
     found = []
-    for camera, file in [(camera, pictures.find(camera.file)) for camera in cameras]:
+    for camera in cameras:
         with naming(f"{path}: {camera.file}"):
-            found.append(Picture(camera.shot(pictures, file), file))
+            found.append(camera.picture(pictures))
     return CameraModel(path, tuple(found), units=METRES if table.units == "metres" else UNITS_OF_MODEL)
 
 
@@ -127,29 +123,22 @@ def _rows(text: str) -> list[dict[str, Any]]:
     rows = csv.DictReader(lines, delimiter=separator, skipinitialspace=True)
     rows.fieldnames = [name.strip() for name in rows.fieldnames or ()]
     require_known("columns", rows.fieldnames, _COLUMNS)
-    for name in ("file", *_PLACE, "fx"):
+    for name in _REQUIRED:
         if name not in rows.fieldnames:
             raise SepiError(f"no column '{name}'; expected {', '.join(_COLUMNS)}; columns from qw on are optional")
-    return [_entry(row) for row in rows]
+    return [_entry({name: (row.get(name) or "").strip() for name in _COLUMNS}) for row in rows]
 
 
-def _entry(row: Mapping[str, Any]) -> dict[str, Any]:
-    def numbers(*names: str, least: int = 1) -> list[str] | None:
-        told = [str(row.get(name) or "").strip().replace(",", ".") for name in names]
-        return [value or "0" for value in told] if sum(map(bool, told)) >= least else None
-
-    lens = (row.get("lens") or PINHOLE).strip()
-    entry = {
-        "file": (row["file"] or "").strip(),
-        "position": numbers(*_PLACE, least=0),
-        "rotation": numbers(*_ROTATION),
-        "focal": numbers("fx", "fy" if (row.get("fy") or "").strip() else "fx", least=0),
-        "principal": numbers("cx", "cy", least=2),
-        "size": numbers("w", "h", least=2),
-        "lens": lens,
-        "distortion": numbers(*_DISTORTION.get(lens, _DISTORTION[PINHOLE]), least=0),
-    }
-    return {key: value for key, value in entry.items() if value is not None}
+def _entry(row: dict[str, str]) -> dict[str, Any]:
+    """The entry of a table that a row of a CSV file means; empty columns are 0, or nothing."""
+    row["fy"] = row["fy"] or row["fx"]
+    lens = row["lens"] or PINHOLE
+    entry: dict[str, Any] = {"file": row["file"], "lens": lens}
+    for key, names, least in (*_PARTS, ("distortion", _DISTORTION.get(lens, ()), 0)):
+        numbers = [row[name].replace(",", ".") for name in names]
+        if sum(map(bool, numbers)) >= least:
+            entry[key] = [number or "0" for number in numbers]
+    return entry
 
 
 def rotation_of(told: Any) -> Floats:
@@ -181,40 +170,39 @@ def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
     frames = told.get("frames") if isinstance(told, dict) else None
     if not isinstance(frames, list) or not frames or not all(isinstance(frame, dict) for frame in frames):
         raise SepiError(f"{path}: no cameras; expected a list 'frames'")
-    # nerfstudio's own rotation and scale of the world
     found = []
     for n, frame in enumerate(frames, 1):
         entry = {**told, **frame}
-        name, mask = entry.get("file_path"), entry.get("mask_path")
+        name = entry.get("file_path")
         if not isinstance(name, str) or not name:
             raise SepiError(f"{path}: frame {n}: no file_path")
-        name = name.removeprefix("./")
-        file = _found(pictures, name)
-        covered = _found(pictures, mask) if isinstance(mask, str) and mask else None
         with naming(f"{path}: {name}"):
-            found.append(Picture(_shot_of_frame(name, entry, pictures, file), file, covered))
+            found.append(_picture_of_frame(name.removeprefix("./"), entry, pictures))
     units = METRES if told.get("units") == METRES else UNITS_OF_MODEL
-    return CameraModel(path, tuple(found), _points(path, told), units)
+    # nerfstudio's points
+    cloud = told.get("ply_file_path")
+    inside = isinstance(cloud, str) and not Path(cloud).is_absolute() and ".." not in Path(cloud).parts
+    if not inside or not (path.parent / cloud).is_file():
+        return CameraModel(path, tuple(found), units=units)
+    return CameraModel(path, tuple(found), read_positions(path.parent / cloud), units)
 
 
-def _found(pictures: Pictures, name: str) -> Path:
-    # paths may contain the folder of pictures, which may lie elsewhere; NeRF's files leave out the ending
-    return pictures.find(name, PureWindowsPath(name).name, f"{name}.png")
-
-
-def _shot_of_frame(name: str, entry: Mapping[str, Any], pictures: Pictures, file: Path) -> Shot:
-    word = str(entry.get("camera_model", "OPENCV"))
-    if word not in _LENSES:
-        raise SepiError(f"camera_model '{word[:40]}'; expected one of {', '.join(_LENSES)}")
-    kind = _LENSES[word]
-
-    def number(key: str, other: float | None = None) -> float:
-        value = entry.get(key, other)
+def _picture_of_frame(name: str, entry: Mapping[str, Any], pictures: Pictures) -> Picture:
+    def number(key: str, other: Any = None, shapes: Sequence[tuple[int, ...]] = ((),)) -> Any:
+        told = entry.get(key, other)
         with suppress(TypeError, ValueError, OverflowError):
-            if not isinstance(value, bool) and math.isfinite(found := float(value)):
-                return found
-        raise SepiError(f"expected a number as {key}, got {str(value)[:40]}")
+            value = np.array(told, np.float64)
+            if not isinstance(told, bool) and value.shape in shapes and np.isfinite(value).all():
+                return value.tolist()
+        expected = "a number" if () in shapes else "4 rows of 4 numbers"
+        raise SepiError(f"expected {expected} as {key}, got {str(told)[:40]}")
 
+    def file_of(path: str) -> Path:
+        # paths may contain the folder of pictures, which may lie elsewhere; NeRF's files leave out the ending
+        return pictures.find(path, PureWindowsPath(path).name, f"{path}.png")
+
+    file, mask = file_of(name), entry.get("mask_path")
+    kind = _lens_kind(str(entry.get("camera_model", "OPENCV")))
     size = (number("w"), number("h")) if {"w", "h"} <= entry.keys() else None
     width, height = size or pictures.size(file)
     if "fl_x" not in entry and "camera_angle_x" in entry:
@@ -223,26 +211,17 @@ def _shot_of_frame(name: str, entry: Mapping[str, Any], pictures: Pictures, file
         focal_x = number("fl_x")
     # counted from the picture's corner, not from the middle of the first pixel
     principal = number("cx", width / 2) - 0.5, number("cy", height / 2) - 0.5
-    coefficients = tuple(number(key, 0.0) for key in _DISTORTION[kind][:6])
-    try:
-        matrix = np.array(entry.get("transform_matrix"), np.float64)
-    except (ValueError, TypeError):
-        matrix = np.zeros(0)
-    if matrix.shape not in ((4, 4), (3, 4)) or not np.isfinite(matrix).all():
-        raise SepiError("expected 4 rows of 4 numbers as transform_matrix")
-    lens = Lens(int(width), int(height), (focal_x, number("fl_y", focal_x)), principal, kind, coefficients)
-    return Shot(name, pictures.fitted(file, lens, size), rotation_of((matrix[:3, :3] @ _TURN).T), matrix[:3, 3].copy())
+    distortion = [number(key, 0.0) for key in _DISTORTION[kind][:6]]
+    lens = pictures.lens(file, size, (focal_x, number("fl_y", focal_x)), principal, kind, distortion)
+    matrix = np.array(number("transform_matrix", shapes=((4, 4), (3, 4))))
+    shot = Shot(name, lens, rotation_of((matrix[:3, :3] @ _TURN).T), matrix[:3, 3].copy())
+    return Picture(shot, file, file_of(mask) if isinstance(mask, str) and mask else None)
 
 
-def _points(path: Path, told: Mapping[str, Any]) -> Floats:
-    """Points of the PLY file that it names, if they can be read."""
-    name = told.get("ply_file_path")
-    if not isinstance(name, str) or Path(name).is_absolute() or ".." in Path(name).parts:
-        return np.zeros((0, 3))
-    from sepi.io.point_cloud import read_positions
-
-    file = path.parent / name
-    return read_positions(file) if file.is_file() else np.zeros((0, 3))
+def _lens_kind(model: str) -> str:
+    if model not in _LENSES:
+        raise SepiError(f"camera model {model[:40]}; expected one of {', '.join(_LENSES)}")
+    return _LENSES[model]
 
 
 def read_colmap(path: Path, pictures: Pictures) -> CameraModel:
@@ -266,11 +245,21 @@ def read_colmap(path: Path, pictures: Pictures) -> CameraModel:
     points = np.array([point.xyz for point in model.points3D.values()], np.float64).reshape(-1, 3)
     found = []
     for image in images:
-        file = pictures.find(image.name)
         with naming(f"{path}: {image.name}"):
-            shot = _shot_of_image(pictures, file, image, model.cameras[image.camera_id])
-        found.append(Picture(shot, file, mask_of(file, image.name)))
+            found.append(_picture_of_image(image, model.cameras[image.camera_id], pictures))
     return CameraModel(path, tuple(found), points)
+
+
+def _picture_of_image(image: Any, camera: Any, pictures: Pictures) -> Picture:
+    file, kind, pose = pictures.find(image.name), _lens_kind(camera.model.name), image.cam_from_world()
+    focal = camera.focal_length_x, camera.focal_length_y
+    # COLMAP counts from the picture's corner, a lens from the middle of the first pixel
+    principal = camera.principal_point_x - 0.5, camera.principal_point_y - 0.5
+    distortion = [float(camera.params[place]) for place in camera.extra_params_idxs()]
+    lens = pictures.lens(file, (camera.width, camera.height), focal, principal, kind, distortion)
+    rotation = np.array(pose.rotation.matrix(), np.float64)
+    shot = Shot(image.name, lens, rotation, -rotation.T @ np.array(pose.translation, np.float64))
+    return Picture(shot, file, mask_of(file, image.name))
 
 
 def require_pycolmap(where: str) -> Any:
@@ -289,18 +278,3 @@ def require_pycolmap(where: str) -> Any:
     # it logs everything to standard error
     pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL  # type: ignore[assignment]
     return pycolmap
-
-
-def _shot_of_image(pictures: Pictures, file: Path, image: Any, camera: Any) -> Shot:
-    word = camera.model.name
-    if word not in _COLMAP:
-        raise SepiError(f"camera model {word}; expected one of {', '.join(_COLMAP)}")
-    kind, (fx, fy, cx, cy), places = _COLMAP[word]
-    values = [float(value) for value in camera.params]
-    # COLMAP counts from the picture's corner, a lens from the middle of the first pixel
-    principal = values[cx] - 0.5, values[cy] - 0.5
-    size, distortion = (camera.width, camera.height), tuple(values[place] for place in places)
-    lens = pictures.fitted(file, Lens(*size, (values[fx], values[fy]), principal, kind, distortion), size)
-    pose = image.cam_from_world()
-    rotation = np.array(pose.rotation.matrix(), np.float64)
-    return Shot(image.name, lens, rotation, -rotation.T @ np.array(pose.translation, np.float64))

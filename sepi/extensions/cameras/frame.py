@@ -6,7 +6,8 @@ show are marked as missing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -31,25 +32,18 @@ _MOST_LARGER = 16.0
 _LEAST_PART = 0.1
 
 
-@dataclass(frozen=True)
-class Frame:
+class Frame(NamedTuple):
     """Pixels of the rectified views.
 
     Attributes
     ----------
-    focal : float
-        Focal length, pixels.
     principal : (float, float)
         Principal point ``(x, y)`` of the reference view in the frame.
-    offset : float
-        Shift of a view's principal point to the right for each view step to the right, pixels: the views' shear.
     shape : (int, int)
         Height and width.
     """
 
-    focal: float
     principal: tuple[float, float]
-    offset: float
     shape: tuple[int, int]
 
     @property
@@ -60,23 +54,43 @@ class Frame:
 
 
 class Seeing:
-    """Positions of rectified views' pixels in the original pictures."""
+    """Positions of rectified views' pixels in the original pictures.
+
+    Attributes
+    ----------
+    model : CameraModel
+    plane : Plane
+    zoom : ndarray, shape (N,), float64
+        Focal length of each view as a multiple of ``focal``.
+    focal : float
+        Focal length of the reference view, pixels.
+    principal : (float, float)
+        Principal point ``(x, y)`` of the reference's original picture.
+    offset : float
+        Shift of a view's principal point to the right for each view step to the right, pixels: the shear that aligns
+        the middles of the pictures, by least squares.
+    """
 
     def __init__(self, model: CameraModel, plane: Plane, zoom: Floats) -> None:
         self.model, self.plane, self.zoom = model, plane, zoom
         self.focal = float(np.median([sum(shot.lens.focal) / 2 for shot in model.shots]))
         self.principal = model.shots[plane.reference].lens.principal
-        self.offset = self._offset()
-
-    def rays(self, view: int, pixels: Floats) -> Floats:
-        """Rays (N, 3), in the axes of the plane, of pixels ``(x, y)`` in the reference's original picture."""
-        shifted = pixels - self.principal - self.offset * self.plane.baselines[view, ::-1]
-        return np.column_stack([shifted / (self.focal * self.zoom[view]), np.ones(len(pixels))])
+        middles = [
+            self._from_picture(n, np.array([[(shot.lens.width - 1) / 2, (shot.lens.height - 1) / 2]]))[0]
+            for n, shot in enumerate(model.shots)
+        ]
+        at = plane.baselines[:, ::-1]
+        apart = at - at.mean(axis=0)
+        self.offset = -float((apart * np.array(middles)).sum() / (apart**2).sum())
 
     def pixels(self, view: int, pixels: Floats) -> Floats:
-        """Positions ``(x, y)`` of these pixels in the view's original picture, (N, 2); NaN outside."""
+        """Positions ``(x, y)`` in the view's original picture, (N, 2), of pixels ``(x, y)`` in the reference's original
+        picture; NaN outside.
+        """
         shot = self.model.shots[view]
-        seen = shot.lens.project(self.rays(view, pixels) @ (shot.rotation @ self.plane.rotation.T).T)
+        shifted = pixels - self.principal - self.offset * self.plane.baselines[view, ::-1]
+        rays = np.column_stack([shifted / (self.focal * self.zoom[view]), np.ones(len(pixels))])
+        seen = shot.lens.project(rays @ (shot.rotation @ self.plane.rotation.T).T)
         size = np.array([shot.lens.width, shot.lens.height])
         with np.errstate(invalid="ignore"):
             inside = ((seen >= -_OUTSIDE) & (seen <= size - 1 + _OUTSIDE)).all(axis=1)
@@ -91,16 +105,6 @@ class Seeing:
         shot = self.model.shots[view]
         rays = shot.lens.rays(pixels) @ (shot.rotation @ self.plane.rotation.T)
         return self.focal * rays[:, :2] / np.maximum(rays[:, 2:], 1e-3)
-
-    def _offset(self) -> float:
-        """The shear that aligns the middles of the pictures, by least squares."""
-        middles = []
-        for n, shot in enumerate(self.model.shots):
-            middle = np.array([[(shot.lens.width - 1) / 2, (shot.lens.height - 1) / 2]])
-            middles.append(self._from_picture(n, middle)[0])
-        at = self.plane.baselines[:, ::-1]
-        apart = at - at.mean(axis=0)
-        return -float((apart * np.array(middles)).sum() / (apart**2).sum())
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Least and largest pixel ``(x, y)`` of the reference's original picture."""
@@ -130,12 +134,11 @@ def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
     stride = max(1.0, float((high - low).max()) / _LATTICE)
     counts = np.maximum(2, np.ceil((high - low) / stride).astype(int) + 1)
     across, down = (np.round(np.linspace(low[n], high[n], counts[n])) for n in (0, 1))
-    lattice = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2).astype(np.float64)
+    lattice = _lattice(across, down)
     part = largest_rectangle(seeing.has(own, lattice).reshape(len(down), len(across)))
     if part is not None:
-        top, bottom, left, right = part
-        box = _grown(seeing, (down[top], down[bottom], across[left], across[right]), stride)
-        height, width = int(box[1] - box[0]) + 1, int(box[3] - box[2]) + 1
+        box = _grown(seeing, [*down[list(part[:2])], *across[list(part[2:])]], stride)
+        height, width = (int(end - begin) + 1 for begin, end in (box[:2], box[2:]))
         within = lattice[((lattice >= (box[2], box[0])) & (lattice <= (box[3], box[1]))).all(axis=1)]
         kept = [n for n in range(number) if n == own or seeing.has(n, within).mean() >= _LEAST_SHOWN]
         if (
@@ -143,12 +146,16 @@ def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
             and min(height / reference.lens.height, width / reference.lens.width) >= _LEAST_PART
             and min(height, width) >= MIN_SIZE
         ):
-            principal = seeing.principal[0] - box[2], seeing.principal[1] - box[0]
-            return Frame(seeing.focal, principal, seeing.offset, (height, width)), kept
+            return Frame((seeing.principal[0] - box[2], seeing.principal[1] - box[0]), (height, width)), kept
     raise SepiError(
         f"{seeing.model.path}: the cameras share hardly anything of the picture of {reference.name}; they look in too "
         "different directions, or stand too far apart"
     )
+
+
+def _lattice(across: npt.NDArray[Any], down: npt.NDArray[Any]) -> Floats:
+    """Points ``(x, y)`` of a lattice, row by row, (N, 2)."""
+    return np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2).astype(np.float64)
 
 
 def largest_rectangle(inside: npt.NDArray[np.bool_]) -> tuple[int, int, int, int] | None:
@@ -168,38 +175,29 @@ def largest_rectangle(inside: npt.NDArray[np.bool_]) -> tuple[int, int, int, int
     return best
 
 
-def _grown(seeing: Seeing, box: tuple[float, float, float, float], stride: float) -> tuple[float, float, float, float]:
-    """A box ``(top, bottom, left, right)`` grown or shrunk at its sides to the pixels that the reference view has."""
+def _grown(seeing: Seeing, box: list[float], stride: float) -> list[float]:
+    """A box ``[top, bottom, left, right]`` grown or shrunk at its sides to the pixels that the reference view has."""
 
-    def line(side: int, now: list[float]) -> Floats:
-        at = now[side]
-        if side < 2:
-            along = np.arange(now[2], now[3] + 1)
-            return np.column_stack([along, np.full(len(along), at)])
-        along = np.arange(now[0], now[1] + 1)
-        return np.column_stack([np.full(len(along), at), along])
+    def seen(side: int, box: list[float]) -> bool:
+        down, across = np.arange(box[0], box[1] + 1), np.arange(box[2], box[3] + 1)
+        at = np.array([box[side]])
+        line = _lattice(across, at) if side < 2 else _lattice(at, down)
+        return bool(seeing.has(seeing.plane.reference, line).all())
 
-    def seen(side: int, now: list[float]) -> bool:
-        return bool(seeing.has(seeing.plane.reference, line(side, now)).all())
+    def moved(box: list[float], sides: Iterable[int], outward: int) -> list[float]:
+        return [at + (outward * (-1, 1, -1, 1)[side] if side in sides else 0) for side, at in enumerate(box)]
 
-    now, outward = list(box), (-1, 1, -1, 1)
     # for a side that bulges between the samples
     for _ in range(int(2 * stride) + 2):
-        short = [side for side in range(4) if not seen(side, now)]
-        if not short:
-            break
-        for side in short:
-            now[side] -= outward[side]
-    growing = set(range(4))
+        box = moved(box, [side for side in range(4) if not seen(side, box)], -1)
+    growing = [0, 1, 2, 3]
     for _ in range(int(stride) + 1):
-        for side in sorted(growing):
-            tried = list(now)
-            tried[side] += outward[side]
-            if seen(side, tried):
-                now = tried
+        for side in list(growing):
+            if seen(side, tried := moved(box, [side], 1)):
+                box = tried
             else:
-                growing.discard(side)
-    return now[0], now[1], now[2], now[3]
+                growing.remove(side)
+    return box
 
 
 # order of the splines: the third blurs more, which costs accuracy at silhouettes
@@ -218,10 +216,7 @@ def rectified_view(seeing: Seeing, frame: Frame, view: int) -> tuple[FloatMap, B
     height, width = frame.shape
     # the frame's first pixel in the reference's original picture
     first = np.subtract(seeing.principal, frame.principal)
-    pixels = (
-        np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2).astype(np.float64) + first
-    )
-    at = seeing.pixels(view, pixels)[:, ::-1].T
+    at = seeing.pixels(view, _lattice(np.arange(width), np.arange(height)) + first)[:, ::-1].T
     absent = np.isnan(at[0])
     at = np.where(absent, 0, at)
     picture, unusable = as_unit_float(read_picture(seeing.model.pictures[view].file)), _masked(seeing, view)

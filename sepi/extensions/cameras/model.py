@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
@@ -117,12 +116,12 @@ class CameraModel:
         names = [shot.name for shot in self.shots]
         centres, axes = self.centres, self.axes
         extent = float(np.linalg.norm(np.ptp(centres, axis=0)))
-        for one, other in combinations(range(len(names)), 2):
-            if np.linalg.norm(centres[one] - centres[other]) <= _SAME_PLACE * extent:
-                raise SepiError(
-                    f"{self.path}: {names[one]} and {names[other]} were taken from one position; leave one of them out "
-                    f"(--exclude {names[other]})"
-                )
+        apart = np.linalg.norm(centres[:, None] - centres, axis=2)
+        for one, other in np.argwhere(np.triu(apart <= _SAME_PLACE * extent, 1)).tolist():
+            raise SepiError(
+                f"{self.path}: {names[one]} and {names[other]} were taken from one position; leave one of them out "
+                f"(--exclude {names[other]})"
+            )
         turned = np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)))
         one, other = divmod(int(turned.argmax()), len(turned))
         if turned[one, other] > _MOST_TURNED:
@@ -185,41 +184,50 @@ class Pictures:
                 if (place / inside).is_file():
                     return place / inside
         if tried[0] not in within:
-            raise SepiError(f"{self._model}: picture '{tried[0]}': expected a path within the folder of pictures")
+            raise SepiError(f"picture '{tried[0]}': expected a path within the folder of pictures")
         where = " nor ".join(map(str, self._places[:3]))
-        raise SepiError(f"{self._model}: no picture '{names[0]}' in {where}; name the folder by --images")
+        raise SepiError(f"no picture '{names[0]}' in {where}; name the folder by --images")
 
     def size(self, file: Path) -> tuple[int, int]:
         """Width and height of a picture, or of the whole picture for a crop."""
         header = picture_header(file)
         return (header.width, header.height) if self._crop is None else self._crop[:2]
 
-    def fitted(self, file: Path, lens: Lens, size: tuple[float, float] | None) -> Lens:
+    def lens(
+        self,
+        file: Path,
+        size: tuple[float, float] | None,
+        focal: tuple[float, float],
+        principal: tuple[float, float] | None,
+        kind: str,
+        distortion: Sequence[float],
+    ) -> Lens:
         """The lens for a picture file, which may be a scaled or cropped version of the calibrated picture.
 
         Parameters
         ----------
         file : Path
-        lens : Lens
-            Lens in the model.
         size : (float, float) or None
             Width and height of the calibrated picture, if the model has them.
+        focal, principal, kind, distortion
+            Those of :class:`sepi.camera.rig.Lens` in the model; the default of ``principal`` is the middle.
 
         Raises
         ------
         SepiError
-            If the sizes do not fit.
+            If the sizes do not fit, or a number is not possible.
         """
-        header, whole, told = picture_header(file), self.size(file), (lens.width, lens.height)
+        header, whole = picture_header(file), self.size(file)
+        width, height = map(int, size or whole)
+        told = Lens(width, height, focal, principal or ((width - 1) / 2, (height - 1) / 2), kind, tuple(distortion))
         if size is None:
-            self._middles.append([(2 * at + 1) / side for at, side in zip(lens.principal, told, strict=True)])
-        elif told != whole:
-            self._scaled = f"lenses of {told[0]}x{told[1]} pixels scaled to pictures of {whole[0]}x{whole[1]}"
-        lens = lens.scaled(*whole)
-        part = self._crop or (*whole, 0, 0)
+            self._middles.append([(2 * told.principal[0] + 1) / width, (2 * told.principal[1] + 1) / height])
+        elif (width, height) != whole:
+            self._scaled = f"lenses of {width}x{height} pixels scaled to pictures of {whole[0]}x{whole[1]}"
+        lens, part = told.scaled(*whole), self._crop or (*whole, 0, 0)
         require_part(part, (header.height, header.width))
-        principal = lens.principal[0] - part[2], lens.principal[1] - part[3]
-        return replace(lens, width=header.width, height=header.height, principal=principal)
+        middle = lens.principal[0] - part[2], lens.principal[1] - part[3]
+        return replace(lens, width=header.width, height=header.height, principal=middle)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -67,19 +67,21 @@ def colmap(folder: Path) -> Iterator[None]:
         raise SepiError(f"{folder}: COLMAP gave up ({reason})") from error
 
 
-def tolerance(width: int, height: int) -> float:
-    """Largest error of a match in pictures of this size, pixels."""
-    return _MATCH_ERROR * max(1.0, max(width, height) / _SIDE)
+def tolerance(camera: Any) -> float:
+    """Largest error of a match in pictures of a camera's size, pixels."""
+    return _MATCH_ERROR * max(1.0, float(max(camera.width, camera.height)) / _SIDE)
 
 
 def write_features(
     pycolmap: Any, database: Path, pictures: Sequence[Path], finding: Finding, progress: Progress
-) -> list[int]:
+) -> tuple[Any, list[int]]:
     """Write cameras and features of pictures into a new database.
 
     Returns
     -------
-    list of int
+    camera : pycolmap.Camera
+        That of the first picture.
+    counts : list of int
         Number of features of each picture.
 
     Raises
@@ -90,29 +92,28 @@ def write_features(
     wanted = pycolmap.FeatureExtractionOptions()
     wanted.num_threads = 1
 
-    def found(path: Path) -> tuple[tuple[int, int], Any, Any]:
+    def found(path: Path) -> tuple[tuple[int, ...], Any, Any]:
         grey: FloatMap = np.ascontiguousarray(as_unit_float(read_picture(path)).mean(axis=2), np.float32)
         height, width = grey.shape
-        scale = finding.side / max(height, width)
-        if scale < 1:
-            small = (max(1, round(width * scale)), max(1, round(height * scale)))
+        if (scale := finding.side / max(height, width)) < 1:
+            small = max(1, round(width * scale)), max(1, round(height * scale))
             grey = np.asarray(cv2.resize(grey, small, interpolation=cv2.INTER_AREA), np.float32)
         bytes_of = np.rint(np.clip(grey, 0, 1) * 255).astype(np.uint8)
         extractor = pycolmap.FeatureExtractor.create(wanted, pycolmap.Device.cpu)
         features, descriptors = extractor.extract_from_uint8_array(bytes_of)
         places = np.array([(feature.x, feature.y) for feature in features], np.float32).reshape(-1, 2)
         places *= np.array([width / grey.shape[1], height / grey.shape[0]], np.float32)
-        return (height, width), places, descriptors
+        return (width, height), places, descriptors
 
     counts: list[int] = []
-    first: tuple[int, int] | None = None
+    first: tuple[int, ...] = ()
     with pycolmap.Database.open(str(database)) as file, ThreadPoolExecutor(finding.threads) as pool:
         camera = rig = -1
         for path, (size, places, descriptors) in zip(pictures, pool.map(found, pictures), strict=True):
             first = first or size
             if size != first and not finding.each:
                 raise SepiError(
-                    f"{path}: {size[1]}x{size[0]} pixels, but {pictures[0].name} has {first[1]}x{first[0]}; expected "
+                    f"{path}: {size[0]}x{size[1]} pixels, but {pictures[0].name} has {first[0]}x{first[1]}; expected "
                     "pictures of one camera, or --cameras each"
                 )
             if not counts or finding.each:
@@ -127,7 +128,7 @@ def write_features(
             file.write_descriptors(image.image_id, descriptors)
             counts.append(len(places))
             progress(len(counts) / len(pictures))
-    return counts
+        return file.read_all_cameras()[0], counts
 
 
 def _write_camera(pycolmap: Any, file: Any, path: Path, lens: str) -> tuple[int, int]:
@@ -180,8 +181,7 @@ _MOST, _NARROW, _FIRM = 0.85, 0.8, 1.5
 _AHEAD, _TURNED = 30.0, 60.0
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """Motion of the camera between two pictures.
 
     Attributes
@@ -189,15 +189,16 @@ class Step:
     names : (str, str)
     parallax : float
         Parallax between near and far points, pixels.
-    ahead : float or None
-        Degrees from the first camera's viewing direction to the second camera's position; None if unknown.
+    ahead : float
+        Degrees from the first camera's viewing direction, or its opposite, to the second camera's position; NaN if
+        unknown.
     turned : float
         Degrees between the viewing directions.
     """
 
     names: tuple[str, str]
     parallax: float
-    ahead: float | None
+    ahead: float
     turned: float
 
 
@@ -212,27 +213,22 @@ def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], findin
     chosen = np.unique(np.rint(np.linspace(0, len(pictures) - 1, _LOOKED_AT)).astype(int)).tolist()
     # also neighbours, in case distant pictures do not match
     looked_at = [pictures[n] for n in sorted({*chosen, 1})]
+    names = [path.name for path in looked_at]
     with tempfile.TemporaryDirectory() as place, colmap(folder):
         database = Path(place) / "look.db"
-        counts = write_features(pycolmap, database, looked_at, replace(finding, side=_LOOK), no_progress)
-        poor = [path.name for path, count in zip(looked_at, counts, strict=True) if count < _FEATURES]
+        camera, counts = write_features(pycolmap, database, looked_at, replace(finding, side=_LOOK), no_progress)
+        poor = [name for name, count in zip(names, counts, strict=True) if count < _FEATURES]
         if 2 * len(poor) > len(counts):
             raise SepiError(
                 f"{folder}: hardly any features in {_listed(poor)}; expected pictures with texture, in focus "
                 "and well lit"
             )
-        with pycolmap.Database.open(str(database)) as file:
-            camera = file.read_all_cameras()[0]
-        names = [path.name for path in looked_at]
-        size = tolerance(camera.width, camera.height) * max(1.0, max(camera.width, camera.height) / _LOOK)
+        # width of a reduced picture's pixel, and largest error of a match
+        unit = max(1.0, max(camera.width, camera.height) / _LOOK)
+        size = tolerance(camera) * unit
         match(pycolmap, database, list(combinations(names, 2)), size, finding.threads, no_progress)
         with pycolmap.Database.open(str(database)) as file:
             steps = _steps(pycolmap, file, size)
-    require_sideways(folder, names, steps, max(1.0, max(camera.width, camera.height) / _LOOK))
-
-
-def require_sideways(folder: Path, names: Sequence[str], steps: Sequence[Step], unit: float) -> None:
-    """Raise for motion that does not suit a light field; ``unit`` is the width of a reduced picture's pixel."""
     if not steps:
         raise SepiError(
             f"{folder}: no two of {_listed(names)} match; expected pictures of one static scene, each from a position "
@@ -251,7 +247,7 @@ def require_sideways(folder: Path, names: Sequence[str], steps: Sequence[Step], 
             f"{folder}: {turned.names[0]} and {turned.names[1]} look about {turned.turned:.0f} degrees apart; expected "
             f"similar viewing directions in all pictures, at most {_TURNED:.0f} degrees apart"
         )
-    firm = [step.ahead for step in steps if step.ahead is not None and step.parallax >= _FIRM * unit]
+    firm = [step.ahead for step in steps if not np.isnan(step.ahead) and step.parallax >= _FIRM * unit]
     if firm and np.median(firm) < _AHEAD:
         raise SepiError(
             f"{folder}: the camera moves along its viewing direction (at about {np.median(firm):.0f} degrees to it); "
@@ -279,15 +275,10 @@ def _steps(pycolmap: Any, file: Any, size: float) -> list[Step]:
             continue
         rotation = np.array(motion.rotation.matrix())
         place = -rotation.T @ np.array(motion.translation)
-        length = float(np.linalg.norm(place))
-        steps.append(
-            Step(
-                (one.name, other.name),
-                _parallax(here[pairs[:, 0]], there[pairs[:, 1]], size),
-                float(np.degrees(np.arccos(min(1.0, abs(place[2]) / length)))) if length else None,
-                float(np.degrees(np.arccos(np.clip(rotation[2, 2], -1, 1)))),
-            )
-        )
+        ahead = min(1.0, abs(place[2]) / length) if (length := np.linalg.norm(place)) else np.nan
+        parallax = _parallax(here[pairs[:, 0]], there[pairs[:, 1]], size)
+        angles = np.degrees(np.arccos([ahead, np.clip(rotation[2, 2], -1, 1)])).tolist()
+        steps.append(Step((one.name, other.name), parallax, *angles))
     return steps
 
 

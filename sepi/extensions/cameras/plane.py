@@ -152,22 +152,17 @@ def grid_of(baselines: Floats) -> npt.NDArray[np.int64]:
     The regular grid near which the cameras stand; without one, a single row in the order of their positions.
     """
     row, column = (_numbers(baselines[:, axis]) for axis in (0, 1))
-    best: npt.NDArray[np.int64] | None = None
     if row is not None and column is not None:
-        best = np.column_stack([row, column])
-        shape = best.max(axis=0) + 1
-        taken = len(np.unique(best, axis=0))
-        if taken < len(best) or taken < _FULL * shape.prod():
-            best = None
-    if best is not None:
-        return best
+        at = np.column_stack([row, column])
+        taken = len(np.unique(at, axis=0))
+        if taken == len(at) and taken >= _FULL * (at.max(axis=0) + 1).prod():
+            return at
     # along the longer axis, or the cameras' path
-    order = np.lexsort((baselines[:, 0], baselines[:, 1]))
-    if np.ptp(baselines[:, 0]) > np.ptp(baselines[:, 1]):
-        order = np.lexsort((baselines[:, 1], baselines[:, 0]))
-    numbers = np.empty(len(order), np.int64)
-    numbers[order] = np.arange(len(order))
-    return np.column_stack([np.zeros_like(numbers), numbers])
+    down, across = baselines.T
+    order = np.lexsort((across, down) if np.ptp(down) > np.ptp(across) else (down, across))
+    at = np.zeros((len(order), 2), np.int64)
+    at[order, 1] = np.arange(len(order))
+    return at
 
 
 def _numbers(along: Floats) -> npt.NDArray[np.int64] | None:

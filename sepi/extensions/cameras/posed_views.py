@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -40,92 +41,6 @@ NEAREST, FARTHEST = 1.0, 2.0
 
 # share of the pixels beyond each end of a map's range, so that a few wrong ones do not widen it
 _BEYOND = 0.005
-
-
-@dataclass(frozen=True)
-class CameraPoses:
-    """Pinhole cameras of the views that are present, row by row.
-
-    Attributes
-    ----------
-    positions : ndarray, shape (N, 2), int64
-        Grid position of each view, ``(t, s)``.
-    baselines : ndarray, shape (N, 2), float64
-        ``(down, across)`` from the reference view, in view steps.
-    centres : ndarray, shape (N, 3), float64
-        Position of each camera, x right, y down, z forward, from the reference view's; metres, or units of a nominal
-        camera.
-    principal_points : ndarray, shape (N, 2), float64
-        ``(x, y)`` in pixels, the middle of the top left pixel being (0, 0).
-    focal_px : float
-        Common focal length in pixels.
-    shape : (int, int)
-        Height and width of a view.
-    reference : int
-        Number of the reference view.
-    """
-
-    positions: npt.NDArray[np.int64]
-    baselines: Points
-    centres: Points
-    principal_points: Points
-    focal_px: float
-    shape: tuple[int, int]
-    reference: int
-
-    def __len__(self) -> int:
-        return len(self.positions)
-
-    @property
-    def from_corner(self) -> Points:
-        """Principal points ``(x, y)`` from the picture's corner, as in COLMAP and nerfstudio."""
-        return self.principal_points + 0.5
-
-    def project(self, points: Points, view: int) -> Points:
-        """Pixels ``(y, x)`` at which a view sees points, shape (P, 2).
-
-        Parameters
-        ----------
-        points : ndarray, shape (P, 3), float64
-            In front of the cameras, with positive z.
-        view : int
-            Number of the camera.
-        """
-        seen = points - self.centres[view]
-        across_down = self.principal_points[view] + self.focal_px * seen[:, :2] / seen[:, 2:]
-        return np.asarray(across_down[:, ::-1], np.float64)
-
-    def points_at(self, pixels: Points, depth: npt.NDArray[np.floating]) -> Points:
-        """Points (P, 3) that the reference view sees at pixels ``(y, x)``, shape (P, 2), at depths of shape (P,)."""
-        from_axis = (pixels[:, ::-1] - self.principal_points[self.reference]) / self.focal_px
-        return np.column_stack([from_axis, np.ones(len(pixels))]) * np.asarray(depth, np.float64)[:, None]
-
-
-def camera_poses(light_field: LightField, camera: Camera) -> CameraPoses:
-    """The cameras of the views that are present, in the order of their rows.
-
-    Parameters
-    ----------
-    light_field : LightField
-    camera : Camera
-        The light field's own, or a nominal one.
-    """
-    positions = np.argwhere(light_field.present)
-    baselines = light_field.baselines[light_field.present]
-    baseline = camera.scale / camera.focal_px
-    height, width = light_field.shape
-    from_centre = baselines + light_field.from_centre
-    return CameraPoses(
-        positions=positions,
-        baselines=baselines,
-        centres=np.column_stack([baselines[:, ::-1] * baseline, np.zeros(len(baselines))]),
-        principal_points=np.array([width - 1, height - 1]) / 2
-        + (camera.right, camera.down)
-        + from_centre[:, ::-1] * camera.offset,
-        focal_px=camera.focal_px,
-        shape=(height, width),
-        reference=int(np.flatnonzero((positions == light_field.reference_position).all(axis=1))[0]),
-    )
 
 
 def nominal_camera(disparity: FloatMap, known: BoolMap) -> Camera:
@@ -165,7 +80,7 @@ _APART = 1.0
 
 @dataclass(frozen=True)
 class PosedViews:
-    """A light field as single pictures with cameras, and the known geometry of the scene.
+    """A light field as single pictures with pinhole cameras, row by row, and the known geometry of the scene.
 
     Attributes
     ----------
@@ -174,11 +89,8 @@ class PosedViews:
         The given camera, the light field's own, or a nominal one.
     metric : bool
         Whether positions and depth are in metres; False with a nominal camera.
-    poses : CameraPoses
     disparity : ndarray, shape (H, W), float32
-        Of the reference view, pixels per view step.
-    known : ndarray, shape (H, W), bool
-        Pixels of the reference view that have a depth.
+        Of the reference view, pixels per view step; NaN where unknown.
     chosen : ndarray, shape (H, W), bool
         Pixels of the reference view that have a point.
     surfaces : callable or None
@@ -194,20 +106,46 @@ class PosedViews:
     light_field: LightField
     camera: Camera
     metric: bool
-    poses: CameraPoses
     disparity: FloatMap
-    known: BoolMap
     chosen: BoolMap
     surfaces: Surfaces | None = None
     rig: Rig | None = None
     sigma: FloatMap | None = None
     sigmas: Surfaces | None = None
 
+    @cached_property
+    def positions(self) -> list[tuple[int, int]]:
+        """Grid position ``(t, s)`` of each view that is present."""
+        return [(t, s) for t, s in np.argwhere(self.light_field.present).tolist()]
+
+    @cached_property
+    def reference(self) -> int:
+        """Number of the reference view."""
+        return self.positions.index(self.light_field.reference_position)
+
+    @cached_property
+    def baselines(self) -> Points:
+        """``(down, across)`` of each view from the reference view, in view steps, (N, 2)."""
+        return self.light_field.baselines[self.light_field.present]
+
+    @cached_property
+    def centres(self) -> Points:
+        """Position of each camera from the reference view's, (N, 3): x right, y down, z forward."""
+        baseline = self.camera.scale / self.camera.focal_px
+        return np.column_stack([self.baselines[:, ::-1] * baseline, np.zeros(len(self.baselines))])
+
+    @cached_property
+    def principal_points(self) -> Points:
+        """Principal points ``(x, y)`` in pixels, the middle of the top left pixel being (0, 0); (N, 2)."""
+        (height, width), camera = self.light_field.shape, self.camera
+        sheared = (self.baselines + self.light_field.from_centre)[:, ::-1] * camera.offset
+        return np.array([width - 1, height - 1]) / 2 + (camera.right, camera.down) + sheared
+
     @property
     def names(self) -> tuple[str, ...]:
         """Name of each view by its row and column, such as ``view_04_04``."""
         digits = max(2, *(len(str(size - 1)) for size in self.light_field.grid))
-        return tuple(f"view_{t:0{digits}d}_{s:0{digits}d}" for t, s in self.poses.positions.tolist())
+        return tuple(f"view_{t:0{digits}d}_{s:0{digits}d}" for t, s in self.positions)
 
     @property
     def units(self) -> str:
@@ -216,60 +154,40 @@ class PosedViews:
             return self.rig.units
         return "metres" if self.metric else "nominal units, not to scale, since the camera is unknown"
 
-    @property
-    def rotation(self) -> Points:
-        """Rotation from the world's axes to those of all cameras, (3, 3)."""
-        return np.eye(3) if self.rig is None else self.rig.rotation
-
-    def in_world(self, points: Points) -> Points:
-        """World coordinates of points (P, 3) in the reference view's axes."""
-        return points if self.rig is None else self.rig.to_world(points)
-
-    @property
+    @cached_property
     def points(self) -> Points:
         """The points (P, 3): x right, y down, z forward, from the reference view's camera."""
         depth = self.camera.scale / (self.disparity[self.chosen].astype(np.float64) + self.camera.offset)
-        return self.poses.points_at(np.argwhere(self.chosen).astype(np.float64), depth)
+        pixels = np.argwhere(self.chosen)[:, ::-1].astype(np.float64)
+        from_axis = (pixels - self.principal_points[self.reference]) / self.camera.focal_px
+        return np.column_stack([from_axis, np.ones(len(pixels))]) * depth[:, None]
 
     @property
     def colours(self) -> Colours:
         """Colours of the points, (P, 3) RGB."""
-        return self.picture(self.poses.reference)[self.chosen]
+        return self.picture(self.reference)[self.chosen]
+
+    def project(self, points: Points, view: int) -> Points:
+        """Pixels ``(x, y)``, shape (P, 2), at which a view sees points (P, 3) in front of the cameras."""
+        seen = points - self.centres[view]
+        return np.asarray(self.principal_points[view] + self.camera.focal_px * seen[:, :2] / seen[:, 2:], np.float64)
 
     def picture(self, view: int) -> Colours:
         """A view as RGB of 8 bits, which all programs read; shape (H, W, 3)."""
-        t, s = self.poses.positions[view]
-        pixels = self.light_field.rgb_views[t, s]
+        pixels = self.light_field.rgb_views[self.positions[view]]
         if pixels.dtype == np.uint8:
             return np.asarray(pixels, np.uint8)
         return np.rint(255 * np.clip(as_unit_float(pixels), 0, 1)).astype(np.uint8)
 
-    @property
-    def incomplete(self) -> bool:
-        """Whether a view has missing pixels."""
-        return self.light_field.missing is not None
-
-    def shown(self, view: int) -> BoolMap:
-        """Mask of the pixels that a view shows, (H, W)."""
-        missing = self.light_field.missing
-        if missing is None:
-            return np.ones(self.light_field.shape, bool)
-        t, s = self.poses.positions[view]
-        return np.asarray(~missing[t, s])
-
     def carried(self, view: int) -> FloatMap:
         """Disparity of a view, (H, W) float32; NaN at unknown and missing pixels."""
-        carried = self._carried(view)
-        return np.where(self.shown(view), carried, np.float32(np.nan)) if self.incomplete else carried
-
-    def _carried(self, view: int) -> FloatMap:
-        if view == self.poses.reference:
-            return np.where(self.known, self.disparity, np.float32(np.nan))
-        if self.surfaces is None:
-            down, across = self.poses.baselines[view].tolist()
-            return carried_map(self.disparity, (down, across), self.known)
-        t, s = self.poses.positions[view].tolist()
-        return self.surfaces((t, s))
+        missing = self.light_field.missing
+        found = self.disparity
+        if view != self.reference and self.surfaces is not None:
+            found = self.surfaces(self.positions[view])
+        elif view != self.reference:
+            found = carried_map(self.disparity, self._baseline(view), ~np.isnan(self.disparity))
+        return found if missing is None else np.where(missing[self.positions[view]], np.float32(np.nan), found)
 
     def depth(self, carried: FloatMap) -> FloatMap:
         """Depth of a view, (H, W) float32, from its :meth:`carried` disparity; 0 where unknown."""
@@ -285,18 +203,17 @@ class PosedViews:
         """Standard deviation of the depth of a view, (H, W) float32, given its :meth:`carried` disparity; 0 without
         depth. For views that are :attr:`sure`.
         """
-        sigma = self._carried_sigma(view)
+        assert self.sigma is not None
+        sigma = self.sigma
+        if view != self.reference and self.sigmas is not None:
+            sigma = self.sigmas(self.positions[view])
+        elif view != self.reference:
+            sigma = carried_values(self.disparity, sigma, self._baseline(view), ~np.isnan(self.disparity))
         return np.where(self.depth(carried) > 0, self.camera.depth_sigma(carried, sigma), np.float32(0))
 
-    def _carried_sigma(self, view: int) -> FloatMap:
-        assert self.sigma is not None
-        if view == self.poses.reference:
-            return self.sigma
-        if self.sigmas is None:
-            down, across = self.poses.baselines[view].tolist()
-            return carried_values(self.disparity, self.sigma, (down, across), self.known)
-        t, s = self.poses.positions[view].tolist()
-        return self.sigmas((t, s))
+    def _baseline(self, view: int) -> tuple[float, float]:
+        down, across = self.baselines[view].tolist()
+        return down, across
 
     def pixel_errors(self, sees: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
         """Expected reprojection error of the points, mean over views, (P,), pixels; 0 where unknown.
@@ -309,7 +226,7 @@ class PosedViews:
         if self.sigma is None:
             return np.zeros(sees.shape[1])
         # an error of sigma per view step grows with the view's distance
-        steps = np.linalg.norm(self.poses.baselines, axis=1)
+        steps = np.linalg.norm(self.baselines, axis=1)
         mean = (sees * steps[:, None]).sum(axis=0) / np.maximum(sees.sum(axis=0), 1)
         return np.asarray(self.sigma[self.chosen].astype(np.float64) * mean)
 
@@ -319,10 +236,10 @@ class PosedViews:
         Inverse depth, and so disparity, is linear on a plane, so its slopes give the normal exactly.
         """
         down, across = (_slopes(carried, axis) for axis in (0, 1))
-        x, y = self.poses.principal_points[view]
+        x, y = self.principal_points[view]
         row, column = np.indices(carried.shape)
         ahead = carried + self.camera.offset - across * (column - x) - down * (row - y)
-        facing = -np.stack([self.poses.focal_px * across, self.poses.focal_px * down, ahead])
+        facing = -np.stack([self.camera.focal_px * across, self.camera.focal_px * down, ahead])
         known = (self.depth(carried) > 0) & np.isfinite(facing).all(axis=0)
         length = np.linalg.norm(facing, axis=0)
         return np.where(known, facing / np.where(known, length, 1), 0).astype(np.float32)
@@ -331,7 +248,7 @@ class PosedViews:
         """Points that a view sees, (P,), given its :meth:`carried` disparity: those inside it that nothing nearer
         occludes.
         """
-        baseline, disparity = self.poses.baselines[view], self.disparity[self.chosen].astype(np.float64)
+        baseline, disparity = self.baselines[view], self.disparity[self.chosen].astype(np.float64)
         there = np.argwhere(self.chosen) - disparity[:, None] * baseline
         inside = ((there > -0.5) & (there < np.array(carried.shape) - 0.5)).all(axis=1)
         # positions outside may exceed integers
@@ -382,30 +299,23 @@ def posed_views(
     Raises
     ------
     SepiError
-        If a map has another shape than the views, or a number is out of bounds.
+        If a map has another shape than the views.
     """
     given = {"disparity": disparity, "confidence": confidence, "unknown": unknown, "sigma": sigma}
     for name, values in given.items():
         if values is not None and values.shape != light_field.shape:
             raise SepiError(f"{light_field.name}: {name} is {values.shape}, the views {light_field.shape}")
-    if min_confidence is not None and not 0 <= min_confidence <= 1:
-        raise SepiError(f"{light_field.name}: expected a least confidence within 0..1, got {min_confidence:g}")
-    if max_points < 0:
-        raise SepiError(f"{light_field.name}: expected 0 points or more, got {max_points}")
     known = np.isfinite(disparity)
     if unknown is not None:
         known &= ~unknown
     own = camera or light_field.camera
     used = own or nominal_camera(disparity, known)
-    depth = used.depth(disparity)
-    known &= np.isfinite(depth) & (depth > 0)
+    known &= np.isfinite(used.depth(disparity))
     return PosedViews(
         light_field=light_field,
         camera=used,
         metric=own is not None,
-        poses=camera_poses(light_field, used),
-        disparity=disparity,
-        known=known,
+        disparity=np.where(known, disparity, np.float32(np.nan)),
         chosen=_thinned(_surer(known, confidence, min_confidence, sigma), max_points),
         surfaces=surfaces,
         rig=light_field.reference_rig if camera is None else None,

@@ -208,6 +208,7 @@ def read_model(path: Path, images: str | None = None, crop_of: Part | None = Non
         If there are none, the file is damaged, or pictures are missing.
     """
     # called for every path, so readers are imported when needed
+    from sepi.extensions.cameras import files
     from sepi.extensions.cameras.model import Pictures
 
     found = cameras_in(path)
@@ -217,10 +218,6 @@ def read_model(path: Path, images: str | None = None, crop_of: Part | None = Non
             f"{TRANSFORMS[0]}, or a table {', '.join(TABLES)}"
         )
     pictures = Pictures(found, None if images is None else Path(images).expanduser(), crop_of)
-    if found.is_dir():
-        from sepi.extensions.cameras.files import read_colmap as read
-    elif found.suffix.lower() == ".json":
-        from sepi.extensions.cameras.files import read_transforms as read
-    else:
-        from sepi.extensions.cameras.files import read_table as read
-    return replace(read(found, pictures), notes=pictures.notes)
+    read = files.read_transforms if found.suffix.lower() == ".json" else files.read_table
+    model = (files.read_colmap if found.is_dir() else read)(found, pictures)
+    return replace(model, notes=pictures.notes)

@@ -7,12 +7,13 @@ The steps: the plane through the cameras (``plane``), the picture of the referen
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from sepi.camera import Camera
-from sepi.camera.rig import Floats, Rectified, Rig
+from sepi.camera.rig import Rectified, Rig
 from sepi.errors import SepiError
 from sepi.extensions.cameras.frame import Frame, Seeing, completed, frame_of, rectified_view
 from sepi.extensions.cameras.model import CameraModel
@@ -31,16 +32,12 @@ _BEYOND, _MARGIN, _LEAST_MARGIN = 0.005, 0.06, 0.1
 _NOTHING = 0.05
 
 
-@dataclass(frozen=True)
-class Rectification:
+class Rectification(NamedTuple):
     """Result of rectifying the cameras, before any picture is read."""
 
-    model: CameraModel
-    plane: Plane
-    frame: Frame
     seeing: Seeing
+    frame: Frame
     inverse_depths: tuple[float, float] | None
-    errors: Floats
     notes: tuple[str, ...]
 
 
@@ -71,9 +68,7 @@ def rectification_of(
         seeing = Seeing(model, plane, zooms(plane, known or (0.0, 0.0)))
         # the error of a camera off the plane depends on the frame, and the frame on the remaining cameras
         frame, kept = frame_of(seeing)
-        errors = (
-            np.zeros(len(model.shots)) if known is None else disparity_errors(plane, known, frame.corners, frame.focal)
-        )
+        errors = disparity_errors(plane, known or (0.0, 0.0), frame.corners, seeing.focal)
         worst = int(errors.argmax())
         if len(kept) < len(model.shots):
             left = [shot.name for n, shot in enumerate(model.shots) if n not in kept]
@@ -81,35 +76,25 @@ def rectification_of(
             reference = model.shots[plane.reference].name
             model = model.of(kept)
         elif errors[worst] > _TOO_MUCH:
-            name = model.shots[worst].name
+            name, ahead = model.shots[worst].name, plane.places[worst, 2] / plane.step
             if len(model.shots) <= _FEWEST:
                 raise SepiError(
                     f"{model.path}: the cameras do not stand in a plane: {name} is so far off that the disparity error "
                     f"is {errors[worst]:.2g} pixels; expected at most {_TOO_MUCH:g}"
                 )
-            notes.append(
-                f"left out, since it stands {_off(plane, worst)}: {name} (disparity error {errors[worst]:.2g} pixels)"
-            )
+            where = f"{abs(ahead):.2g} steps {'before' if ahead > 0 else 'behind'} the others"
+            notes.append(f"left out, since it stands {where}: {name} (disparity error {errors[worst]:.2g} pixels)")
             model = model.of([n for n in range(len(model.shots)) if n != worst])
         else:
             break
         if len(model.shots) < 2:
             raise SepiError(f"{model.path}: expected at least two cameras, too few are left: {'; '.join(notes)}")
-    return Rectification(model, plane, frame, seeing, known, errors, (*notes, *_told(plane, errors, known)))
-
-
-def _off(plane: Plane, view: int) -> str:
-    ahead = plane.places[view, 2] / plane.step
-    return f"{abs(ahead):.2g} steps {'before' if ahead > 0 else 'behind'} the others"
-
-
-def _told(plane: Plane, errors: Floats, known: tuple[float, float] | None) -> tuple[str, ...]:
     places = plane.places[:, 2] - plane.places[:, 2].mean()
     flat = f"the cameras stand within {float(np.abs(places).max()) / plane.step:.2g} view steps of a plane"
-    if known is None:
-        return (flat,)
-    off = "; mind this if hundredths of a pixel matter" if errors.max() > _TOLD else ""
-    return (f"{flat}, so disparity errors over the scene's depth are at most {errors.max():.2g} pixels{off}",)
+    if known is not None:
+        off = "; mind this if hundredths of a pixel matter" if errors.max() > _TOLD else ""
+        flat += f", so disparity errors over the scene's depth are at most {errors.max():.2g} pixels{off}"
+    return Rectification(seeing, frame, known, (*notes, flat))
 
 
 def _of_points(model: CameraModel, plane: Plane) -> tuple[float, float] | None:
@@ -134,54 +119,43 @@ def _of_points(model: CameraModel, plane: Plane) -> tuple[float, float] | None:
 
 def light_field_of(found: Rectification) -> LightField:
     """The rectified views as a light field of equal brightness, with the pictures read and resampled."""
-    model, plane, frame = found.model, found.plane, found.frame
-    pictures, absent = zip(*(rectified_view(found.seeing, frame, n) for n in range(len(model.shots))), strict=True)
-    channels = {picture.shape[2] for picture in pictures}
-    views = np.stack([np.broadcast_to(p, (*p.shape[:2], max(channels))) if len(channels) > 1 else p for p in pictures])
+    seeing, frame, depths = found.seeing, found.frame, found.inverse_depths
+    model, plane = seeing.model, seeing.plane
+    pictures, absent = zip(*(rectified_view(seeing, frame, n) for n in range(len(model.shots))), strict=True)
+    channels = max(picture.shape[2] for picture in pictures)
     at = grid_of(plane.baselines)
     rows, columns = (at.max(axis=0) + 1).tolist()
-    grid = np.zeros((rows, columns, *views.shape[1:]), np.float32)
+    grid = np.zeros((rows, columns, *frame.shape, channels), np.float32)
     present, positions = np.zeros((rows, columns), bool), np.zeros((rows, columns, 2))
-    missing = np.zeros(grid.shape[:4], bool)
-    for (t, s), view, lacking, baseline in zip(at.tolist(), views, absent, plane.baselines, strict=True):
-        grid[t, s], missing[t, s] = completed(view, lacking), lacking
+    missing, views = np.zeros(grid.shape[:4], bool), {}
+    for n, (t, s) in enumerate(at.tolist()):
+        # grey becomes colour beside colour
+        grid[t, s], missing[t, s] = completed(pictures[n], absent[n]), absent[n]
         # a mask may leave no pixels
-        present[t, s], positions[t, s] = not lacking.all(), baseline
-    view = tuple(at[plane.reference].tolist())
-    scale = plane.step * frame.focal
+        present[t, s], positions[t, s] = not absent[n].all(), plane.baselines[n]
+        views[t, s] = Rectified(model.shots[n], float(seeing.zoom[n]))
+    scale, view = plane.step * seeing.focal, (int(at[plane.reference, 0]), int(at[plane.reference, 1]))
+    limits = None
+    if depths is not None:
+        low, high = (scale * inverse - seeing.offset for inverse in depths)
+        margin = max(_MARGIN * (high - low), _LEAST_MARGIN)
+        limits = DisparityRange(round(low - margin, 3), round(high + margin, 3), "parameters")
     light_field = LightField(
         grid,
         name_of(model.path).name,
         source=str(model.path),
         present=present,
-        view=None if view == (rows // 2, columns // 2) else (view[0], view[1]),
+        view=None if view == (rows // 2, columns // 2) else view,
         positions=positions,
-        disparity_range=_range(found, scale),
+        disparity_range=limits,
         settled=True,
         notes=found.notes,
         missing=missing if missing.any() else None,
-        rig=Rig(
-            plane.rotation,
-            model.shots[plane.reference].centre,
-            plane.step,
-            model.units,
-            {
-                (int(t), int(s)): Rectified(shot, float(zoom))
-                for (t, s), shot, zoom in zip(at.tolist(), model.shots, found.seeing.zoom, strict=True)
-            },
-        ),
+        rig=Rig(plane.rotation, model.shots[plane.reference].centre, plane.step, model.units, views),
     )
     down, across = light_field.from_centre
     (x, y), (height, width) = frame.principal, frame.shape
     # the camera's principal point is that of the grid's centre view
-    right = float(x - (width - 1) / 2 - across * frame.offset)
-    below = float(y - (height - 1) / 2 - down * frame.offset)
-    return equally_bright(replace(light_field, camera=Camera(scale, frame.offset, frame.focal, right, below)))
-
-
-def _range(found: Rectification, scale: float) -> DisparityRange | None:
-    if found.inverse_depths is None:
-        return None
-    low, high = (scale * inverse - found.frame.offset for inverse in found.inverse_depths)
-    margin = max(_MARGIN * (high - low), _LEAST_MARGIN)
-    return DisparityRange(round(low - margin, 3), round(high + margin, 3), "parameters")
+    right = float(x - (width - 1) / 2 - across * seeing.offset)
+    below = float(y - (height - 1) / 2 - down * seeing.offset)
+    return equally_bright(replace(light_field, camera=Camera(scale, seeing.offset, seeing.focal, right, below)))

@@ -91,10 +91,8 @@ def matches_stack(path: Path) -> bool:
                 return False
             file.seek(0)
             with open_tiff(file) as pictures:
-                first, *others = (page.aspage() for page in pictures.pages[:2])
-                return not _is_whole(pictures) or any(
-                    (page.shape, page.dtype) == (first.shape, first.dtype) for page in others
-                )
+                forms = [(page.aspage().shape, page.aspage().dtype) for page in pictures.pages[:2]]
+                return not _is_whole(pictures) or forms[0] in forms[1:]
     except SepiError:
         # reading reports the damage
         return True
@@ -115,19 +113,19 @@ def read_stack(path: Path, options: ReadOptions) -> LightField:
         for number, page in enumerate(pictures.pages):
             stack[number] = page_pixels(page.aspage())
         series = pictures.series[0]
-        counted = [(axis, n) for axis, n in zip(series.axes, series.shape, strict=True) if axis not in "YXS" and n > 1]
-    if prod(n for _, n in counted) != count:
-        counted = [("I", count)]
-    if len(counted) > 1 and ("C", _RGB) in counted and stack.shape[3] == 1:
+        axes = [(axis, n) for axis, n in zip(series.axes, series.shape, strict=True) if axis not in "YXS" and n > 1]
+    if prod(n for _, n in axes) != count:
+        axes = [("I", count)]
+    stack = stack.reshape(*(n for _, n in axes), *first.shape)
+    if len(axes) > 1 and ("C", _RGB) in axes and first.shape[2] == 1:
         # each colour has a page
-        stack = stack.reshape(*(n for _, n in counted), *stack.shape[1:3])
-        colour = counted.index(("C", _RGB))
-        stack = np.moveaxis(stack, colour, -1)
-        del counted[colour]
-    if len(counted) != 2 or options.grid is not None:
+        colour = axes.index(("C", _RGB))
+        stack = np.moveaxis(stack[..., 0], colour, -1)
+        del axes[colour]
+    if len(axes) != 2 or options.grid is not None:
         return light_field_from_array(stack.reshape(-1, *stack.shape[-3:]), path, options, axes="NHWC")
-    rows, columns = (n for _, n in counted)
-    light_field = light_field_from_array(stack.reshape(rows, columns, *stack.shape[-3:]), path, options, axes="TSHWC")
+    (_, rows), (_, columns) = axes
+    light_field = light_field_from_array(stack, path, options, axes="TSHWC")
     note = f"the file has {rows}x{columns} pages, taken as rows and columns; --order transpose exchanges them"
     return replace(light_field, notes=(note, *light_field.notes))
 
@@ -147,8 +145,8 @@ def _pages(pictures: Any, size: int) -> tuple[int, int, int, int]:
     for number, page in enumerate(pictures.pages, 1):
         with naming(f"page {number}"):
             forms.append((tiff_form(page.aspage(), size), page.aspage().dtype))
-    if unlike := [number for number, form in enumerate(forms, 1) if form != forms[0]]:
-        raise SepiError(f"page {unlike[0]} is unlike the first; all views must be alike")
+            if forms[-1] != forms[0]:
+                raise SepiError(f"page {number} is unlike the first; all views must be alike")
     height, width, pixel_bytes, _ = forms[0][0]
     if count * height * width * pixel_bytes > size * DEFLATE_RATIO + _SMALL:
         raise SepiError(f"damaged TIFF: {count} pages of {width}x{height} in {size} bytes")
@@ -157,7 +155,7 @@ def _pages(pictures: Any, size: int) -> tuple[int, int, int, int]:
 
 GROUP = "LF"
 
-_GRID, _ROW, _COLUMN, _CROSS = 1, 2, 3, 4
+_GRID, _ROW, _COLUMN = 1, 2, 3
 _COLOURS, _GREY = ("r", "g", "b"), ("bw",)
 _COUNTS = ("LF_TYPE", "cams_h", "cams_v", "height", "width")
 
@@ -211,11 +209,12 @@ def _form(path: Path, group: h5py.Group) -> tuple[tuple[int, int, int, int], int
         if not 0 <= count < 2**31 or count != int(count):
             raise SepiError(f"{path}: expected the attribute '{key}' to be a whole number, got {count:g}")
     kind, columns, rows, height, width = map(int, counts)
-    if kind == _CROSS:
-        raise SepiError(f"{path}: LF_TYPE {kind}, a cross of views, is not supported; give a folder of the views")
     expected = {_GRID: rows * columns > 1, _ROW: rows == 1 < columns, _COLUMN: columns == 1 < rows}
     if kind not in expected:
-        raise SepiError(f"{path}: LF_TYPE {kind} is unknown; expected 1 (grid), 2 (row) or 3 (column)")
+        raise SepiError(
+            f"{path}: LF_TYPE {kind}, a cross of views or unknown; expected 1 (grid), 2 (row) or 3 (column), or a "
+            "folder of the views"
+        )
     if min(rows, columns) < 1 or not expected[kind]:
         raise SepiError(f"{path}: {rows}x{columns} views (cams_v x cams_h) do not fit LF_TYPE {kind}")
     if height % rows or width % columns:

@@ -271,28 +271,22 @@ def anchor_views(light_field: LightField) -> list[tuple[int, int]]:
 
 def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sources:
     """The source maps, with the surfaces of their pixels."""
-    bars = [offsets for offsets in map(_offsets, found) if offsets is not None]
-    return Sources(
-        _stacked([maps.disparity for maps in found]),
-        _stacked([maps.confidence for maps in found]),
+    shape, bars = found[0].disparity.shape, []
+    for maps in found:
         # error bars of all maps, or of none
-        _stacked(bars) if len(bars) == len(found) else np.empty((0, *found[0].disparity.shape, 3), np.float32),
-        _stacked([corner_disparities(maps.disparity) for maps in found]),
+        if maps.sigma is None or maps.low is None or maps.high is None:
+            bars = [np.empty((0, *shape, 3), np.float32)]
+            break
+        # distances of the bounds hold in other views, too; an unknown disparity may lie beyond both
+        below, above = np.maximum(maps.disparity - maps.low, 0), np.maximum(maps.high - maps.disparity, 0)
+        bars.append(np.stack([maps.sigma, below, above], axis=2)[None])
+    return Sources(
+        np.stack([maps.disparity for maps in found], dtype=np.float32),
+        np.stack([maps.confidence for maps in found], dtype=np.float32),
+        np.concatenate(bars, dtype=np.float32),
+        np.stack([corner_disparities(maps.disparity) for maps in found], dtype=np.float32),
         baselines,
     )
-
-
-def _stacked(maps: list[FloatMap]) -> FloatMap:
-    return np.ascontiguousarray(np.stack(maps), np.float32)
-
-
-def _offsets(maps: StageMaps) -> FloatMap | None:
-    """Sigma, and distances of the bounds below and above the disparity, which hold in other views, too; (H, W, 3)."""
-    if maps.sigma is None or maps.low is None or maps.high is None:
-        return None
-    below, above = maps.disparity - maps.low, maps.high - maps.disparity
-    # an unknown disparity may lie beyond both bounds
-    return np.stack([maps.sigma, np.maximum(below, 0), np.maximum(above, 0)], axis=2).astype(np.float32, copy=False)
 
 
 def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int64]) -> list[ViewMaps]:
@@ -345,14 +339,12 @@ def _with_own_edges(light_field: LightField, view: ViewMaps, edge_views: int) ->
 
 def torn_pixels(disparity: FloatMap) -> BoolMap:
     """Pixels beside a depth step that slopes do not explain; shape (H, W), bool."""
-    top_left, top_right, bottom_right, bottom_left = np.moveaxis(corner_disparities(disparity), 2, 0)
-    torn = np.zeros(disparity.shape, bool)
-    for first, second in ((top_right, top_left), (bottom_right, bottom_left)):
-        apart = np.abs(first[:, :-1] - second[:, 1:]) > TOLERANCE
-        torn[:, :-1] |= apart
-        torn[:, 1:] |= apart
-    for first, second in ((bottom_left, top_left), (bottom_right, top_right)):
-        apart = np.abs(first[:-1] - second[1:]) > TOLERANCE
-        torn[:-1] |= apart
-        torn[1:] |= apart
+    corners, torn = corner_disparities(disparity), np.zeros(disparity.shape, bool)
+    # numbers of corners that pixels side by side share, then pixels one above the other
+    beside, below = ((1, 0), (2, 3)), ((3, 0), (2, 1))
+    for of_pixel, lines, pairs in ((corners, torn, beside), (corners.swapaxes(0, 1), torn.T, below)):
+        for here, there in pairs:
+            apart = np.abs(of_pixel[:, :-1, here] - of_pixel[:, 1:, there]) > TOLERANCE
+            lines[:, :-1] |= apart
+            lines[:, 1:] |= apart
     return torn

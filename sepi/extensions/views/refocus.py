@@ -8,9 +8,9 @@ import os
 import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 import numpy as np
@@ -18,16 +18,14 @@ import numpy.typing as npt
 
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, read_light_field_of, reading_flags
 from sepi.errors import SepiError
-from sepi.io.files import atomic_path, filled_folder, remove_files
+from sepi.io.files import atomic_path, filled_folder, naming, remove_files
 from sepi.io.images import write_png
 from sepi.lightfield import FloatMap, full_scale
 from sepi.process.command import SepiCommand, progress_bar
 
 if TYPE_CHECKING:
     from sepi.camera import Camera
-    from sepi.lightfield import BoolMap, LightField
-    from sepi.stage import Progress
-
+    from sepi.lightfield import LightField
 
 INDEX = "focus.csv"
 """Name of the index: a row for each image."""
@@ -47,22 +45,18 @@ _QUALITY = 85
 _MADE = re.compile(rf"focus_\d+\.png|{re.escape(ALL_IN_FOCUS)}|{re.escape(ANIMATION)}")
 
 
-@dataclass(frozen=True)
-class Focus:
+class Focus(NamedTuple):
     """Focus of an image.
 
     Attributes
     ----------
     disparity : float
         Pixels per view step.
-    depth : float or None
-        Metres, infinite at and beyond infinity; None if the camera is unknown.
     at : (int, int) or None
         Column and row ``(x, y)`` of the pixel whose surface is in focus, if the focus was chosen so.
     """
 
     disparity: float
-    depth: float | None = None
     at: tuple[int, int] | None = None
 
 
@@ -73,15 +67,9 @@ def stack_names(count: int) -> list[str]:
 
 
 def write_refocused(
-    folder: Path,
-    foci: Sequence[Focus],
-    pictures: Iterable[FloatMap],
-    sharp: FloatMap | None,
-    dtype: npt.DTypeLike,
-    *,
-    animated: bool = False,
-) -> tuple[str, ...]:
-    """Write a focal stack, the image in focus everywhere, and their index.
+    folder: Path, rows: Sequence[Sequence[str]], pictures: Iterable[FloatMap], dtype: npt.DTypeLike, *, animated: bool
+) -> list[str]:
+    """Write pictures and their index, and return the names of the files.
 
     A new folder appears whole or not at all. In an existing folder, files that an earlier index names are replaced once
     all new files are written, or removed; other files stay. Equal content gives equal bytes.
@@ -90,21 +78,14 @@ def write_refocused(
     ----------
     folder : Path
         Made if missing.
-    foci : sequence of Focus
-        Focus of each image of the stack.
+    rows : sequence of sequence of str
+        Row of the index for each picture, which begins with the name of its file.
     pictures : iterable of ndarray, shape (H, W, C), float32
-        Images in 0..1, consumed one by one.
-    sharp : ndarray, shape (H, W, C), float32, or None
-        The image in focus everywhere.
+        Pictures in 0..1, consumed one by one.
     dtype : dtype
         That of the views: uint8 gives images of 8 bit, all others of 16 bit.
     animated : bool
-        Also write the stack as an animation.
-
-    Returns
-    -------
-    tuple of str
-        Names of the files written.
+        Also write the focal stack as an animation.
 
     Raises
     ------
@@ -112,28 +93,23 @@ def write_refocused(
         If the folder is a file, cannot be written or holds other files of these names, or the installed Pillow cannot
         write animations.
     """
-    before = _earlier_files(folder / INDEX)
-    names = stack_names(len(foci))
-    made = [*[ALL_IN_FOCUS] * (sharp is not None), *names, *[ANIMATION] * animated, INDEX]
+    rows = [*rows, *[[ANIMATION, "", "", "", ""]] * animated]
+    made, before = [*(row[0] for row in rows), INDEX], _earlier_files(folder / INDEX)
     others = [name for name in made if name not in before and os.path.lexists(folder / name)]
     if others:
         raise SepiError(f"{folder}: {others[0]} there was not written by 'sepi refocus'; choose another folder")
     with filled_folder(folder) as temporary:
-        if sharp is not None:
-            write_png(temporary / ALL_IN_FOCUS, _levels(sharp, dtype))
         frames = []
-        for name, picture in zip(names, pictures, strict=True):
+        for name, picture in zip(made, pictures, strict=False):
             write_png(temporary / name, _levels(picture, dtype))
-            if animated:
+            if animated and name != ALL_IN_FOCUS:
                 frames.append(_levels(picture, np.uint8))
         if animated:
             _write_animation(temporary / ANIMATION, frames)
-        told = dict(zip(names, map(_described, foci), strict=True))
-        rows = [[name, *told.get(name, [""] * 4)] for name in made[:-1]]
         with (temporary / INDEX).open("w", encoding="ascii", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
     remove_files(folder, set(before).difference(made))
-    return tuple(made)
+    return made
 
 
 def _levels(picture: FloatMap, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
@@ -141,12 +117,6 @@ def _levels(picture: FloatMap, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
     held = np.uint8 if np.dtype(dtype) == np.uint8 else np.uint16
     levels = np.rint(picture.astype(np.float64) * full_scale(held)).astype(held)
     return levels[..., 0] if levels.shape[2] == 1 else levels
-
-
-def _described(focus: Focus) -> list[str]:
-    x, y = ("", "") if focus.at is None else focus.at
-    depth = "" if focus.depth is None else f"{focus.depth:.6g}"
-    return [f"{focus.disparity:.6g}", depth, f"{x}", f"{y}"]
 
 
 def _write_animation(path: Path, frames: Sequence[npt.NDArray[Any]]) -> None:
@@ -174,16 +144,6 @@ def _earlier_files(index: Path) -> list[str]:
 
 _PATH = click.Path(path_type=Path)
 _STEPS = 9
-
-
-@dataclass(frozen=True)
-class _Result:
-    """A map: path, disparity (H, W), unknown pixels, and camera if known."""
-
-    path: Path
-    disparity: FloatMap
-    unknown: BoolMap | None
-    camera: Camera | None
 
 
 @click.command(cls=SepiCommand)
@@ -267,37 +227,53 @@ def refocus(
     if pixels and result_path is None:
         raise SepiError("--at: needs RESULT for the disparity of the pixel; 'sepi depth INPUT' makes it")
     light_field = read_light_field_of(light_field_path, result_path, reading)
-    result = None if result_path is None else _read_result(result_path, light_field_path, light_field, reading)
-    camera = light_field.camera or (result.camera if result else None)
+    surfaces = known = None
+    camera = light_field.camera
+    if result_path is not None:
+        surfaces, known, stored = _read_result(result_path, light_field_path, light_field, reading)
+        camera = camera or stored
     if geometry is not None:
         camera = geometry(shape=light_field.shape)
-    foci = _foci(light_field, result, steps, disparities, pixels)
-    if camera is not None:
-        depths = camera.depth(np.array([focus.disparity for focus in foci], np.float32)).tolist()
-        foci = [replace(focus, depth=depth) for focus, depth in zip(foci, depths, strict=True)]
+    for value in disparities:
+        if not math.isfinite(value):
+            raise SepiError(f"--disparity {value}: expected a finite number of pixels per view step")
+    foci = [Focus(value) for value in disparities]
+    if known is not None:
+        foci += [Focus(_disparity_at(result_path, known, x, y), (x, y)) for x, y in pixels]
+    if steps or not foci:
+        foci += [Focus(value) for value in _through(light_field, result_path, known, steps or _STEPS)]
+    # from near to far
+    foci.sort(key=lambda focus: -focus.disparity)
+    at = np.array([focus.disparity for focus in foci], np.float32)
+    depths = [] if camera is None else camera.depth(at).tolist()
+    rows = [[ALL_IN_FOCUS, "", "", "", ""]] * (surfaces is not None)
+    for name, (disparity, pixel), depth in zip(stack_names(len(foci)), foci, depths or [None] * len(foci), strict=True):
+        x, y = pixel or ("", "")
+        rows.append([name, f"{disparity:.6g}", "" if depth is None else f"{depth:.6g}", f"{x}", f"{y}"])
     # fails before a picture is computed
     refocusing.views_within(light_field, aperture)
-    surfaces = None if result is None else result.disparity
-    count = len(foci) + (surfaces is not None)
+    makers = [partial(refocusing.refocus, light_field, at, surfaces, aperture=aperture) for at, _ in foci]
+    if surfaces is not None:
+        makers.insert(0, partial(refocusing.all_in_focus, light_field, surfaces))
     with progress_bar(light_field.name) as progress:
 
-        def part(number: int) -> Progress:
-            return lambda fraction: progress((number + fraction) / count)
+        def part(number: int, fraction: float) -> None:
+            progress((number + fraction) / len(makers))
 
-        sharp = None if surfaces is None else refocusing.all_in_focus(light_field, surfaces, progress=part(0))
-        pictures = (
-            refocusing.refocus(light_field, focus.disparity, surfaces, aperture=aperture, progress=part(number))
-            for number, focus in enumerate(foci, count - len(foci))
-        )
-        files = write_refocused(folder, foci, pictures, sharp, light_field.views.dtype, animated=animation)
-    click.echo(f"focused at: {_listed(foci)}")
-    if result is None:
+        pictures = (make(progress=partial(part, number)) for number, make in enumerate(makers))
+        files = write_refocused(folder, rows, pictures, light_field.views.dtype, animated=animation)
+    told = ", ".join(f"{focus.disparity:.3g}" for focus in foci)
+    metres = f" ({', '.join(f'{depth:.3g}' for depth in depths)} m)" if depths else ""
+    click.echo(f"focused at: {told} pixels per view step{metres}")
+    if surfaces is None:
         click.echo("no all_in_focus.png: it needs RESULT, which 'sepi depth' makes")
     click.echo(f"written to {folder}/: {' '.join(files)}")
 
 
-def _read_result(path: Path, light_field_path: Path, light_field: LightField, reading: Reading) -> _Result:
-    """The map to focus by, checked to have the views' size."""
+def _read_result(
+    path: Path, light_field_path: Path, light_field: LightField, reading: Reading
+) -> tuple[FloatMap, FloatMap, Camera | None]:
+    """The map to focus by, the same with NaN at unknown pixels, and its camera if it records one."""
     from sepi.io.all_views import read_disparity_at, read_origin_at, read_result_at
 
     view = reading.options.view
@@ -307,56 +283,27 @@ def _read_result(path: Path, light_field_path: Path, light_field: LightField, re
             f"{path}: is {disparity.shape}, but the views of {light_field_path} are {light_field.shape} (height, width)"
         )
     if read_origin_at(path, view) is None:
-        return _Result(path, disparity, None, None)
-    stored = read_result_at(path, view)
-    return _Result(path, disparity, stored.unknown if stored.unknown.shape == disparity.shape else None, stored.camera)
+        return disparity, disparity, None
+    result = read_result_at(path, view)
+    return disparity, np.where(result.unknown, np.float32(np.nan), disparity), result.camera
 
 
-def _foci(
-    light_field: LightField,
-    result: _Result | None,
-    steps: int | None,
-    disparities: tuple[float, ...],
-    pixels: tuple[tuple[int, int], ...],
-) -> list[Focus]:
-    """Disparities to focus at, from near to far."""
-    for value in disparities:
-        if not math.isfinite(value):
-            raise SepiError(f"--disparity {value}: expected a finite number of pixels per view step")
-    found = [Focus(value) for value in disparities]
-    if result is not None:
-        found += [Focus(_disparity_at(result, x, y), at=(x, y)) for x, y in pixels]
-    if steps or not found:
-        found += [Focus(value) for value in _through(light_field, result, steps or _STEPS)]
-    return sorted(found, key=lambda focus: -focus.disparity)
-
-
-def _through(light_field: LightField, result: _Result | None, count: int) -> list[float]:
+def _through(light_field: LightField, path: Path | None, known: FloatMap | None, count: int) -> list[float]:
     """Disparities from the nearest to the farthest surface of the map, else over the light field's range."""
     from sepi.extensions.views.refocusing import evenly_spaced, focal_stack
     from sepi.inspection.disparity_range import settle_range
 
-    if result is not None:
-        try:
-            return focal_stack(result.disparity, count, result.unknown)
-        except SepiError as error:
-            raise SepiError(f"{result.path}: {error}") from error
+    if known is not None:
+        with naming(str(path)):
+            return focal_stack(known, count)
     limits = settle_range(light_field).require_disparity_range()
     return evenly_spaced(limits.minimum, limits.maximum, count)
 
 
-def _disparity_at(result: _Result, x: int, y: int) -> float:
-    height, width = result.disparity.shape
+def _disparity_at(path: Path | None, known: FloatMap, x: int, y: int) -> float:
+    height, width = known.shape
     if not (x < width and y < height):
         raise SepiError(f"--at {x} {y}: outside the picture; X goes from 0 to {width - 1}, Y from 0 to {height - 1}")
-    value = float(result.disparity[y, x])
-    if not math.isfinite(value) or (result.unknown is not None and result.unknown[y, x]):
-        raise SepiError(f"--at {x} {y}: {result.path} has no disparity for this pixel; choose one beside it")
-    return value
-
-
-def _listed(foci: Sequence[Focus]) -> str:
-    """Text of the disparities, and depths if known."""
-    values = ", ".join(f"{focus.disparity:.3g}" for focus in foci)
-    depths = ", ".join(f"{focus.depth:.3g}" for focus in foci if focus.depth is not None)
-    return f"{values} pixels per view step" + (f" ({depths} m)" if depths else "")
+    if not math.isfinite(known[y, x]):
+        raise SepiError(f"--at {x} {y}: {path} has no disparity for this pixel; choose one beside it")
+    return float(known[y, x])

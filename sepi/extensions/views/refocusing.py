@@ -15,14 +15,16 @@ from __future__ import annotations
 
 import math
 from numbers import Real
+from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.image.noise import noise_level, variance_of_residuals
+from sepi.image.noise import noise_level
 from sepi.kernels import refocusing as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field, without_reference
 from sepi.matching.nearest_surfaces import EMPTY, nearest_surfaces, z_buffers
 from sepi.matching.row_bands import Rows
 from sepi.matching.sheared_views import ShearedViews
@@ -106,10 +108,7 @@ def refocus(
     held = (np.abs(moved) <= (height - 1, width - 1)).all(axis=2)
     chosen = views_within(light_field, aperture) & held
     sums, counts = np.zeros((3, height, width), np.float32), np.zeros((height, width), np.float32)
-    # a row of views at a time, since all views take much memory
-    for t in range(light_field.grid[0]):
-        one_row = np.zeros_like(chosen)
-        one_row[t] = chosen[t]
+    for t, one_row in enumerate(_rows(chosen)):
         if one_row.any():
             views = ShearedViews(light_field, one_row).at(disparity)
             if surfaces is not None:
@@ -186,16 +185,16 @@ def all_in_focus(
         return np.clip(reference, 0, 1)
     disparity = np.where(np.isfinite(disparity), disparity, np.float32(np.nan))
     channels = reference.shape[2]
-    noise = variance_of_residuals(noise_level(light_field.reference_view), channels)
+    noise = 2 * channels * noise_level(light_field.reference_view) ** 2
     scale2 = np.float32(COLOUR_SCALE**2 * channels / 3 + noise)
     centre = reference
     for number in range(ROUNDS):
         sums = reference - centre
         weights = np.square(scale2 / (scale2 + np.square(sums).sum(axis=2)))
         sums *= weights[..., None]
-        for t in np.flatnonzero(others.any(axis=1)).tolist():
-            row = np.zeros_like(others)
-            row[t] = others[t]
+        for t, row in enumerate(_rows(others)):
+            if not row.any():
+                continue
             nearest = nearest_surfaces(light_field, surfaces, row, Rows(0, light_field.shape[0]))[t]
             for s in np.flatnonzero(row[t]).tolist():
                 view, margin = as_unit_float(light_field.views[t, s]), occlusion_margin
@@ -204,6 +203,11 @@ def all_in_focus(
             progress((number + (t + 1) / light_field.grid[0]) / ROUNDS)
         centre = centre + sums / weights[..., None]
     return np.clip(centre, 0, 1)
+
+
+def _rows(views: BoolMap) -> list[BoolMap]:
+    """Masks (T, S) of the views of each row of the grid, since all views at a time take much memory."""
+    return list(views & np.eye(len(views), dtype=bool)[:, :, None])
 
 
 def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
@@ -222,8 +226,7 @@ def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
     distance = np.hypot(*np.moveaxis(light_field.baselines, 2, 0))
     chosen = light_field.present & (distance <= aperture)
     if chosen.sum() < 2:
-        others = light_field.present.copy()
-        others[light_field.reference_position] = False
+        others = without_reference(light_field, light_field.present)
         raise SepiError(
             f"{light_field.name}: an aperture of {aperture:g} view steps has no view but the reference view; the "
             f"nearest other is {distance[others].min():g} away"
@@ -231,17 +234,15 @@ def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
     return np.asarray(chosen, bool)
 
 
-def focal_stack(disparity: FloatMap, count: int, unknown: BoolMap | None = None) -> list[float]:
+def focal_stack(disparity: FloatMap, count: int) -> list[float]:
     """Disparities to focus at, from the nearest to the farthest surface of a map.
 
     Parameters
     ----------
     disparity : ndarray, shape (H, W), float32
-        Pixels per view step.
+        Pixels per view step; NaN where unknown.
     count : int
         Number of disparities; 1: the middle.
-    unknown : ndarray, shape (H, W), bool, optional
-        Pixels that do not count.
 
     Returns
     -------
@@ -251,12 +252,12 @@ def focal_stack(disparity: FloatMap, count: int, unknown: BoolMap | None = None)
     Raises
     ------
     SepiError
-        If no pixel is finite and known.
+        If no pixel is finite.
     """
-    counted = np.isfinite(disparity) if unknown is None else np.isfinite(disparity) & ~unknown
-    if not counted.any():
+    counted = disparity[np.isfinite(disparity)].astype(np.float64)
+    if not counted.size:
         raise SepiError("the map has no pixel with a known disparity to focus at")
-    low, high = np.quantile(disparity[counted].astype(np.float64), (BEYOND, 1 - BEYOND)).tolist()
+    low, high = np.quantile(counted, (BEYOND, 1 - BEYOND)).tolist()
     return evenly_spaced(low, high, count)
 
 
@@ -295,17 +296,13 @@ def _filled_between(
     light_field: LightField, chosen: BoolMap, views: FloatMap, surfaces: FloatMap, focus: float
 ) -> FloatMap:
     """Sheared views ``(N, 3, H, W)`` of one row of the grid, each with the views round it."""
-    height, width = light_field.shape
     baselines, cell = light_field.baselines, _cell(light_field)
     (t,) = np.flatnonzero(chosen.any(axis=1)).tolist()
-    nearest = z_buffers(surfaces, chosen[t : t + 1], baselines[t : t + 1], 0, height)[0]
+    nearest = z_buffers(surfaces, chosen[t : t + 1], baselines[t : t + 1], 0, len(surfaces))[0]
     filled = np.empty_like(views)
     for n, s in enumerate(np.flatnonzero(chosen[t]).tolist()):
         seen = _without_holes(nearest[s], focus)
-        down, across = focus * baselines[t, s]
-        rows = np.clip(np.rint(np.arange(height) - down), 0, height - 1).astype(int)
-        columns = np.clip(np.rint(np.arange(width) - across), 0, width - 1).astype(int)
-        here = np.ascontiguousarray(seen[np.ix_(rows, columns)])
+        here = _sheared(seen, focus * baselines[t, s])
         kernels.fill_between(views[n], here, focus, cell, OCCLUSION_MARGIN, filled[n])
     return filled
 
@@ -326,18 +323,20 @@ def _without_holes(nearest: FloatMap, otherwise: float) -> FloatMap:
     return np.where(np.isinf(found), np.float32(otherwise), found).astype(np.float32)
 
 
-def _shown(light_field: LightField, place: tuple[int, ...], moved: FloatMap) -> FloatMap:
+def _shown(light_field: LightField, place: tuple[int, ...], moved: npt.NDArray[np.float64]) -> FloatMap:
     """Mask of the reference pixels whose samples a view shows, as 1 and 0; shape (H, W)."""
-    height, width = light_field.shape
-    shown = np.ones((height, width), np.float32)
+    shown = np.ones(light_field.shape, np.float32)
     # the reference view counts even at its missing pixels, for lack of others
     if light_field.missing is not None and place != light_field.reference_position:
         # reach of a cubic sample
-        beside = cv2.dilate(light_field.missing[place].astype(np.uint8), np.ones((5, 5), np.uint8))
-        rows = np.clip(np.rint(np.arange(height) - moved[0]), 0, height - 1).astype(int)
-        columns = np.clip(np.rint(np.arange(width) - moved[1]), 0, width - 1).astype(int)
-        shown -= beside[np.ix_(rows, columns)]
+        shown -= _sheared(cv2.dilate(light_field.missing[place].astype(np.uint8), np.ones((5, 5), np.uint8)), moved)
     return shown
+
+
+def _sheared(values: npt.NDArray[Any], moved: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+    """Values (H, W) of a view at the nearest pixels to those of the reference view, which it shows ``moved``."""
+    at = (np.clip(np.rint(np.arange(n) - by), 0, n - 1).astype(int) for n, by in zip(values.shape, moved, strict=True))
+    return np.ascontiguousarray(values[np.ix_(*at)])
 
 
 def _held(moved: float, length: int) -> slice:

@@ -272,9 +272,8 @@ def _require_room(path: Path, info: zipfile.ZipInfo) -> None:
 def matches_hdf5(path: Path) -> bool:
     """Whether ``path`` is an HDF5 file of another program, with an array that may be a light field."""
     try:
-        return has_dataset(path, "/", lambda root: not is_own(root)) and any(
-            is_likely(shape) for shape, _ in hdf5_shapes(path).values()
-        )
+        others = has_dataset(path, "/", lambda root: not is_own(root))
+        return others and any(is_likely(shape) for shape, _ in hdf5_shapes(path).values())
     except SepiError:
         return False
 

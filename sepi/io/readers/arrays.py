@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import permutations
 from math import isqrt, prod
 from pathlib import Path
@@ -24,30 +24,14 @@ from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
 _INTEGERS = (np.uint8, np.uint16)
 _LEAST_BRIGHTEST = 16
 
+Array = npt.NDArray[np.generic]
 _Ranges = Mapping[tuple[int, int], tuple[float, float]]
 
 
-@dataclass(frozen=True)
-class Scale:
-    """Conversion of the values of an array to those of a light field.
-
-    Attributes
-    ----------
-    dtype : dtype
-        uint8, uint16 or float32.
-    divisor : float
-        Values are divided by it; for floats it is the value of white.
-    notes : tuple of str
-        Assumptions that were made.
-    """
-
-    dtype: np.dtype[Any]
-    divisor: float = 1.0
-    notes: tuple[str, ...] = ()
-
-
-def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers, white: float | None = None) -> Scale:
-    """Scale of the values of views.
+def _scaled(
+    source: str, stack: Array, numbers: Numbers, white: float | None
+) -> tuple[Array, list[tuple[int, int]], list[str]]:
+    """Views at their positions, those that are NaN throughout, which stay zero, and assumptions.
 
     Parameters
     ----------
@@ -60,54 +44,68 @@ def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers, whit
     white : float, optional
         Value of white; default: guessed from the values.
 
+    Returns
+    -------
+    views : ndarray, uint8, uint16 or float32
+    unknown : list of (int, int)
+    notes : list of str
+
     Raises
     ------
     SepiError
         If a used view holds floats that are not finite, or values beyond every scale.
     """
-    floats = stack.dtype.kind == "f"
-    if white is None and stack.dtype.kind == "u" and stack.dtype.itemsize <= 2:
-        return Scale(np.dtype(f"u{stack.dtype.itemsize}"))
-    ranges, whole = {}, True
-    for t, s in np.argwhere(numbers >= 0).tolist():
-        view = stack[divmod(int(numbers[t, s]), stack.shape[1])]
-        values = _range_of(source, (t, s), view)
-        if values is not None:
-            ranges[t, s] = values
-            whole = whole and (not floats or bool((view == np.rint(view)).all()))
-    if white is not None:
-        return _given(source, stack.dtype, ranges, white)
+    stored = stack.dtype
+    notes: list[str] = []
+    used = {(t, s): stack[divmod(int(numbers[t, s]), stack.shape[1])] for t, s in np.argwhere(numbers >= 0).tolist()}
+    if white is None and stored.kind == "u" and stored.itemsize <= 2:
+        dtype, divisor, known = np.dtype(f"u{stored.itemsize}"), 1.0, list(used)
+    else:
+        ranges = {place: ends for place, view in used.items() if (ends := _range_of(source, place, view)) is not None}
+        known = list(ranges)
+        dtype, divisor, notes = _scale(source, stored, [used[place] for place in known], ranges, white)
+    views: Array = np.zeros((*numbers.shape, *stack.shape[2:]), dtype)
+    for place in known:
+        values = used[place] if divisor == 1 else used[place] / divisor
+        views[place] = np.rint(values) if divisor != 1 and dtype.kind == "u" else values
+    return views, [place for place in used if place not in known], notes
+
+
+def _scale(
+    source: str, stored: np.dtype[Any], views: Sequence[Array], ranges: _Ranges, white: float | None
+) -> tuple[np.dtype[Any], float, list[str]]:
+    """Type of the views of a light field, the divisor of stored values, and the assumption that was made.
+
+    For a given white, integers of few bits span the range of their type, other values are shares of white.
+    """
+    floats = stored.kind == "f"
     low = min((low for low, _ in ranges.values()), default=0.0)
     high = max((high for _, high in ranges.values()), default=0.0)
+    if white is not None:
+        bounds = (LOWEST * white, HIGHEST * white) if floats else (0.0, white)
+        if low < bounds[0] or high > bounds[1]:
+            raise _beyond(source, ranges, bounds, f"{bounds[0]:g} to {bounds[1]:g}, white being {white:g}")
+        if floats or stored.itemsize > 2:
+            return np.dtype(np.float32), white, []
+        dtype = np.dtype(f"u{stored.itemsize}")
+        return dtype, white / np.iinfo(dtype).max, []
     if floats and low >= LOWEST and high <= HIGHEST:
-        return Scale(np.dtype(np.float32))
+        return np.dtype(np.float32), 1.0, []
+    whole = not floats or all((view == np.rint(view)).all() for view in views)
     for kind in _INTEGERS:
-        white, dtype = np.iinfo(kind).max, np.dtype(kind)
-        if low >= 0 and high <= white and (whole or high >= _LEAST_BRIGHTEST):
-            word = "floats" if floats else stack.dtype.name
-            note = f"{word} from {low:g} to {high:g} taken as {8 * dtype.itemsize} bit, white being {white}"
-            return Scale(dtype if whole else np.dtype(np.float32), 1.0 if whole else float(white), (note,))
+        most, dtype = np.iinfo(kind).max, np.dtype(kind)
+        if low >= 0 and high <= most and (whole or high >= _LEAST_BRIGHTEST):
+            word = "floats" if floats else stored.name
+            note = f"{word} from {low:g} to {high:g} taken as {8 * dtype.itemsize} bit, white being {most}"
+            return (dtype, 1.0, [note]) if whole else (np.dtype(np.float32), float(most), [note])
     bounds = (LOWEST, HIGHEST) if floats else (0, np.iinfo(_INTEGERS[-1]).max)
     expected = f"{'0..1, ' if floats else ''}0..255 or 0..65535; --white sets another white"
     raise _beyond(source, ranges, bounds, expected)
 
 
-def _given(source: str, kind: np.dtype[Any], ranges: _Ranges, white: float) -> Scale:
-    """Scale for a given white: integers of few bits span the range of their type, other values are shares of white."""
-    whole = kind.kind in "iu"
-    bounds = (0.0, white) if whole else (LOWEST * white, HIGHEST * white)
-    if any(low < bounds[0] or high > bounds[1] for low, high in ranges.values()):
-        raise _beyond(source, ranges, bounds, f"{bounds[0]:g} to {bounds[1]:g}, white being {white:g}")
-    if whole and kind.itemsize <= 2:
-        dtype = np.dtype(f"u{kind.itemsize}")
-        return Scale(dtype, white / np.iinfo(dtype).max)
-    return Scale(np.dtype(np.float32), white)
-
-
 def _beyond(source: str, ranges: _Ranges, bounds: tuple[float, float], expected: str) -> SepiError:
     """Error that names the first view with values outside the bounds."""
-    beyond = {place: ends for place, ends in ranges.items() if ends[0] < bounds[0] or ends[1] > bounds[1]}
-    (t, s), (low, high) = next(iter(beyond.items()))
+    (t, s), (low, high) = next(one for one in ranges.items() if one[1][0] < bounds[0] or one[1][1] > bounds[1])
     return SepiError(f"{source}: view {t},{s} has values from {low:g} to {high:g}; expected within {expected}")
 
 
@@ -122,8 +120,6 @@ def _range_of(source: str, position: tuple[int, int], view: npt.NDArray[np.gener
     at = f"{position[0]},{position[1]}"
     raise SepiError(f"{source}: view {at} holds NaN or infinite values; repair it, or leave it out: --exclude {at}")
 
-
-Array = npt.NDArray[np.generic]
 
 # possible orders of the axes; "N" is the number t * S + s of a view
 _AXES = (("TS", "HW", "C"), ("TS", "HW"), ("N", "HW", "C"), ("N", "HW"))
@@ -199,10 +195,8 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     if not arranged:
         options = unarranged(options)
     numbers = arrange_numbers(source, stack.shape[:2], options)
-    scale = scale_of(source, stack, numbers, options.white)
-    views: Array = np.zeros((*numbers.shape, *stack.shape[2:]), scale.dtype)
     # excluded views may hold any values
-    unknown = _fill(views, stack, numbers, scale)
+    views, unknown, assumptions = _scaled(source, stack, numbers, options.white)
     present: BoolMap = np.any(views, axis=(2, 3, 4))
     black = [(t, s) for t, s in np.argwhere((numbers >= 0) & ~present).tolist() if (t, s) not in unknown]
     if black and not present.any():
@@ -212,12 +206,10 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
     if arranged and reference in [*black, *unknown]:
         t, s = reference
-        raise SepiError(
-            f"{source}: view {t},{s}, whose depth is estimated, is black or NaN; choose another by --view ROW,COLUMN"
-        )
+        raise SepiError(f"{source}: view {t},{s}, whose depth is made, is black or NaN; choose another by --view")
     assumed = [] if given else [f"axes taken as {' '.join(letters)}; --axes sets them otherwise"]
     missing = [*_missing_notes("all zeros", black), *_missing_notes("NaN throughout", unknown)]
-    notes = (*assumed, *channel_notes, *scale.notes, *missing)
+    notes = (*assumed, *channel_notes, *assumptions, *missing)
     return LightField(views, path.stem, source, present, view=options.view, notes=notes, arranged=arranged)
 
 
@@ -244,11 +236,7 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
 
 def with_white(views: Array, present: BoolMap, path: Path, white: float) -> Array:
     """Views (T, S, H, W, C) scaled so that ``white`` becomes the white of their type."""
-    numbers = np.where(present, np.arange(present.size).reshape(present.shape), -1)
-    scale = scale_of(str(path), views, numbers, white)
-    scaled: Array = np.zeros(views.shape, scale.dtype)
-    _fill(scaled, views, numbers, scale)
-    return scaled
+    return _scaled(str(path), views, np.where(present, np.arange(present.size).reshape(present.shape), -1), white)[0]
 
 
 def _checked_axes(source: str, array: Array, text: str) -> str:
@@ -332,21 +320,6 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
     views = views.reshape(rows, columns, size["H"], size["W"], size["C"])
     # drop the fourth channel
     return views[..., :3], notes
-
-
-def _fill(views: Array, stack: Array, numbers: Numbers, scale: Scale) -> list[tuple[int, int]]:
-    """Put the views in their positions; return the views that are all NaN, which stay zero."""
-    unknown = []
-    for t, s in np.argwhere(numbers >= 0).tolist():
-        view = stack[divmod(int(numbers[t, s]), stack.shape[1])]
-        if view.dtype.kind == "f" and np.isnan(view).all():
-            unknown.append((t, s))
-        elif scale.divisor == 1:
-            views[t, s] = view
-        else:
-            values = view / scale.divisor
-            views[t, s] = np.rint(values) if scale.dtype.kind == "u" else values
-    return unknown
 
 
 def _missing_notes(what: str, positions: Sequence[tuple[int, int]]) -> list[str]:

@@ -220,9 +220,8 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None, *, tr
     known = format_of(path, file_format)
     _require_used(path, known, options)
     with naming(path):
-        light_field = (
-            known.read(path, options) if truth or known.read_views is None else known.read_views(path, options)
-        )
+        of_views = known.read if truth or known.read_views is None else known.read_views
+        light_field = of_views(path, options)
         if not truth:
             light_field = replace(light_field, ground_truth=None, masks={})
         if options.white is not None and not known.scales:

@@ -22,7 +22,6 @@ from __future__ import annotations
 import configparser
 import math
 import re
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,7 +32,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, PositiveInt
 
 from sepi.camera import Camera, Part, camera_from
-from sepi.errors import SepiError, SepiWarning
+from sepi.errors import SepiError, warn
 from sepi.io.disparity_maps import read_pfm
 from sepi.io.files import name_of, naming, reading
 from sepi.io.hdf5 import has_dataset, number_of, open_hdf5, read_dataset
@@ -111,8 +110,7 @@ def read_truth(path: Path, options: ReadOptions) -> Truth:
         return _truth_of(path, (header.height, header.width), options.part)
     if of is not None and options.view is None and truth_files(path):
         known, made = (f"{t},{s}" for t, s in (of, reference))
-        told = f"{path}: its ground truth is of view {known}, the depth of view {made}; --view {known} scores it"
-        warnings.warn(told, SepiWarning, stacklevel=2)
+        warn(f"{path}: its ground truth is of view {known}, the depth of view {made}; --view {known} scores it")
     return None, {}
 
 
@@ -238,9 +236,7 @@ _GEOMETRY = ("dH", "focalLength", "shift")
 
 def matches_2013(path: Path) -> bool:
     """Whether ``path`` is a readable HDF5 file with a dataset ``LF`` of that shape."""
-    return has_dataset(
-        path, VIEWS_2013, lambda views: isinstance(views, h5py.Dataset) and _is_layout(views.shape or ())
-    )
+    return has_dataset(path, VIEWS_2013, lambda one: isinstance(one, h5py.Dataset) and _is_layout(one.shape or ()))
 
 
 def read_2013(path: Path, options: ReadOptions) -> LightField:
@@ -258,13 +254,10 @@ def read_2013(path: Path, options: ReadOptions) -> LightField:
         views = read_dataset(path, file[VIEWS_2013])
         shape = views.shape
         if not _is_layout(shape):
-            raise SepiError(
-                f"{path}: expected '{VIEWS_2013}' of shape (T, S, H, W, 3), got {shape}; as .npy, --axes tells"
-            )
+            raise SepiError(f"{path}: expected '{VIEWS_2013}' (T, S, H, W, 3), got {shape}; as .npy, --axes tells")
         camera, reason = _read_camera(file)
         light_field = light_field_from_array(views, path, options, axes="TSHWC")
-        numbers = arrange_numbers(str(path), shape[:2], options)
-        number = int(numbers[light_field.reference_position])
+        number = int(arrange_numbers(str(path), shape[:2], options)[light_field.reference_position])
         depth = _read_depth(path, file, shape, divmod(number, shape[1])) if _DEPTH in file else None
     if camera is None:
         note = f"no metric depth{'' if depth is None else ' and no ground truth'}: {reason}"

@@ -19,19 +19,11 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.io.files import name_of
 from sepi.io.images import SUFFIXES
+from sepi.io.readers import view_names
 from sepi.io.readers.camera_positions import off_grid, positions_from_cameras
 from sepi.io.readers.options import ReadOptions, is_position, unarranged
 from sepi.io.readers.view_files import MAX_VIEWS, files_in, has_rows, numbered, read_grid, view_files
-from sepi.io.readers.view_names import (
-    EXAMPLES,
-    ViewNumbers,
-    decimals_in,
-    infer_view_numbers,
-    origin,
-    pair_view_numbers,
-    parse_view_numbers,
-    sorted_view_numbers,
-)
+from sepi.io.readers.view_names import EXAMPLES, ViewNumbers, decimals_in, origin
 from sepi.lightfield import LightField
 
 _POSITIONS_PER_PICTURE = 100
@@ -77,12 +69,10 @@ def read(path: Path, options: ReadOptions) -> LightField:
     pixels, present, numbers, names = read_grid(path, views, layout.grid, options)
     told = (*_left_out([name for name in named.unmatched if _is_picture(name)]), *layout.notes)
     arranged, name = layout.arranged, str(name_of(path))
-    light_field = LightField(
-        pixels, name, str(path), present, view=options.view, notes=told, arranged=arranged, files=names
-    )
+    found = LightField(pixels, name, str(path), present, view=options.view, notes=told, arranged=arranged, files=names)
     # of decimals of which a part is row or column, none is a position
     counted = re.search(r"[0-9}*]\.\{|\}\.[0-9{*]", options.pattern or "")
-    return _with_positions(light_field, layout, numbers) if arranged and not counted else light_field
+    return _with_positions(found, layout, numbers) if arranged and not counted else found
 
 
 @dataclass(frozen=True)
@@ -158,9 +148,8 @@ def _by_row_and_column(folder: Path, named: ViewNumbers, numbers: Numbers, optio
                 f"images; say which numbers are row and column with --pattern, such as {EXAMPLES}"
             )
     if spread[0] // step >= grid[0] or spread[1] // step >= grid[1]:
-        raise SepiError(
-            f"{folder}: rows {top} to {max(rows)}, columns {left} to {max(columns)}; --grid has {grid[0]}x{grid[1]}"
-        )
+        ends = f"rows {top} to {max(rows)}, columns {left} to {max(columns)}"
+        raise SepiError(f"{folder}: {ends}; --grid has {grid[0]}x{grid[1]}")
     notes = []
     if named.said:
         notes = [f"the names say row and column{_like(named)}"]
@@ -169,10 +158,8 @@ def _by_row_and_column(folder: Path, named: ViewNumbers, numbers: Numbers, optio
     if top not in (0, 1) or left not in (0, 1):
         notes.append(f"the names count rows from {top}, columns from {left}")
     notes += _step_notes(step)
-    positions = {
-        name: (row - top) // step * grid[1] + (column - left) // step for name, (row, column) in numbers.items()
-    }
-    return _Layout(grid, positions, notes)
+    places = {name: ((row - top) // step, (column - left) // step) for name, (row, column) in numbers.items()}
+    return _Layout(grid, {name: row * grid[1] + column for name, (row, column) in places.items()}, notes)
 
 
 def _by_number(folder: Path, named: ViewNumbers, numbers: dict[str, int], grid: tuple[int, int] | None) -> _Layout:
@@ -211,15 +198,15 @@ def _step_notes(step: int) -> list[str]:
 
 def _named(folder: Path, names: Sequence[str], options: ReadOptions) -> ViewNumbers:
     if options.pattern is not None:
-        return parse_view_numbers(str(folder), names, options.pattern)
+        return view_names.parse_view_numbers(str(folder), names, options.pattern)
     names = list(filter(_is_picture, names))
     try:
-        return pair_view_numbers(names) or infer_view_numbers(str(folder), names)
+        return view_names.pair_view_numbers(names) or view_names.infer_view_numbers(str(folder), names)
     except SepiError:
         # a given grid that is filled needs only an order
         if options.grid is None or prod(options.grid) != len(names):
             raise
-        return sorted_view_numbers(names)
+        return view_names.sorted_view_numbers(names)
 
 
 def _is_picture(name: str) -> bool:
@@ -248,12 +235,9 @@ def _with_positions(light_field: LightField, layout: _Layout, numbers: npt.NDArr
 def _left_out(names: Sequence[str]) -> list[str]:
     if not names:
         return []
-    what = (
-        "1 image whose name is unlike the views' was"
-        if len(names) == 1
-        else (f"{len(names)} images whose names are unlike the views' were")
-    )
-    return [f"{what} left out: {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}"]
+    number = len(names)
+    what, were = ("1 image whose name is", "was") if number == 1 else (f"{number} images whose names are", "were")
+    return [f"{what} unlike the views' {were} left out: {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}"]
 
 
 def _require_different(path: Path, named: ViewNumbers) -> None:

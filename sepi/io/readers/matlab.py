@@ -21,9 +21,10 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -63,35 +64,6 @@ class _Part(NamedTuple):
     data: bytes | memoryview
 
 
-class _Variable(NamedTuple):
-    """A variable: its first elements, its place and length in the file, and its greatest unpacked size."""
-
-    order: str
-    parts: list[_Part]
-    file: BinaryIO
-    start: int
-    length: int
-    compressed: bool
-    most: int
-
-    @property
-    def flags(self) -> int:
-        """Class and kind of the values; 0 if it is not a matrix."""
-        return _flags(self.order, self.parts) if self.parts else 0
-
-    def content(self) -> bytes:
-        """Data of the matrix element."""
-        self.file.seek(self.start)
-        stored = self.file.read(self.length)
-        if not self.compressed:
-            return stored
-        packed = zlib.decompressobj()
-        content = packed.decompress(stored, self.most)[8:]
-        if not packed.eof:
-            raise ValueError("a variable that is cut off")
-        return content
-
-
 def shapes_of_version_5(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
     """Shape and type of the arrays of real numbers, as MATLAB shows them.
 
@@ -103,14 +75,7 @@ def shapes_of_version_5(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype
     SepiError, ValueError
         If the file is damaged.
     """
-    found = {}
-    with path.open("rb") as file:
-        for variable in _variables(path, file):
-            if _is_real(variable.flags):
-                shape, kind, _ = _form(variable.order, variable.parts)
-                found[_text(variable.parts[2])] = shape, kind
-                if variable.parts[_BEFORE].length > variable.most:
-                    raise ValueError("an array that is longer than the file")
+    found = {name: _form(order, parts)[:2] for order, name, parts, _ in _variables(path) if _is_real(order, parts)}
     if not any(is_likely(shape) for shape, _ in found.values()):
         found |= {name: (array.shape, array.dtype) for name, array in _arrays(path)}
     return found
@@ -123,11 +88,9 @@ def read_version_5(path: Path, name: str) -> npt.NDArray[Any]:
 
 def _arrays(path: Path, wanted: str = "") -> Iterator[tuple[str, npt.NDArray[Any]]]:
     """Arrays in structures and cells, and the wanted one."""
-    with path.open("rb") as file:
-        for variable in _variables(path, file):
-            name = _text(variable.parts[2]) if variable.parts else ""
-            if variable.flags & 0xFF in (_CELLS, _STRUCTURE) or name == wanted:
-                yield from _fields(variable.order, memoryview(variable.content()), name)
+    for order, name, parts, whole in _variables(path):
+        if _flags(order, parts) & 0xFF in (_CELLS, _STRUCTURE) or name == wanted:
+            yield from _fields(order, whole(), name)
 
 
 def _form(order: str, parts: list[_Part]) -> tuple[tuple[int, ...], np.dtype[Any], np.dtype[Any]]:
@@ -146,8 +109,8 @@ def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.
     parts = _parts(order, data)
     if any(part.length != len(part.data) for part in parts):
         raise ValueError(f"{name} is cut off")
-    flags = _flags(order, parts)
-    if flags & 0xFF == _STRUCTURE:
+    kind_of_matrix = _flags(order, parts) & 0xFF
+    if kind_of_matrix == _STRUCTURE:
         width = struct.unpack(order + "i", parts[3].data)[0]
         text = bytes(parts[4].data)
         fields = [text[at : at + width].split(b"\0")[0].decode("latin-1") for at in range(0, len(text), width)]
@@ -158,35 +121,49 @@ def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.
             if value.kind == _MATRIX and value.length:
                 which = f"({element + 1})" if len(values) > len(fields) else ""
                 yield from _fields(order, memoryview(value.data), f"{name}{which}/{fields[field]}")
-    elif flags & 0xFF == _CELLS:
+    elif kind_of_matrix == _CELLS:
         shape = np.frombuffer(parts[1].data, order + "i4").tolist()
         cells = [cell for part in parts[3:] if part.length for _, cell in _fields(order, memoryview(part.data), name)]
         if len(cells) == math.prod(shape) and len({(cell.shape, cell.dtype) for cell in cells}) == 1:
             yield name, np.stack(cells)[np.arange(len(cells)).reshape(shape, order="F").squeeze()]
-    elif _is_real(flags):
+    elif _is_real(order, parts):
         shape, kind, stored = _form(order, parts)
         # MATLAB stores doubles that are small whole numbers as bytes
         yield name, np.frombuffer(parts[_BEFORE].data, stored).reshape(shape, order="F").astype(kind, copy=False)
 
 
-def _variables(path: Path, file: BinaryIO) -> Iterator[_Variable]:
-    order = _ORDERS[file.read(_HEADER)[-4:]]
-    while tag := file.read(8):
-        kind, length = struct.unpack(order + "II", tag)
-        start = file.tell()
-        if start + length > path.stat().st_size:
+def _variables(path: Path) -> Iterator[tuple[str, str, list[_Part], Callable[[], memoryview]]]:
+    """Matrices: byte order, name, the first elements, and what gives the data of all."""
+    data, at = np.memmap(path, np.uint8, "r").data, _HEADER
+    order = _ORDERS[bytes(data[_HEADER - 4 : _HEADER])]
+    while at < len(data):
+        kind, length = struct.unpack_from(order + "II", data, at)
+        stored = data[at + 8 : at + 8 + length]
+        at += 8 + length
+        if at > len(data):
             raise SepiError("damaged MATLAB file: it is cut off")
-        head, compressed, most = file.read(min(length, _PREFIX)), kind == _COMPRESSED, length
-        if compressed:
+        head, most, packed = stored, length, kind == _COMPRESSED
+        if packed:
             most = length * DEFLATE_RATIO
-            head = zlib.decompressobj().decompress(head, _PREFIX)
-            kind, head = struct.unpack_from(order + "I", head)[0], head[8:]
-        parts = _parts(order, head, _BEFORE + 1) if kind == _MATRIX else []
-        # SciPy would allocate these lengths, even for variables that nobody asks for
-        if any(part.length > len(part.data) for part in parts[:_BEFORE]):
-            raise ValueError("a variable whose head is longer than the file")
-        yield _Variable(order, parts, file, start, length, compressed, most)
-        file.seek(start + length)
+            unpacked = zlib.decompressobj().decompress(stored, _PREFIX)
+            kind, head = _kind(order, unpacked), memoryview(unpacked)[8:]
+        if kind == _MATRIX:
+            parts = _parts(order, head, _BEFORE + 1)
+            # SciPy would allocate these lengths, even for variables that nobody asks for
+            if any(part.length > (most if n == _BEFORE else len(part.data)) for n, part in enumerate(parts)):
+                raise ValueError("a variable whose head is longer than the file")
+            yield order, _text(parts[2]), parts, partial(_content, stored, most if packed else 0)
+
+
+def _content(stored: memoryview, most: int) -> memoryview:
+    """Data of a matrix, unpacked to this size at most unless it is 0."""
+    if not most:
+        return stored
+    packed = zlib.decompressobj()
+    content = packed.decompress(stored, most)
+    if not packed.eof:
+        raise ValueError("a variable that is cut off")
+    return memoryview(content)[8:]
 
 
 def _parts(order: str, data: bytes | memoryview, most: int | None = None) -> list[_Part]:
@@ -205,10 +182,16 @@ def _parts(order: str, data: bytes | memoryview, most: int | None = None) -> lis
 
 
 def _flags(order: str, parts: list[_Part]) -> int:
-    return int(struct.unpack_from(order + "I", parts[0].data)[0])
+    """Class and kind of the values of a matrix."""
+    return _kind(order, parts[0].data)
 
 
-def _is_real(flags: int) -> bool:
+def _kind(order: str, data: bytes | memoryview) -> int:
+    return int(struct.unpack_from(order + "I", data)[0])
+
+
+def _is_real(order: str, parts: list[_Part]) -> bool:
+    flags = _flags(order, parts)
     return flags & 0xFF in _CLASSES and not flags & (_COMPLEX | _LOGICAL)
 
 

@@ -128,18 +128,14 @@ class ReadOptions:
     """
 
     grid: Grid = _option("Grid of views in the files.", "ROWSxCOLUMNS")
-    pattern: str | None = _option(
-        "Names of views in a folder: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is any text."
-    )
+    pattern: str | None = _option("Names of views: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is any text.")
     axes: str | None = _option(
         "Axes of an array in order, such as HWTSC: T S (view row, column; N for both in one), H W and C (colour)."
     )
     variable: str | None = _option("Name of the array in a .mat, .npz or HDF5 file with several.")
     central: Count | None = _option("Use only the N x N views in the middle.", "N")
     order: str = _option("Order of the views: a name that 'sepi check' prints.", default=AS_GIVEN)
-    exclude: tuple[str, ...] = _option(
-        "Leave out a view: ROW,COLUMN from 0, or a file; repeatable.", "VIEW", default=()
-    )
+    exclude: tuple[str, ...] = _option("Leave out a view: ROW,COLUMN from 0, or file; repeatable.", "VIEW", default=())
     view: Position = _option("View whose depth is estimated; default: the centre view.", "ROW,COLUMN")
     row_spacing: Positive | None = _option("Distance of rows of views in steps of columns, if they differ.", "F")
     white: Positive | None = _option("Value of white: 1023 for 10 bits, 4095 for 12.", "W")

@@ -28,9 +28,7 @@ def cut_like_views(values: Map, shape: tuple[int, int], part: Part | None) -> Ma
     return values[top : top + shape[0], left : left + shape[1]]
 
 
-def arrange_numbers(
-    source: str, grid: tuple[int, int], options: ReadOptions, names: Mapping[str, int] | None = None
-) -> Numbers:
+def arrange_numbers(source: str, grid: tuple[int, int], options: ReadOptions, names: Mapping[str, int] = {}) -> Numbers:
     """Number in the given grid of the view at each position of the light field's grid.
 
     Parameters
@@ -65,7 +63,7 @@ def arrange_numbers(
     numbers = ORDERS[options.order](numbers)
     if options.view is not None:
         _require_inside(source, numbers, options.view)
-    excluded = [_excluded(source, view, numbers, names or {}) for view in options.exclude]
+    excluded = [_excluded(source, view, numbers, names) for view in options.exclude]
     return np.where(np.isin(numbers, excluded), -1, numbers)
 
 

@@ -151,9 +151,7 @@ def _ranked(names: Sequence[str], others: tuple[str, ...] = ()) -> ViewNumbers:
 def pair_view_numbers(names: Iterable[str]) -> ViewNumbers | None:
     """A left and a right view, ``left.png`` and ``right.png``; None unless there is exactly one such pair."""
     names = sorted(names)
-    swapped = [
-        (name, re.sub(rf"(?<![A-Za-z]){left}(?![A-Za-z])", right, name)) for name in names for left, right in _PAIRS
-    ]
+    swapped = [(n, re.sub(rf"(?<![A-Za-z]){left}(?![A-Za-z])", right, n)) for n in names for left, right in _PAIRS]
     pairs = [pair for pair in swapped if pair[0] != pair[1] in names]
     if len(pairs) != 1:
         return None
@@ -168,10 +166,8 @@ def decimals_in(names: Sequence[str]) -> list[tuple[float, ...]]:
     if len(set(map(len, found))) != 1:
         return [()] * len(names)
     separators = _hyphens([sign for sign, _ in row] for row in found)
-    return [
-        tuple(_signed(sign, text, hyphen, float) for (sign, text), hyphen in zip(row, separators, strict=True))
-        for row in found
-    ]
+    every = (zip(row, separators, strict=True) for row in found)
+    return [tuple(_signed(sign, text, hyphen, float) for (sign, text), hyphen in row) for row in every]
 
 
 def origin(values: Sequence[int]) -> tuple[int, int]:
@@ -230,7 +226,7 @@ class _NameGroup:
             why = "several numbers differ from name to name, and no two of them alone fill a grid"
             if not kept:
                 raise SepiError(
-                    f"{source}: no number in the names counts the views; give --grid, or --pattern, such as {EXAMPLES}"
+                    f"{source}: no number in the names counts views; give --grid, or --pattern, such as {EXAMPLES}"
                 )
             if len(kept) == 1:
                 return tuple(kept), self._is_count(kept[0])
@@ -280,19 +276,18 @@ class _NameGroup:
         ]
         return found if len(found) < len(words) else []
 
+    def _span(self, at: int) -> int:
+        """Number of places between the least and the greatest number."""
+        lowest, step = origin(self._columns[at])
+        return (max(self._columns[at]) - lowest) // step + 1
+
     def _fills(self, row: int, column: int) -> bool:
         """Whether two numbers give each view a place of its own, in a grid that they fill well."""
-        sizes = [
-            (max(values) - lowest) // step + 1
-            for values in (self._columns[row], self._columns[column])
-            for lowest, step in [origin(values)]
-        ]
-        return self._count([row, column]) == len(self.names) >= _FILLED * math.prod(sizes)
+        return self._count([row, column]) == len(self.names) >= _FILLED * self._span(row) * self._span(column)
 
     def _is_count(self, at: int) -> bool:
         """Whether numbers, perhaps with gaps, count one by one."""
-        lowest, step = origin(self._columns[at])
-        return len(self.names) >= _COUNTED * ((max(self._columns[at]) - lowest) // step + 1)
+        return len(self.names) >= _COUNTED * self._span(at)
 
     def row_first(self, columns: tuple[int, ...]) -> tuple[tuple[int, ...], bool]:
         """Row and column in that order, and whether words in the names say so: ``x3_y7``, ``c3r7``."""

@@ -51,19 +51,24 @@ double in_order(const Scratch<Number, 1> &rows) {
     return total;
 }
 
-// Weights of second differences in one direction; corners (n, 2) and factors (n) are the pixels of a difference.
-void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const double, 2> colour,
-                            Array<const std::int64_t, 2> corners, Array<const double, 1> factors, double threshold, double variance,
-                            Array<double, 2> out) {
-    parallel_for_pixels(out.shape[0], out.shape[1], [&](Index y, Index x) {
-        double difference = 0, trust = reliability(y, x);
-        for (Index i = 0; i < factors.shape[0]; ++i) {
-            const Index row = y + corners(i, 0), column = x + corners(i, 1);
-            difference += factors(i) * double(disparity(row, column));
-            trust = std::min(trust, double(reliability(row, column)));
+// Weights of second differences in one direction; corners (n, 2) and factors (n) are the pixels of a difference, at most four.
+void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const float, 2> colour,
+                            Array<const std::int64_t, 2> corners, Array<const float, 1> factors, float threshold, float variance,
+                            Array<float, 2> out) {
+    parallel_for(0, out.shape[0], [&](Index y) {
+        const float *values[4], *trusts[4], *changes = colour.at(y);
+        float factor[4] = {}, *__restrict target = out.at(y);
+        for (Index i = 0; i < 4; ++i) {
+            // a fourth of three is the first again, without effect
+            const Index n = i < factors.shape[0] ? i : 0;
+            values[i] = disparity.at(y + corners(n, 0), corners(n, 1)), trusts[i] = reliability.at(y + corners(n, 0), corners(n, 1));
+            factor[i] = i == n ? factors(n) / threshold : 0;
         }
-        difference /= threshold;
-        out(y, x) = std::exp(-std::min(difference * difference * trust + 2 * colour(y, x) / variance, 30.0));
+        for (Index x = 0; x < out.shape[1]; ++x) {
+            const float difference = factor[0] * values[0][x] + factor[1] * values[1][x] + factor[2] * values[2][x] + factor[3] * values[3][x];
+            const float trust = std::min(std::min(trusts[0][x], trusts[1][x]), std::min(trusts[2][x], trusts[3][x]));
+            target[x] = exp_of_negative(-std::min(difference * difference * trust + 2 * changes[x] / variance, 30.0f));
+        }
     });
 }
 
@@ -179,24 +184,25 @@ double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2
 }
 
 // Diagonal of the matrix in hats with this spacing, out (h, w).
-void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<double, 2> out) {
+template <class Number>
+void diagonal_of_hats(Array<const Number, 3> stencil, Index spacing, Array<Number, 2> out) {
     const Index H = stencil.shape[1] - 2 * MARGIN, W = stencil.shape[2] - 2 * MARGIN, w = out.shape[1], reach = 2 * spacing;
     const Nodes down(out.shape[0], spacing, H), across(w, spacing, W);
     parallel_for(0, out.shape[0], [&](Index i) {
-        const Scratch<double, 1> lines(spacing * (w + 1));
-        double *line = lines.array().data, *__restrict target = out.at(i);
-        std::fill_n(target, w, 0.0);
+        const Scratch<Number, 1> lines(spacing * (w + 1));
+        Number *line = lines.array().data, *__restrict target = out.at(i);
+        std::fill_n(target, w, Number(0));
         for (Index k = 0; k < stencil.shape[0]; ++k) {
             const auto [dy, dx] = ENTRIES[k];
-            std::fill_n(line, spacing * (w + 1), 0.0);
+            std::fill_n(line, spacing * (w + 1), Number(0));
             for (Index p = 0; p < reach; ++p) {
                 const Index y = spacing * i + p - down.before;
-                const double share = down.height(p) * down.height(p + dy);
+                const auto share = Number(down.height(p) * down.height(p + dy));
                 if (0 <= y && y < H && share > 0) add(line + across.before, share, stencil.at(k, y + MARGIN, MARGIN), W);
             }
             for (Index p = 0; p < reach; ++p) {
                 // each entry from either of its pixels
-                const double share = (k == 0 ? 1.0 : 2.0) * across.height(p) * across.height(p + dx);
+                const auto share = Number((k == 0 ? 1 : 2) * across.height(p) * across.height(p + dx));
                 if (share > 0)
                     for (Index j = 0; j < w; ++j) target[j] += share * line[spacing * j + p];
             }
@@ -209,6 +215,7 @@ template <class Number>
 void bind_of_numbers(Kernels &m) {
     m.def("bend", &bend<Number>);
     m.def("step", &step<Number>);
+    m.def("diagonal_of_hats", &diagonal_of_hats<Number>);
     m.def("onto_finest", &onto_finest<Number>);
     m.def("onto_coarser", &onto_coarser<Number>);
     m.def("onto_finer", &onto_finer<Number>);
@@ -221,7 +228,6 @@ const Submodule submodule("second_order", [](Kernels &m) {
     m.def("weights_of_differences", &weights_of_differences);
     bind_of_numbers<float>(m);
     bind_of_numbers<double>(m);
-    m.def("diagonal_of_hats", &diagonal_of_hats);
 });
 
 }  // namespace

@@ -7,7 +7,7 @@ import pytest
 from geometries import GEOMETRIES, standing
 
 from sepi.camera import Camera
-from sepi.extensions.cameras.posed_views import camera_poses, nominal_camera, posed_views
+from sepi.extensions.cameras.posed_views import nominal_camera, posed_views
 from sepi.lightfield import LightField
 from sepi.matching.carried_map import carried_map
 from sepi.scenes import render
@@ -24,12 +24,12 @@ def light_field(**known: object) -> LightField:
 
 def test_the_centre_view_looks_through_the_middle() -> None:
     """Programs that take the middle of the picture for granted are right about one view at least."""
-    poses = camera_poses(light_field(view=(0, 0)), SHEARED)
-    (centre,) = np.flatnonzero((poses.positions == (1, 2)).all(axis=1))
-    np.testing.assert_allclose(poses.from_corner[centre], [SHAPE[1] / 2, SHAPE[0] / 2], atol=1e-12)
+    poses = posed_views(light_field(view=(0, 0)), np.zeros(SHAPE, np.float32), camera=SHEARED)
+    centre = poses.positions.index((1, 2))
+    np.testing.assert_allclose(poses.principal_points[centre], [(SHAPE[1] - 1) / 2, (SHAPE[0] - 1) / 2], atol=1e-12)
     # one view step to the right, a baseline of b = scale / f, and b f / F pixels
     np.testing.assert_allclose(poses.centres[centre + 1] - poses.centres[centre], [36 / 1500, 0, 0], atol=1e-12)
-    np.testing.assert_allclose(poses.from_corner[centre + 1] - poses.from_corner[centre], [8, 0], atol=1e-12)
+    np.testing.assert_allclose(poses.principal_points[centre + 1] - poses.principal_points[centre], [8, 0], atol=1e-12)
 
 
 def test_a_nominal_camera_sees_the_scene_before_it() -> None:
@@ -89,16 +89,16 @@ def test_carried_pixels_have_the_colours_of_the_reference_view(geometry: str) ->
     """Depth of the other views must lie where their pictures show the thing: not mirrored, nor a row too far."""
     scene = render("curved_occluders", size=64, views=3, **standing(geometry, (3, 3)))
     posed = posed_views(scene, np.asarray(scene.ground_truth))
-    here = posed.picture(posed.poses.reference).astype(np.float64)
-    for view in range(len(posed.poses)):
+    here = posed.picture(posed.reference).astype(np.float64)
+    for view in range(len(posed.positions)):
         carried = posed.carried(view)
         y, x = np.nonzero(~np.isnan(carried))
         assert len(y) > 0.7 * carried.size
-        back = np.column_stack([y, x]) + carried[y, x][:, None] * posed.poses.baselines[view]
+        back = np.column_stack([y, x]) + carried[y, x][:, None] * posed.baselines[view]
         rows, columns = np.clip(np.rint(back).astype(int), 0, 63).T
         right = np.abs(posed.picture(view)[y, x] - here[rows, columns]).mean()
         wrong = np.abs(posed.picture(view)[y, x] - here[y, x]).mean()
-        assert right < 0.5 * wrong or view == posed.poses.reference
+        assert right < 0.5 * wrong or view == posed.reference
 
 
 # --- what is asked for
@@ -118,7 +118,7 @@ def test_points_are_the_surer_pixels_and_no_more_than_asked() -> None:
         assert len(posed.points) == len(posed.colours) == posed.chosen.sum()
     unknown = np.zeros(SHAPE, bool)
     unknown[4:] = True
-    assert posed_views(scene, disparity, unknown=unknown).known.sum() == 4 * SHAPE[1]
+    assert posed_views(scene, disparity, unknown=unknown, max_points=10**6).chosen.sum() == 4 * SHAPE[1]
 
 
 def test_what_lies_at_infinity_has_no_depth() -> None:
@@ -126,10 +126,10 @@ def test_what_lies_at_infinity_has_no_depth() -> None:
     disparity = np.ones(SHAPE, np.float32)
     disparity[2, :3] = -8, -9, np.nan
     posed = posed_views(light_field(camera=SHEARED), disparity)
-    depth = posed.depth(posed.carried(posed.poses.reference))
+    depth = posed.depth(posed.carried(posed.reference))
     assert depth[2, :3].tolist() == [0, 0, 0]
-    assert posed.known.sum() == disparity.size - 3
-    np.testing.assert_array_equal(depth[posed.known], SHEARED.depth(disparity)[posed.known])
+    assert posed.chosen.sum() == disparity.size - 3
+    np.testing.assert_array_equal(depth[posed.chosen], SHEARED.depth(disparity)[posed.chosen])
     assert (posed.points[:, 2] > 0).all()
 
 
@@ -139,6 +139,6 @@ def test_pictures_are_8_bit_colour_whatever_the_views_are(kind: type) -> None:
     levels = np.random.default_rng(6).integers(0, 256, (*GRID, *SHAPE, 1), np.uint8)
     views = levels * kind(257) if kind is np.uint16 else (levels / 255).astype(kind)
     posed = posed_views(replace(light_field(), views=views), np.ones(SHAPE, np.float32))
-    picture = posed.picture(posed.poses.reference)
+    picture = posed.picture(posed.reference)
     assert picture.dtype == np.uint8
     np.testing.assert_array_equal(picture, np.repeat(levels[1, 2], 3, axis=2))

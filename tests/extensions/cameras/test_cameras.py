@@ -21,7 +21,7 @@ from sepi.camera.rig import Lens, Shot
 from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.extensions.cameras.files import rotation_of
-from sepi.extensions.cameras.posed_views import camera_poses
+from sepi.extensions.cameras.posed_views import posed_views
 from sepi.extensions.cameras.reader import read_model
 from sepi.extensions.cameras.rectification import light_field_of, rectification_of
 from sepi.io.all_views import read_result_at, write_all_views
@@ -157,13 +157,13 @@ def test_dots_are_where_they_should_be_in_every_rectified_view(tmp_path: Path) -
         cv2.imwrite(str(tmp_path / shot.name), np.rint(picture).astype(np.uint16))
     (tmp_path / "cameras.yaml").write_text(json.dumps({"cameras": list(map(_entry, shots))}))
     light_field = light_field_of(rectification_of(read_model(tmp_path), inverse_depths=(0.9, 1.1)))
-    camera, rig = light_field.camera, light_field.reference_rig
-    poses = camera_poses(light_field, camera)
+    rig = light_field.reference_rig
+    poses = posed_views(light_field, np.zeros(light_field.shape, np.float32))
     seen = (dots @ TURN.T + AWAY - rig.origin) @ rig.rotation.T
     errors = []
-    for view, (t, s) in enumerate(poses.positions.tolist()):
+    for view, (t, s) in enumerate(poses.positions):
         bright = light_field.views[t, s].mean(axis=2) - 2000 / 65535
-        for py, px in poses.project(seen, view):
+        for px, py in poses.project(seen, view):
             top, left = round(py) - 4, round(px) - 4
             if min(top, left) < 0 or top + 9 > light_field.shape[0] or left + 9 > light_field.shape[1]:
                 continue
@@ -212,7 +212,6 @@ def test_poses_that_were_written_give_their_light_field_again(tmp_path: Path, ki
     if kind == "colmap":
         pytest.importorskip("pycolmap")
     from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
-    from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = replace(render("pyramids", size=SIZE, views=3), camera=CAMERA)
     truth = light_field.ground_truth
@@ -236,7 +235,6 @@ def test_written_cameras_stand_in_the_calibrated_world(folder: Path, tmp_path: P
     if kind == "colmap":
         pytest.importorskip("pycolmap")
     from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
-    from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = sepi.read_cameras(folder)
     flat = np.zeros(light_field.shape, np.float32)
@@ -257,7 +255,7 @@ def test_written_cameras_stand_in_the_calibrated_world(folder: Path, tmp_path: P
         from_centre=light_field.from_centre,
         rig=light_field.reference_rig,
     )
-    written = posed.in_world(posed.points)
+    written = light_field.reference_rig.to_world(posed.points)
     np.testing.assert_allclose(written, cloud.positions.reshape(*light_field.shape, 3)[posed.chosen], atol=1e-5)
     if len(model.points):
         np.testing.assert_allclose(np.sort(model.points, axis=0), np.sort(written, axis=0), atol=1e-9)
@@ -266,7 +264,6 @@ def test_written_cameras_stand_in_the_calibrated_world(folder: Path, tmp_path: P
 def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path: Path) -> None:
     """Their lengths would be those of the calibrated one, beside metres of the other."""
     from sepi.extensions.cameras.data_sets import write_nerfstudio
-    from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)
     assert light_field.ground_truth is not None
@@ -281,7 +278,6 @@ def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path:
 def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> None:
     """A hand before the lens, or the gantry itself, becomes part of the scene."""
     from sepi.extensions.cameras.data_sets import write_nerfstudio
-    from sepi.extensions.cameras.posed_views import posed_views
 
     light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)
     write_nerfstudio(tmp_path / "rig", posed_views(light_field, np.zeros(light_field.shape, np.float32)))

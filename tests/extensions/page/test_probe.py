@@ -57,7 +57,7 @@ def test_curves_are_what_the_sweep_minimises(settings, radius):
     light_field = random_light_field(**settings)
     parameters = SweepParameters(num_disparities=10, scale=0.3, window_radius=radius, window_sigma=0.5)
     views = halves_and_quarters(light_field)
-    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    result = sweep(light_field, parameters, subsets=views)
     H, W = light_field.shape
     corners_and_inside = [(0, 0), (H - 1, W - 1), (0, W - 1), (H - 1, 0), (H // 2, W // 2), (H // 2, 1), (1, W // 2)]
     for y, x in corners_and_inside:

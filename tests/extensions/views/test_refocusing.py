@@ -258,15 +258,13 @@ def test_pixels_of_unknown_disparity_stay_as_they_are() -> None:
 
 
 def test_a_stack_goes_from_near_to_far() -> None:
-    """A few wrong pixels, unknown ones and those without a value do not stretch it."""
+    """A few wrong pixels and those without a value do not stretch it."""
     disparity = np.linspace(-1, 2, 10000, dtype=np.float32).reshape(100, 100)
     disparity[0, :10] = -50
     disparity[1, 1] = np.nan
-    unknown = np.zeros(disparity.shape, bool)
-    unknown[50], disparity[50] = True, 9
-    found = focal_stack(disparity, 4, unknown)
+    found = focal_stack(disparity, 4)
     assert found == pytest.approx([1.985, 0.995, 0.005, -0.985], abs=0.02)
-    assert focal_stack(disparity, 1, unknown) == pytest.approx([0.5], abs=0.02)
+    assert focal_stack(disparity, 1) == pytest.approx([0.5], abs=0.02)
     assert focal_stack(np.full((4, 4), 0.5, np.float32), 9) == [0.5]
     assert evenly_spaced(-1, 1, 3) == [1, 0, -1]
 
