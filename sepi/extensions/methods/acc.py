@@ -55,7 +55,7 @@ from scipy import fft
 from sepi.extensions.methods.costs import GuidedFilter, Previous, distinctness, filtered, maps_of, weighted_median
 from sepi.extensions.methods.markov_field import labels_of_least_energy
 from sepi.kernels import thread_count
-from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.lightfield import FloatMap, LightField, as_unit_float, without_reference
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, no_progress, require_costs
 
@@ -139,9 +139,10 @@ def phase_shift_costs(
     """
     reference = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     farthest = light_field.reach * float(np.abs(disparities).max())
-    costs, others = np.zeros((len(disparities), *light_field.shape), np.float32), _others(light_field)
-    for n, position in enumerate(others):
-        view, baseline = as_unit_float(light_field.rgb_views[position]), light_field.baselines[position]
+    costs = np.zeros((len(disparities), *light_field.shape), np.float32)
+    others = np.argwhere(without_reference(light_field, light_field.present))
+    for n, (t, s) in enumerate(others):
+        view, baseline = as_unit_float(light_field.rgb_views[t, s]), light_field.baselines[t, s]
         # gradients along the baseline; none stands where the reference view does
         share = float(np.abs(baseline[1]) / np.abs(baseline).sum()) if baseline.any() else 0.5
         shifted = phase_shifted(view.transpose(2, 0, 1), -disparities[:, None] * baseline, farthest)
@@ -151,12 +152,6 @@ def phase_shift_costs(
     share, truncation = parameters.colour_share, parameters.colour_truncation
     costs /= np.float32(len(others) * (share * truncation + (1 - share) * parameters.gradient_truncation))
     return costs
-
-
-def _others(light_field: LightField) -> list[tuple[int, ...]]:
-    """Grid positions of the views other than the reference view."""
-    positions = map(tuple, np.argwhere(light_field.present).tolist())
-    return [position for position in positions if position != light_field.reference_position]
 
 
 def truncated_difference(
@@ -332,11 +327,11 @@ def matched_disparities(light_field: LightField, low: float, high: float) -> tup
         Pixels per view step.
     """
     points, descriptors = features_of(light_field.reference_view)
-    others = _others(light_field)
-    baselines = np.array([light_field.baselines[position] for position in others]).reshape(-1, 2)
-    found = np.full((len(others), len(points)), np.nan)
-    for n, position in enumerate(others):
-        there, of_view = features_of(as_unit_float(light_field.rgb_views[position]))
+    others = without_reference(light_field, light_field.present)
+    baselines = light_field.baselines[others]
+    found = np.full((len(baselines), len(points)), np.nan)
+    for n, (t, s) in enumerate(np.argwhere(others)):
+        there, of_view = features_of(as_unit_float(light_field.rgb_views[t, s]))
         first, second = mutual_matches(descriptors, of_view)
         moved = there[second] - points[first]
         # NaN where a view stands where the reference view does
@@ -345,7 +340,7 @@ def matched_disparities(light_field: LightField, low: float, high: float) -> tup
         fits = (aside <= _OFF_LINE) & (along >= low) & (along <= high)
         found[n, first[fits]] = along[fits]
     disparity, support = agreed(found, np.hypot(*baselines.T))
-    kept = support >= max(1.0, _LEAST_SUPPORT * len(others))
+    kept = support >= max(1.0, _LEAST_SUPPORT * len(baselines))
     pixels = np.floor(points[kept] + 0.5).astype(np.int64)
     # a point with two orientations yields two features
     pixels, once = np.unique(pixels, axis=0, return_index=True)
