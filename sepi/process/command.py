@@ -204,8 +204,14 @@ def peak_memory_mb() -> float:
         status = Path("/proc/self/status").read_text(encoding="ascii")
         # ru_maxrss below would count the parent's memory
         return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")) / 2**10
-    import resource
+    try:
+        import resource
+    except ImportError:
+        # Windows
+        import psutil
 
+        memory = psutil.Process().memory_info()
+        return float(getattr(memory, "peak_wset", memory.rss)) / 2**20
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
