@@ -264,12 +264,6 @@ def _with_bars(
     )
 
 
-def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMap:
-    """Trust in the data, 0..1, by the best confidence within two pixels, since edges lower the confidence."""
-    best = cv2.dilate(confidence, np.ones((5, 5), np.uint8))
-    return np.asarray(np.clip((best / parameters.reliable_confidence) ** 2, LEAST_RELIABILITY, 1), np.float32)
-
-
 def _threshold(disparity: FloatMap, parameters: SecondOrderParameters, first: bool) -> float:
     """Second difference of a discontinuity, in proportion to the map's own: leaves curve more than a wall.
 
@@ -305,7 +299,10 @@ class _Prior(NamedTuple):
 def _prior(
     light_field: LightField, confidence: FloatMap, uniform: BoolMap, parameters: SecondOrderParameters
 ) -> _Prior:
-    reliability = np.where(uniform, 1, reliable(confidence, parameters)).astype(np.float32)
+    # edges lower the confidence, so the best within two pixels counts
+    best = cv2.dilate(confidence, np.ones((5, 5), np.uint8))
+    trust = np.clip((best / parameters.reliable_confidence) ** 2, LEAST_RELIABILITY, 1)
+    reliability = np.where(uniform, 1, trust).astype(np.float32)
     variance = parameters.smooth_colour**2 + 4 * reference_residual_variance(light_field)
     return _Prior(uniform, reliability, colour_changes(light_field.reference_view), variance)
 

@@ -7,7 +7,7 @@ import pytest
 
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
-from sepi.regularization.border_planes import BorderPlaneParameters, ransac_plane
+from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
 from sepi.regularization.uniform_regions import UniformPlanesParameters, plain_pixels
 from sepi.scenes import render
 from sepi.scoring.error_bars import oracle, sparsification
@@ -88,10 +88,10 @@ def test_plane_is_nowhere_nearer_than_most_of_the_border() -> None:
     disparity[:, 30:] = 1.5
     border = np.zeros((30, 40), bool)
     border[[0, -1]] = border[:, [0, -1]] = True
-    plane = ransac_plane(border, disparity.astype(np.float32), BorderPlaneParameters())
+    plane = BorderPlane.of(border, disparity.astype(np.float32), BorderPlaneParameters()).plane
     found = plane[0] + plane[1] * (x - 19.5) + plane[2] * (y - 14.5)
     np.testing.assert_allclose(found, ground_truth, atol=1e-3)
-    assert ransac_plane(np.zeros((30, 40), bool), disparity, BorderPlaneParameters()) is None
+    assert BorderPlane.of(np.zeros((30, 40), bool), disparity, BorderPlaneParameters()) is None
 
 
 def test_parts_that_noise_needs_change_maps_in_noise() -> None:

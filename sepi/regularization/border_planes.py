@@ -24,25 +24,6 @@ from sepi.stage import Parameters
 _PIXELS_OF_A_PLANE = 12  # least to fit one to
 
 
-def pixels_in_order(pixels: BoolMap, disparity: FloatMap) -> tuple[FloatArray, FloatArray]:
-    """1, x and y of some pixels, (N, 3), and their disparities; in the same order in a mirrored picture."""
-    positions, values = basis_of(pixels), disparity[pixels].astype(np.float64)
-    order = np.lexsort(((positions[:, 1:] ** 2).sum(axis=1), values))
-    return positions[order], values[order]
-
-
-def planes_through(positions: FloatArray, values: FloatArray, tried: int) -> FloatArray:
-    """At most so many planes through three pixels each, (P, 3); none for too few pixels.
-
-    The same ones every time, whatever else is asked.
-    """
-    if len(values) < _PIXELS_OF_A_PLANE:
-        return np.empty((0, 3))
-    triples = np.random.default_rng(0).integers(len(values), size=(tried, 3))
-    triples = triples[np.abs(np.linalg.det(positions[triples])) > 1e-9]
-    return np.asarray(np.linalg.solve(positions[triples], values[triples, None])[..., 0])
-
-
 def support(
     positions: FloatArray, values: FloatArray, planes: FloatArray, tolerance: float, behind_penalty: float
 ) -> FloatArray:
@@ -53,11 +34,10 @@ def support(
     return found
 
 
-def residuals_of(positions: FloatArray, values: FloatArray, planes: FloatArray) -> FloatArray:
-    """By how much each of N values is above each of P planes, (P, N)."""
-    a, b, c = planes.T[..., None]
+def _residuals(positions: FloatArray, values: FloatArray, plane: Plane) -> FloatArray:
+    """By how much each of N values is above a plane, (N,)."""
     # term by term: the rounding of a matrix product depends on the number of threads
-    return np.asarray(values - (a + b * positions[:, 1] + c * positions[:, 2]))
+    return np.asarray(values - (plane[0] + plane[1] * positions[:, 1] + plane[2] * positions[:, 2]))
 
 
 KNOWN_BORDER = 2.0
@@ -101,37 +81,37 @@ class BorderPlane:
 
     @classmethod
     def of(cls, border: BoolMap, disparity: FloatMap, parameters: BorderPlaneParameters) -> Self | None:
-        """That of :func:`ransac_plane`, and how much of the border agrees."""
-        plane = ransac_plane(border, disparity, parameters)
-        if plane is None:
+        """The plane that most of a border agrees with and little of it lies behind.
+
+        The triples of pixels that planes are tried through do not depend on other regions, nor on which way the picture
+        is mirrored.
+
+        Parameters
+        ----------
+        border : ndarray, shape (h, w), bool
+        disparity : ndarray, shape (h, w), float32
+        parameters : BorderPlaneParameters
+
+        Returns
+        -------
+        BorderPlane or None
+            None where too little of the border agrees.
+        """
+        positions, values = basis_of(border), disparity[border].astype(np.float64)
+        if len(values) < _PIXELS_OF_A_PLANE:
             return None
-        residuals = residuals_of(basis_of(border), disparity[border].astype(np.float64), plane[None])[0]
-        return cls(plane, residuals.size, float((np.abs(residuals) < parameters.tolerance).mean()))
-
-
-def ransac_plane(border: BoolMap, disparity: FloatMap, parameters: BorderPlaneParameters) -> Plane | None:
-    """Plane that most of a border agrees with and little of it lies behind.
-
-    The triples of pixels that planes are tried through do not depend on other regions, nor on which way the picture is
-    mirrored.
-
-    Parameters
-    ----------
-    border : ndarray, shape (h, w), bool
-    disparity : ndarray, shape (h, w), float32
-    parameters : BorderPlaneParameters
-
-    Returns
-    -------
-    Plane or None
-        None where too little of the border agrees.
-    """
-    positions, values = pixels_in_order(border, disparity)
-    planes = planes_through(positions, values, parameters.ransac_iterations)
-    if not len(planes):
-        return None
-    plane = planes[support(positions, values, planes, parameters.tolerance, parameters.behind_penalty).argmax()]
-    agreeing = abs(residuals_of(positions, values, plane[None])[0]) < parameters.tolerance
-    if agreeing.sum() < max(3, parameters.min_inlier_ratio * values.size):
-        return None
-    return np.asarray(np.linalg.lstsq(positions[agreeing], values[agreeing], rcond=None)[0])
+        # in the same order in a mirrored picture
+        order = np.lexsort(((positions[:, 1:] ** 2).sum(axis=1), values))
+        positions, values = positions[order], values[order]
+        triples = np.random.default_rng(0).integers(len(values), size=(parameters.ransac_iterations, 3))
+        triples = triples[np.abs(np.linalg.det(positions[triples])) > 1e-9]
+        if not len(triples):
+            return None
+        planes = np.linalg.solve(positions[triples], values[triples, None])[..., 0]
+        plane = planes[support(positions, values, planes, parameters.tolerance, parameters.behind_penalty).argmax()]
+        agreeing = np.abs(_residuals(positions, values, plane)) < parameters.tolerance
+        if agreeing.sum() < max(3, parameters.min_inlier_ratio * values.size):
+            return None
+        plane = np.asarray(np.linalg.lstsq(positions[agreeing], values[agreeing], rcond=None)[0], np.float64)
+        agreeing = np.abs(_residuals(positions, values, plane)) < parameters.tolerance
+        return cls(plane, values.size, float(agreeing.mean()))

@@ -21,9 +21,8 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
 from typing import Any
 
 from sepi import initial, occlusion, optimize, textureless
@@ -315,25 +314,16 @@ def stage_parameters(
     }
 
 
-class _BuiltIn(Mapping[str, Variant]):
+class _BuiltIn(Known[Any]):
     """Variants made when looked up, since compared methods load their modules."""
 
-    def __getitem__(self, name: str) -> Variant:
-        return _built_in(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(VARIANT_ENTRIES)
-
-    def __len__(self) -> int:
-        return len(VARIANT_ENTRIES)
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._found:
+            self._found[name] = variant_from(name, VARIANT_ENTRIES, "variants")
+        return self._found[name]
 
 
-@cache
-def _built_in(name: str) -> Variant:
-    return variant_from(name, VARIANT_ENTRIES, "variants")
-
-
-VARIANTS: Mapping[str, Variant] = _BuiltIn()
+VARIANTS: Mapping[str, Variant] = _BuiltIn("variants", ENTRIES)
 """Name to built-in variant."""
 
 
