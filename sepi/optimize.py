@@ -31,7 +31,7 @@ from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
-from sepi.matching.softening import compared_views
+from sepi.matching.softening import SHARP_WIDENING, compared_views, degree_too_sharp
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import WlsParameters, data_weight, rectified_confidence, smoothness_coefficient, solve
 from sepi.stage import Choice, NoParameters, OcclusionMarginParameters, Progress, StageMaps, none, require_previous
@@ -183,6 +183,7 @@ def second_order(
     before, given = require_previous(previous), light_field
     noisy = isinstance(denoised(light_field, parameters.denoising), DenoisedLightField)
     light_field = compared_views(light_field, parameters, parameters.least_noise)
+    widening = 1 + (SHARP_WIDENING - 1) * degree_too_sharp(given, parameters.softening)
     disparity = before.disparity
     uniform = before.mask("textureless")
     prior, variance = _prior(light_field, before.confidence, uniform, parameters), None
@@ -195,7 +196,7 @@ def second_order(
         smooth, last = i >= refinements, i == total - 1
         if i == 0 or last:
             views = spread_views(light_field, parameters.views if last or noisy else parameters.first_views)
-            matching = GaussNewton(light_field, parameters, parameters.occlusion_margin, views)
+            matching = GaussNewton(light_field, parameters, parameters.occlusion_margin, views, widening)
         if i <= refinements or last:
             # later steps are too small to change the visibility
             mean = matching.mean(disparity)
