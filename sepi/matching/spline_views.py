@@ -43,7 +43,7 @@ class SplineViews(NamedTuple):
     scales2, shares : ndarray, shape (2,), float32
         Square of the robust scale, and share in the cost, of colours and of detail.
     widening : ndarray, shape (H, W) or (0, 0), float32
-        Factor of the squared scale of colours; 1 where there is none.
+        Factor of the squared scale of colours; none: 1.
     """
 
     splines: npt.NDArray[np.int16]
