@@ -41,7 +41,7 @@ from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.aligned_views import mean_reference
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
-from sepi.matching.softening import compared_views, degree_too_sharp
+from sepi.matching.softening import compared_views
 from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters, spread_views
 from sepi.matching.visibility_sweep import VisibleViewsParameters, depth_from_visible_views, occluded_in_any_view
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_previous
@@ -210,8 +210,7 @@ def visibility(
     """
     before, given = require_previous(previous), light_field
     light_field = compared_views(light_field, parameters)
-    sharp = degree_too_sharp(given, parameters.softening)
-    result = depth_from_visible_views(light_field, before.disparity, parameters, progress, mean_reference, sharp)
+    result = depth_from_visible_views(light_field, before.disparity, parameters, progress, mean_reference)
     # denoising would mix the colours of both surfaces at a rim
     disparity = assigned_to_surfaces(given, result.disparity, parameters)
     views = spread_views(light_field, parameters.first_views)

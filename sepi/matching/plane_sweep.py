@@ -21,7 +21,6 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import reference_residual_variance
-from sepi.image.texture import variance_within_surface
 from sepi.kernels import LANES
 from sepi.kernels import plane_sweep as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
@@ -29,7 +28,7 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.matching.denoising import sure_noise
 from sepi.matching.expected_costs import expected_costs
 from sepi.matching.nearest_surfaces import shown_columns
-from sepi.matching.softening import Softening, degree_too_sharp, softened
+from sepi.matching.softening import Softening, softened
 from sepi.matching.sweep_arrays import ViewStack, Window, sampled_candidates
 from sepi.matching.view_noise import ViewNoise
 from sepi.matching.view_subsets import ViewSubsets
@@ -188,8 +187,7 @@ def sweep(
     expected = expected_costs(light_field, to_correct, candidates, groups, chosen, squared_scale, LANES)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     # the kernel takes one for each pixel
-    sharp = degree_too_sharp(light_field, parameters.softening)
-    variance = variance_within_surface(light_field.reference_view, parameters.window_sigma**2 + noise, sharp)
+    variance = np.full((H, W), parameters.window_sigma**2 + noise, np.float32)
     window = Window(guide, parameters.window_radius, variance)
     best, cost, mean = maps = np.full((3, len(chosen), H, W), np.nan, np.float32)
     height = _rows_at_a_stretch(H, threads_used())

@@ -59,7 +59,7 @@ In views without noise the measurement is of texture. In strong texture few pixe
 
 SHARE_AFTER_FIRST = 0.2
 """Share of the texture around a pixel that widens its window after the first map, which needs all of it where texture
-repeats, as do the others where it is too sharp. More would join thin structures to what is behind them."""
+repeats. More would join thin structures to what is behind them."""
 
 LIKELY_RADIUS, LIKELY_CANDIDATES = 8, 5
 """Radius of the window whose disparities are likely candidates, pixels, and the number of candidates beyond them."""
@@ -147,7 +147,7 @@ def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, 
         If the disparity range is unknown.
     """
     views = views_without_aliases(light_field, parameters.first_views)
-    return _sweep(light_field, views, parameters.first_sampling, None, None, 1.0, parameters, CostVolumes(), progress)
+    return _sweep(light_field, views, parameters.first_sampling, None, None, parameters, CostVolumes(), progress)
 
 
 MeanOf = Callable[[LightField, FloatMap, BoolMap, BaseDetailParameters, float], FloatMap | None]
@@ -160,7 +160,6 @@ def depth_from_visible_views(
     parameters: VisibleViewsParameters,
     progress: Progress,
     mean_of: MeanOf | None = None,
-    sharp: float | FloatMap = 0.0,
 ) -> StageMaps:
     """Depth from the views that see a pixel, computed in several passes.
 
@@ -175,8 +174,6 @@ def depth_from_visible_views(
     mean_of : callable, optional
         :func:`sepi.matching.aligned_views.mean_reference`, for noisy views; default: views are compared with the
         reference view.
-    sharp : float or ndarray, shape (H, W), float32
-        Degree to which texture is too sharp for interpolation, 0..1.
 
     Returns
     -------
@@ -193,8 +190,6 @@ def depth_from_visible_views(
         disparity = with_open_gaps(light_field, disparity, few, parameters)
     volumes = CostVolumes()
     confidence = np.ones(light_field.shape, np.float32)
-    # texture that is wholly too sharp is dense, unlike thin structures
-    share = SHARE_AFTER_FIRST + (1 - SHARE_AFTER_FIRST) * sharp**2
     for i in range(n):
         last = i == n - 1
         present = views_without_aliases(light_field, parameters.views, far=True) if last else few
@@ -208,7 +203,6 @@ def depth_from_visible_views(
             parameters.sampling if last else parameters.first_sampling,
             disparity,
             mean,
-            share,
             parameters,
             volumes,
             lambda fraction, i=i: progress((i + fraction) / n),  # type: ignore[misc]
@@ -258,7 +252,6 @@ def _sweep(
     sampling: float,
     disparity: FloatMap | None,
     mean: FloatMap | None,
-    share: float | FloatMap,
     parameters: VisibilitySweepParameters,
     volumes: CostVolumes,
     progress: Progress,
@@ -268,13 +261,13 @@ def _sweep(
     """Smoothed map from some of the views, with candidates ``sampling`` times as far apart as usual.
 
     Pixels are compared with their ``mean``, where there is one, instead of the reference view; only at candidates near
-    the map where that is ``refined``. A ``share`` of the texture widens the windows.
+    the map where that is ``refined``.
     """
     disparities = light_field.require_disparity_range().candidates(parameters.fewer(light_field, sampling))
     likely = None if disparity is None else _likely_candidates(disparity, disparities)
     guide = guide_of(light_field, mean)
     least = variance_of_residuals(_contrast_of_surfaces(light_field))
-    contrast = variance_within_surface(guide, least, share)
+    contrast = variance_within_surface(guide, least, 1.0 if disparity is None else SHARE_AFTER_FIRST)
     shown = light_field.present
     if light_field.missing is not None:
         shown = shown & ~light_field.missing.all(axis=(2, 3))
