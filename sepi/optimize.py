@@ -32,7 +32,7 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
 from sepi.matching.gauss_newton import ANY_SURFACE, Evidence, GaussNewton, Surfaces, windowed_step
-from sepi.matching.softening import SHARP_WIDENING, compared_views, degree_too_sharp, reference_sharpness
+from sepi.matching.softening import compared_views, reference_sharpness
 from sepi.matching.spline_views import forget_splines
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.multilevel import solve_smooth
@@ -192,7 +192,6 @@ def second_order(
     before, given = require_previous(previous), light_field
     noisy = isinstance(denoised(light_field, parameters.denoising), DenoisedLightField)
     light_field = compared_views(light_field, parameters, parameters.least_noise)
-    widening = 1 + (SHARP_WIDENING - 1) * degree_too_sharp(given, parameters.softening)
     disparity = before.disparity
     uniform = before.mask("textureless")
     prior, variance = _prior(light_field, before.confidence, uniform, parameters), None
@@ -205,7 +204,7 @@ def second_order(
         smooth, last = i >= refinements, i == total - 1
         if i == 0 or last:
             views = spread_views(light_field, parameters.views if last or noisy else parameters.first_views)
-            matching = GaussNewton(light_field, parameters, parameters.occlusion_margin, views, widening)
+            matching = GaussNewton(light_field, parameters, parameters.occlusion_margin, views)
         if i <= refinements or last:
             # later steps are too small to change the visibility
             mean = matching.mean(disparity)

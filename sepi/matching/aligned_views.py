@@ -19,7 +19,6 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, Rows, row_bands
-from sepi.matching.softening import NOT_WIDENED
 from sepi.matching.spline_views import SplineViews, forget_splines, spline_views
 
 LEAST_OTHERS = 8
@@ -57,8 +56,6 @@ class AlignedViews:
         By how much an occluder must be nearer, pixels per view step.
     present : ndarray, shape (T, S), bool, optional
         The views that are compared; all unless given.
-    widening : ndarray, shape (H, W) or (0, 0), float32
-        Factor of the squared robust scale of colours (:data:`sepi.matching.softening.SHARP_WIDENING`).
     """
 
     def __init__(
@@ -67,13 +64,11 @@ class AlignedViews:
         parameters: BaseDetailParameters,
         occlusion_margin: float,
         present: BoolMap | None = None,
-        widening: FloatMap = NOT_WIDENED,
     ) -> None:
         self._light_field = light_field
         self._parameters = parameters
         self.present = light_field.present if present is None else present
         self._margin = np.float32(occlusion_margin)
-        self._widening = widening
         # of the whole picture, where there is memory for it
         self._splines: SplineViews | None = None
         self._nearest: tuple[FloatMap, FloatMap] | None = None
@@ -105,9 +100,7 @@ class AlignedViews:
         bands = row_bands(field, self.present, float(np.abs(disparity).max()), BYTES_PER_PIXEL)
         if len(bands) == 1:
             if self._splines is None:
-                self._splines = spline_views(
-                    field, self._parameters, bands[0].rows, self.present, widening=self._widening
-                )
+                self._splines = spline_views(field, self._parameters, bands[0].rows, self.present)
             if self._nearest is None or self._nearest[0] is not disparity:
                 self._nearest = None
                 self._nearest = disparity, nearest_surfaces(field, disparity, self.present, bands[0].rows)
@@ -120,7 +113,7 @@ class AlignedViews:
         for band in bands:
             low = min(band.rows.low, height - tallest)
             rows = Rows(low, low + tallest)
-            splines = spline_views(field, self._parameters, rows, self.present, room, self._widening)
+            splines = spline_views(field, self._parameters, rows, self.present, room)
             room = splines.splines
             add(splines, Seeing(nearest_surfaces(field, disparity, self.present, rows), self._margin), band)
         # a band may need all rows

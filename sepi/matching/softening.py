@@ -26,13 +26,6 @@ SHARP, SHARPEST = 0.295, 0.32
 """Sharpness at which the blur begins, and at which it is complete. Dots averaged over each pixel have 0.33; most
 texture through a lens has 0.2 to 0.27."""
 
-SHARP_WIDENING = 4.0
-"""Factor of the squared robust scale of colours where sharpness is complete. The blur leaves residuals there that
-vanish at whole and half pixels alone, where a narrow scale would draw the disparity."""
-
-NOT_WIDENED = np.ones((0, 0), np.float32)
-"""The factor where no view is blurred: none."""
-
 LEAST_SHARE = 0.1
 """Share of the reference view that must be too sharp; below it, no view is blurred."""
 
@@ -154,38 +147,6 @@ def reference_sharpness(light_field: LightField, noise: ViewNoise) -> FloatMap:
     return sharpness(_grey(light_field.views[light_field.reference_position]), _grey_variance(light_field, noise))
 
 
-def degree_too_sharp(light_field: LightField, blur: float) -> FloatMap:
-    """Degree to which texture of the reference view is too sharp for interpolation.
-
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range, before any blur.
-    blur : float
-        As of :func:`softened`.
-
-    Returns
-    -------
-    ndarray, shape (H, W), float32
-        0..1; 0 everywhere if no view is blurred.
-
-    Raises
-    ------
-    SepiError
-        If the disparity range is unknown.
-    """
-
-    def degree() -> FloatMap:
-        if light_field.missing is None:
-            found = _reference_too_sharp(light_field, measured_noise(light_field))
-            if _share(found) >= LEAST_SHARE:
-                return found
-        return np.zeros(light_field.shape, np.float32)
-
-    found = kept(light_field, "degree too sharp", degree)
-    return found if blur > 0 else np.zeros_like(found)
-
-
 def share_too_sharp(light_field: LightField) -> float:
     """Share of the reference view, 0..1, whose texture is too sharp for interpolation; 0 if views miss pixels.
 
@@ -196,7 +157,7 @@ def share_too_sharp(light_field: LightField) -> float:
     """
     if light_field.missing is not None:
         return 0.0
-    return _share(_reference_too_sharp(light_field, measured_noise(light_field)))
+    return _share_too_sharp(light_field, _grey_variance(light_field, measured_noise(light_field)))
 
 
 def _grey_variance(light_field: LightField, noise: ViewNoise) -> FloatMap:
@@ -204,12 +165,8 @@ def _grey_variance(light_field: LightField, noise: ViewNoise) -> FloatMap:
     return (_OF_GREY**2 * expected_variance(light_field, noise)).astype(np.float32)
 
 
-def _reference_too_sharp(light_field: LightField, noise: ViewNoise) -> FloatMap:
-    return _too_sharp(light_field.views[light_field.reference_position], _grey_variance(light_field, noise))
-
-
-def _share(degree: FloatMap) -> float:
-    return float(np.mean(degree > 0))
+def _share_too_sharp(light_field: LightField, variance: FloatMap) -> float:
+    return float(np.mean(_too_sharp(light_field.views[light_field.reference_position], variance) > 0))
 
 
 def _softened_views(light_field: LightField, noise: ViewNoise, blur: float) -> npt.NDArray[Any] | None:
@@ -218,9 +175,9 @@ def _softened_views(light_field: LightField, noise: ViewNoise, blur: float) -> n
     if light_field.missing is not None:
         # pixels that a view does not show are black; a blur would mix them into their neighbours
         return None
-    if _share(_reference_too_sharp(light_field, noise)) < LEAST_SHARE:
-        return None
     variance = _grey_variance(light_field, noise)
+    if _share_too_sharp(light_field, variance) < LEAST_SHARE:
+        return None
     out = np.zeros_like(views)
 
     def soften(place: tuple[int, int]) -> None:

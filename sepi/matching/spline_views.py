@@ -9,7 +9,6 @@ from sepi.kernels import splines as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, without_reference
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail
 from sepi.matching.row_bands import Rows
-from sepi.matching.softening import NOT_WIDENED
 from sepi.process.workspace import forget, kept
 
 SPLINE_UNIT = np.float32(1 / 3400)
@@ -39,8 +38,6 @@ class SplineViews(NamedTuple):
         Theirs, down and across, in view steps.
     scales2, shares : ndarray, shape (2,), float32
         Square of the robust scale, and share in the cost, of colours and of detail.
-    widening : ndarray, shape (H, W) or (0, 0), float32
-        Factor of the squared scale of colours; none: 1.
     """
 
     splines: npt.NDArray[np.int16]
@@ -51,7 +48,6 @@ class SplineViews(NamedTuple):
     baselines: FloatMap
     scales2: FloatMap
     shares: FloatMap
-    widening: FloatMap = NOT_WIDENED
 
 
 def spline_views(
@@ -60,7 +56,6 @@ def spline_views(
     rows: Rows,
     present: BoolMap,
     room: npt.NDArray[np.int16] | None = None,
-    widening: FloatMap = NOT_WIDENED,
 ) -> SplineViews:
     """Splines of some rows of the views' colours and, where it has a share, detail.
 
@@ -73,8 +68,6 @@ def spline_views(
         The views of which they are wanted.
     room : ndarray, optional
         Obsolete splines of as many rows of the same views, whose memory is reused.
-    widening : ndarray, shape (H, W) or (0, 0), float32
-        As in the result.
 
     Returns
     -------
@@ -118,7 +111,6 @@ def spline_views(
         light_field.baselines[others].astype(np.float32),
         np.array([views.squared_scale(scale) for scale in scales], np.float32),
         parameters.shares,
-        widening,
     )
 
 

@@ -20,9 +20,8 @@ struct SplineViews {
     Strided<const std::int64_t, 2> places;   // (N, 2), grid positions of the compared views
     Array<const float, 2> baselines;         // (N, 2), their baselines, down and across
     Array<const float, 1> scales2, shares;   // of colours and of detail
-    Array<const float, 2> widening;          // (H, W) or (0, 0), factor of the squared scale of colours
 
-    bool fields(auto visit) { return visit(splines, unit, low, reference, places, baselines, scales2, shares, widening); }
+    bool fields(auto visit) { return visit(splines, unit, low, reference, places, baselines, scales2, shares); }
 };
 
 // Where views are hidden: the fields of sepi.matching.aligned_views.Seeing.
@@ -37,9 +36,9 @@ using Four = std::array<Float8, 4>;
 
 constexpr std::int32_t ONE = 1 << 15;  // the sum of the weights of coefficients, along either axis
 
-// Eight pixels of a row, their squared scale of colours and reference colours, and their positions in the current view.
+// Eight pixels of a row, their reference colours, and their positions in the current view.
 struct Pixels {
-    Float8 x, disparity, scale2;
+    Float8 x, disparity;
     Four own;
     Int8 inside;
     std::uint32_t nearest[LANES], coefficients[LANES];  // indices into the z-buffer, and of their first coefficients
@@ -130,7 +129,7 @@ struct View {
 };
 
 // Derivative of z / (z + scale2) with respect to z, times scale2: 1 for 0.
-Float8 robust_weight(Float8 z, Float8 scale2) {
+Float8 robust_weight(Float8 z, float scale2) {
     const Float8 w = scale2 / (scale2 + z);
     return w * w;
 }
@@ -163,9 +162,6 @@ void over_views(const SplineViews &views, const Seeing &seeing, Array<const floa
                 sums.x = Float8{0, 1, 2, 3, 4, 5, 6, 7} + float(x);
                 // beyond the last, pixels lie outside all views
                 std::memcpy(&sums.disparity, disparity.at(y, x), count * sizeof(float));
-                sums.scale2 = spread(1);
-                if (views.widening.shape[0] > 0) std::memcpy(&sums.scale2, views.widening.at(y, x), count * sizeof(float));
-                sums.scale2 *= views.scales2(0);
                 begin(sums, y, x, count);
             });
             for (Index n = 0; n < views.places.shape[0]; ++n) {
@@ -198,8 +194,8 @@ void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const f
         [&](Mean &sums, const View &, Float8 seen, const Four &channels) {
             Four r;
             for (Index c = 0; c < 4; ++c) r[c] = channels[c] - sums.own[c];
-            const Float8 weight = seen * robust_weight(dot(r, r), sums.scale2);
-            const Float8 detail_weight = seen * robust_weight(3.0f * (r[3] * r[3]), spread(views.scales2(1)));
+            const Float8 weight = seen * robust_weight(dot(r, r), views.scales2(0));
+            const Float8 detail_weight = seen * robust_weight(3.0f * (r[3] * r[3]), views.scales2(1));
             for (Index c = 0; c < 4; ++c) sums.channels[c] += (c < 3 ? weight : detail_weight) * channels[c];
             sums.colours += weight;
             sums.detail += detail_weight;
@@ -222,8 +218,8 @@ void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<co
         Float8 evidence[12];
     };
     const Index asked = out.shape[0] - 2;
-    const float detail = views.shares(1) / views.scales2(1);
-    const auto both = [=](const Four &of, Float8 colours) { return std::array{colours * of[0] + detail * of[2], colours * of[1] + detail * of[3]}; };
+    const float colours = views.shares(0) / views.scales2(0), detail = views.shares(1) / views.scales2(1);
+    const auto both = [=](const Four &of) { return std::array{colours * of[0] + detail * of[2], colours * of[1] + detail * of[3]}; };
     over_views<Equations>(
         views, seeing, disparity, begin, end,
         [&](Equations &pixels, Index y, Index x, Index count) {
@@ -237,12 +233,12 @@ void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<co
                 r[c] = channels[c] - pixels.own[c];
                 g[c] = pixels.down[c] * view.down + pixels.across[c] * view.across;
             }
-            const Float8 squared = dot(r, r), weight = seen * robust_weight(squared, pixels.scale2);
-            const Float8 detail_weight = seen * (3.0f * robust_weight(3.0f * r[3] * r[3], spread(views.scales2(1))));
+            const Float8 squared = dot(r, r), weight = seen * robust_weight(squared, views.scales2(0));
+            const Float8 detail_weight = seen * (3.0f * robust_weight(3.0f * r[3] * r[3], views.scales2(1)));
             const Four terms{weight * dot(r, g), weight * dot(g, g), detail_weight * r[3] * g[3], detail_weight * g[3] * g[3]};
             for (Index k = 0; k < 4; ++k) pixels.sums[k] += terms[k];
             if (asked > 0) {
-                const auto of_view = both(terms, views.shares(0) / pixels.scale2);
+                const auto of_view = both(terms);
                 const bool belongs[] = {view.across < 0, view.across > 0, view.down < 0, view.down > 0};
                 const Four rest{weight * squared, weight, detail_weight / 3.0f, seen};
                 for (Index k = 0; k < 4; ++k) {
@@ -252,7 +248,7 @@ void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<co
             }
         },
         [&](const Equations &pixels, Index y, Index x, Index count) {
-            const auto sums = both(pixels.sums, views.shares(0) / pixels.scale2);
+            const auto sums = both(pixels.sums);
             for (Index k = 0; k < 2; ++k) store_first(out.at(k, y, x), sums[k], count);
             for (Index k = 0; k < asked; ++k) store_first(out.at(2 + k, y, x), pixels.evidence[k], count);
         });
