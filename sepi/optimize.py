@@ -17,7 +17,6 @@ References
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple, Self
 
 import cv2
@@ -258,10 +257,7 @@ def _with_bars(
         cues["deviation"] = np.sqrt(variance)
     cues |= cues_of_texture(reference_sharpness(light_field, noise), cues["agreement"], cues["deviation"])
     bars = error_bars(disparity, cues, known, calibration)
-    kept = {name: values for name, values in before.extra.items() if name != LIGHT_DEVIATION}
-    return replace(before, extra=kept).updated(
-        disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high
-    )
+    return before.updated(disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high)
 
 
 def _threshold(disparity: FloatMap, parameters: SecondOrderParameters, first: bool) -> float:

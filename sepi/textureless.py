@@ -168,12 +168,15 @@ def uniform_planes(
     """
     before = require_previous(previous)
     filled, uniform, deviation = fill_uniform_regions(light_field, before, parameters)
-    # beside what moved back, the map had no depth step at which to decide; 25 views are enough for so few pixels
-    rims = BoundaryParameters(occlusion_margin=parameters.occlusion_margin, share_views=25)
-    disparity = assigned_to_surfaces(light_field, filled, rims, before.disparity)
-    uniform &= disparity == filled
+    disparity = filled
+    if parameters.edges:
+        # beside what moved back, the map had no depth step at which to decide; 25 views are enough for so few pixels
+        rims = BoundaryParameters(occlusion_margin=parameters.occlusion_margin, share_views=25)
+        disparity = assigned_to_surfaces(light_field, filled, rims, before.disparity)
+    same = disparity == filled
+    uniform &= same
     progress(1.0)
-    return before.updated(disparity, before.confidence, textureless=uniform, **{LIGHT_DEVIATION: deviation})
+    return before.updated(disparity, before.confidence, textureless=uniform, **{LIGHT_DEVIATION: deviation * same})
 
 
 def superpixel_size(shape: tuple[int, int], parameters: LtiParameters) -> int:

@@ -33,7 +33,7 @@ from sepi.errors import SepiError, printable
 from sepi.io.files import DEFLATE_RATIO, PatientFile, atomic_path, reading
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
 from sepi.process.interrupts import no_interrupt_lost
-from sepi.stage import ERROR_BARS, CostVolume, StageMaps
+from sepi.stage import ERROR_BARS, LIGHT_DEVIATION, CostVolume, StageMaps
 from sepi.validation import require_known, require_path
 
 BLOCK = 512
@@ -103,7 +103,7 @@ _COSTS, _CANDIDATES = "cost_volume", "candidates"
 
 _STEPS, _METRES = "pixels per view step", "metres"
 UNITS = {
-    **dict.fromkeys(("disparity", *ERROR_BARS, _CANDIDATES, "ground_truth", "error"), _STEPS),
+    **dict.fromkeys(("disparity", *ERROR_BARS, LIGHT_DEVIATION, _CANDIDATES, "ground_truth", "error"), _STEPS),
     **dict.fromkeys(("positions", "baselines"), "view steps"),
     "confidence": "0..1",
     **dict.fromkeys(("depth", "depth_sigma", "nearest", "farthest"), _METRES),

@@ -6,7 +6,7 @@ computed on the horizontal EPI through a pixel (fixed ``y`` and ``t0``) and on t
 
 Finite differences between neighbouring views are right for disparities below about half a pixel. So the EPIs are
 sheared by every whole disparity of the range, or every whole disparity per row if rows are farther apart than columns.
-The most coherent estimate within ``shear_reach`` of its shear wins. Views off the grid are sheared by their baselines,
+The most coherent estimate within 0.7 pixels of its shear wins. Views off the grid are sheared by their baselines,
 along and across the EPI; views less than a tenth of a step from another are left out.
 
 References

@@ -13,6 +13,7 @@ A bare wall is none of these: its border tells its depth.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -29,7 +30,7 @@ from sepi.lightfield import (
     require_light_field,
     without_reference,
 )
-from sepi.stage import HIGH, LOW, SIGMA, StageMaps
+from sepi.stage import HIGH, LIGHT_DEVIATION, LOW, SIGMA, StageMaps
 from sepi.validation import require_map
 
 UNKNOWN = "unknown"
@@ -90,6 +91,8 @@ def with_unknown(light_field: LightField, maps: StageMaps) -> StageMaps:
         # standard deviation of a uniform distribution over the range
         anywhere = {SIGMA: (highest - lowest) / np.float32(12) ** 0.5, LOW: lowest, HIGH: highest}
         extra |= {name: np.where(unknown, np.float32(value), maps.extra[name]) for name, value in anywhere.items()}
+    # a cue of the error bars is no result
+    maps = replace(maps, extra={name: values for name, values in maps.extra.items() if name != LIGHT_DEVIATION})
     return maps.updated(maps.disparity, np.where(unknown, np.float32(0), maps.confidence), **extra)
 
 

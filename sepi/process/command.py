@@ -278,7 +278,8 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
         light_field = read_light_field(light_field_path)
         maps = None if previous is None else read_stage(previous)
         if maps is not None and maps.disparity.shape != light_field.shape:
-            raise SepiError(f"{previous}: maps have shape {maps.disparity.shape}; expected {light_field.shape}")
+            expected = f"{light_field.shape}, that of {light_field_path}"
+            raise SepiError(f"{previous}: maps have shape {maps.disparity.shape}; expected {expected}")
         known = COMPARABLE in read_attributes(light_field_path, check=False)
         compared = replace(light_field if known else comparable(light_field), workspace=Workspace())
         with progress_bar(f"{light_field.name} {stage}") as progress:

@@ -73,6 +73,7 @@ class UniformPlanesParameters(OcclusionMarginParameters, SofteningParameters, Bo
     min_area: int = Field(50, ge=1, description="least area of a region that may get a plane, in pixels")
     border_confidence: float = Field(0.3, ge=0, le=1, description="confidence above which a border pixel counts")
     light: bool = Field(True, description="whether the change of a region's light may tell its plane, too")
+    edges: bool = Field(True, description="whether edges beside a region are decided again once it has its plane")
 
 
 def fill_uniform_regions(
@@ -122,24 +123,23 @@ def fill_uniform_regions(
         for n, (region, border) in enumerate(found)
     ]
     disparity, held, light_deviation = before.disparity.copy(), np.zeros_like(core), np.zeros_like(before.disparity)
-    known_planes = [(region, chosen) for (region, _), chosen in zip(found, planes, strict=True) if chosen is not None]
-    for n, ((region, _), chosen) in enumerate(zip(found, planes, strict=True)):
-        if chosen is not None and chosen.source == "light":
+    known_planes = [(n, found[n][0], chosen) for n, chosen in enumerate(planes) if chosen is not None]
+    for n, region, chosen in known_planes:
+        if chosen.source == "light":
             light_deviation[region.place][region.pixels] = lit[n].deviations(region.basis)
-    for region, chosen in known_planes:
         # a plane known at one side only may leave the range at the other
         values = np.clip(region.basis @ chosen.plane, known.minimum, known.maximum)
         disparity[region.place][region.pixels] = values
     regions = disparity != before.disparity
     asked = compared, parameters.occlusion_margin, float(np.median(variance))
     against = contradicted(light_field, before.disparity, disparity, regions, *asked)
-    for (place, pixels), chosen in known_planes:
+    for _, (place, pixels), chosen in known_planes:
         kept = pixels & against[place]
         if kept.sum() > MOST_CONTRADICTED * pixels.sum():
             kept = pixels
         elif noisy:
             kept |= kept_pixels(pixels, disparity[place], before.disparity[place], chosen)
-        disparity[place][kept] = before.disparity[place][kept]
+        disparity[place][kept], light_deviation[place][kept] = before.disparity[place][kept], 0
         pixels = pixels & ~kept
         # faint texture below the noise may tell the surface better than a border's plane
         faint = noisy and chosen.source == "border" and 2 * core[place][pixels].sum() < pixels.sum()

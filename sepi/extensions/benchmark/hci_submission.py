@@ -197,14 +197,15 @@ def problems_of(path: str | Path, *, partial: bool = False) -> list[str]:
             # files and folders of the first two levels
             inner = {*path.glob("*/*"), *(entry for entry in path.iterdir() if not entry.is_dir())}
             return _problems_in(path, sorted(file.relative_to(path).as_posix() for file in inner), {}, partial)
-        if path.is_file():
-            with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory(prefix="sepi-") as folder:
-                return _problems_in(Path(folder), archive.namelist(), _unpack(archive, Path(folder)), partial)
+        if not path.is_file():
+            raise SepiError(f"{path}: no such file or folder")
+        archive = zipfile.ZipFile(path)
     except OSError as error:
         raise SepiError(f"{path}: cannot be read ({error.strerror or error})") from error
     except (zipfile.BadZipFile, ValueError, OverflowError, struct.error, NotImplementedError) as error:
         return [f"{path}: not a readable zip archive ({error})"]
-    raise SepiError(f"{path}: no such file or folder")
+    with archive, tempfile.TemporaryDirectory(prefix="sepi-") as folder:
+        return _problems_in(Path(folder), archive.namelist(), _unpack(archive, Path(folder)), partial)
 
 
 def _unpack(archive: zipfile.ZipFile, folder: Path) -> dict[str, str]:

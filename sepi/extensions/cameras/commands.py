@@ -89,7 +89,7 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
 @click.option("-o", "--output", type=_PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
 @click.option(
     "--min-confidence",
-    type=click.FloatRange(0, 1),
+    type=float,
     metavar="X",
     help="Least confidence of points; default: the median of all pixels.",
 )

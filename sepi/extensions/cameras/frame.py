@@ -200,7 +200,10 @@ def _grown(seeing: Seeing, box: list[float], stride: float) -> list[float]:
 
     # for a side that bulges between the samples
     for _ in range(int(2 * stride) + 2):
-        box = moved(box, [side for side in range(4) if not seen(side, box)], -1)
+        short = [side for side in range(4) if not seen(side, box)]
+        if not short:
+            break
+        box = moved(box, short, -1)
     growing = [0, 1, 2, 3]
     for _ in range(int(stride) + 1):
         for side in list(growing):

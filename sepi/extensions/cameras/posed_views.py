@@ -27,6 +27,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.camera.rig import Rig
+from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 from sepi.matching.carried_map import carried_map, carried_values
 
@@ -292,6 +293,8 @@ def posed_views(
     sigmas : callable, optional
         Standard deviation of the other views; needed with ``surfaces`` for the error of their depth.
     """
+    if min_confidence is not None and not 0 <= min_confidence <= 1:
+        raise SepiError(f"{light_field.name}: expected a least confidence within 0..1, got {min_confidence:g}")
     known = np.isfinite(disparity)
     if unknown is not None:
         known &= ~unknown

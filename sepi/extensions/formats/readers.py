@@ -204,10 +204,9 @@ def _open_lf(path: Path) -> Iterator[tuple[h5py.Group, tuple[int, int, int, int]
         kind, columns, rows, height, width = map(int, counts)
         kinds = {1: rows * columns > 1, 2: rows == 1 < columns, 3: columns == 1 < rows}
         if kind not in kinds:
-            raise SepiError(
-                f"LF_TYPE {kind}, a cross of views or unknown; expected 1 (grid), 2 (row) or 3 (column), or a folder "
-                "of the views"
-            )
+            what = "a cross of views" if kind == 4 else "unknown"
+            expected = "1 (grid), 2 (row) or 3 (column), or a folder of the views"
+            raise SepiError(f"LF_TYPE {kind}, {what}; expected {expected}")
         if min(rows, columns) < 1 or not kinds[kind]:
             raise SepiError(f"{rows}x{columns} views (cams_v x cams_h) do not fit LF_TYPE {kind}")
         if height % rows or width % columns:

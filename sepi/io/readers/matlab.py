@@ -145,7 +145,7 @@ def _variables(path: Path) -> Iterator[tuple[str, str, list[_Part], Callable[[],
         head, most, packed = stored, length, kind == _COMPRESSED
         if packed:
             most = length * DEFLATE_RATIO
-            unpacked = zlib.decompressobj().decompress(stored, _PREFIX)
+            unpacked = zlib.decompressobj().decompress(stored[:_PREFIX], _PREFIX)
             kind, head = _kind(order, unpacked), memoryview(unpacked)[8:]
         if kind == _MATRIX:
             parts = _parts(order, head, _BEFORE + 1)
