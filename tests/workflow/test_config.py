@@ -108,17 +108,17 @@ def test_own_variants_come_beside_the_builtin_ones() -> None:
     """Variants that begin alike share files; an override is part of the path, however its number is written."""
     entries = {
         "mine": {"base": "paper", "optimize": "none"},
-        "other": {"base": "best_no_mixture", "occlusion": {"passes": "2"}, "optimize": {"choice": "wls", "alpha": 0.0}},
+        "other": {"base": "best_no_gaps", "occlusion": {"passes": "2"}, "optimize": {"choice": "wls", "alpha": 0.0}},
     }
     settings = load_settings({"variants": entries})
     assert settings.own_variants == ["mine", "other"]
     mine, paper, other = (settings.variants[name].labels for name in ("mine", "paper", "other"))
     assert key_of(mine, "textureless") == key_of(mine, "optimize") == key_of(paper, "textureless")
-    assert key_of(other, "optimize") == "semi_global/visibility+passes=2+use_mixture=False/uniform_planes/wls+alpha=0"
-    assert settings.parameters["occlusion"]["visibility+passes=2+use_mixture=False"].model_dump() == {
+    assert key_of(other, "optimize") == "semi_global/visibility+gaps=False+passes=2/uniform_planes/wls+alpha=0"
+    assert settings.parameters["occlusion"]["visibility+gaps=False+passes=2"].model_dump() == {
         **settings.parameters["occlusion"]["visibility"].model_dump(),
+        "gaps": False,
         "passes": 2,
-        "use_mixture": False,
     }
 
 
