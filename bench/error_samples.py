@@ -12,7 +12,7 @@ from unittest.mock import patch
 import numpy as np
 import numpy.typing as npt
 
-from bench.noisy import with_noise
+from bench.noisy import few_views, with_noise
 from bench.streets import street
 from bench.sweep import scene_for_choosing
 from sepi.error_bars.bars import ErrorBars, error_bars
@@ -83,14 +83,6 @@ def light_fields(
                 yield light_field.name, light_field
         for rows, columns in grids:
             yield f"{light_field.name} + {rows}x{columns}", few_views(light_field, rows, columns)
-
-
-def few_views(light_field: LightField, rows: int, columns: int) -> LightField:
-    """So many rows and columns of the views, from the reference view on."""
-    t, s = light_field.reference_position
-    views = np.ascontiguousarray(light_field.views[t : t + rows, s : s + columns])
-    known, truth = light_field.disparity_range, light_field.ground_truth
-    return LightField(views, light_field.name, disparity_range=known, view=(0, 0), ground_truth=truth)
 
 
 def sample(light_field: LightField, name: str, variant: str, step: float = 0.0, kept: Path | None = None) -> Sample:

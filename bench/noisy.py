@@ -63,3 +63,11 @@ def rows(
                 least = scores_allowed(max(measured, NO_NOISE) * deviations)
                 row[name] = f"{least['q25']:.2f} / {least['badpix007']:.1f}"
             yield row
+
+
+def few_views(light_field: LightField, rows: int, columns: int) -> LightField:
+    """So many rows and columns of the views, from the reference view on."""
+    t, s = light_field.reference_position
+    views = np.ascontiguousarray(light_field.views[t : t + rows, s : s + columns])
+    known, truth = light_field.disparity_range, light_field.ground_truth
+    return LightField(views, light_field.name, disparity_range=known, view=(0, 0), ground_truth=truth)

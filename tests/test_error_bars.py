@@ -6,8 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bench.error_samples import few_views
-from bench.noisy import with_noise
+from bench.noisy import few_views, with_noise
 from bench.streets import street
 from sepi.lightfield import LightField
 from sepi.matching.unknown import with_unknown
