@@ -1,4 +1,4 @@
-"""Scores of variants on copies of light fields with added noise."""
+"""Copies of light fields with added noise or few of their views, and scores of variants on copies with noise."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ BEYOND = 0.005
 
 # not a colour of the scale
 _GREY = 128
-_FORMULA = "disparity = (value - 1) * scale + offset; value 0: unknown"
+_FORMULA = "disparity = (value - 1) * scale + offset; value 0: not finite"
 _STEPS = "pixels per view step"
 
 

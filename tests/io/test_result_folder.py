@@ -76,7 +76,7 @@ def test_16_bit_picture_gives_disparity_back(tmp_path: Path, light_field: LightF
         text = image.text
     assert values.dtype == np.uint16
     assert text["units"] == "pixels per view step"
-    assert text["Description"] == "disparity = (value - 1) * scale + offset; value 0: unknown"
+    assert text["Description"] == "disparity = (value - 1) * scale + offset; value 0: not finite"
     finite = np.isfinite(maps.disparity)
     assert (values[~finite] == 0).all()
     scale, offset = float(text["scale"]), float(text["offset"])
