@@ -24,7 +24,7 @@ class RimViews(NamedTuple):
         Row and column in the grid of each view that is compared.
     baselines : ndarray, shape (N, 2), float64
         Theirs, down and across, in view steps.
-    nearest : ndarray, shape (T, S, n, W), float32
+    nearest : ndarray, shape (N, n, W), float32
         z-buffers of the map, its nearer surfaces widened by a pixel, so that no mixed pixel counts as background.
     low : int
         First row of ``nearest``.

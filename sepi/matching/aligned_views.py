@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sepi.kernels import gauss_newton as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField, without_reference
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, Rows, row_bands
@@ -33,9 +33,9 @@ class Seeing(NamedTuple):
 
     Attributes
     ----------
-    nearest : ndarray, shape (T, S, n, W), float32
-        Nearest disparity in each view (:func:`sepi.matching.nearest_surfaces.nearest_surfaces`); rows start at the
-        splines' ``low``.
+    nearest : ndarray, shape (N, n, W), float32
+        Nearest disparity in each compared view (:func:`sepi.matching.nearest_surfaces.nearest_surfaces`); rows start
+        at the splines' ``low``.
     occlusion_margin : float32
         By how much an occluder must be nearer, pixels per view step.
     """
@@ -68,6 +68,7 @@ class AlignedViews:
         self._light_field = light_field
         self._parameters = parameters
         self.present = light_field.present if present is None else present
+        self._others = without_reference(light_field, self.present)
         self._margin = np.float32(occlusion_margin)
         # of the whole picture, where there is memory for it
         self._splines: SplineViews | None = None
@@ -103,7 +104,7 @@ class AlignedViews:
                 self._splines = spline_views(field, self._parameters, bands[0].rows, self.present)
             if self._nearest is None or self._nearest[0] is not disparity:
                 self._nearest = None
-                self._nearest = disparity, nearest_surfaces(field, disparity, self.present, bands[0].rows)
+                self._nearest = disparity, nearest_surfaces(field, disparity, self._others, bands[0].rows)
             add(self._splines, Seeing(self._nearest[1], self._margin), bands[0])
             return
         forget_splines(field)
@@ -115,7 +116,7 @@ class AlignedViews:
             rows = Rows(low, low + tallest)
             splines = spline_views(field, self._parameters, rows, self.present, room)
             room = splines.splines
-            add(splines, Seeing(nearest_surfaces(field, disparity, self.present, rows), self._margin), band)
+            add(splines, Seeing(nearest_surfaces(field, disparity, self._others, rows), self._margin), band)
         # a band may need all rows
         forget_splines(field)
 

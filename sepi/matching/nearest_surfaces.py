@@ -35,47 +35,43 @@ def nearest_surfaces(light_field: LightField, disparity: FloatMap | None, presen
 
     Returns
     -------
-    ndarray, shape (T, S, n, W), float32
-        From :func:`z_buffers`, with ``MISSING`` at pixels that a view does not show, and beside them, since samples
+    ndarray, shape (V, n, W), float32
+        Of the views wanted, row by row of the grid: from :func:`z_buffers`, with ``MISSING`` at pixels that a view does not show, and beside them, since samples
         between pixels read them, too.
     """
     if disparity is None:
-        nearest = _with_margin(*light_field.grid, rows.high - rows.low, light_field.shape[1])
+        nearest = _with_margin(int(present.sum()), rows.high - rows.low, light_field.shape[1])
         nearest[:] = EMPTY
     else:
-        nearest = z_buffers(disparity, present, light_field.baselines, *rows)
+        nearest = z_buffers(disparity, light_field.baselines[present], *rows)
     if light_field.missing is not None:
-        for t, s in np.argwhere(present & light_field.missing.any(axis=(2, 3))).tolist():
-            beside = cv2.dilate(light_field.missing[t, s].astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-            nearest[t, s][beside[rows.low : rows.high]] = MISSING
+        for view, missing in zip(nearest, light_field.missing[present], strict=True):
+            beside = cv2.dilate(missing.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+            view[beside[rows.low : rows.high]] = MISSING
     return nearest
 
 
-def z_buffers(
-    disparity: FloatMap, present: BoolMap, baselines: npt.NDArray[np.float64], low: int, high: int
-) -> FloatMap:
-    """Disparity map of the reference view as each view sees it: the nearest of the pixels that touch a position.
+def z_buffers(disparity: FloatMap, baselines: npt.NDArray[np.float64], low: int, high: int) -> FloatMap:
+    """Disparity map of the reference view as other views see it: the nearest of the pixels that touch a position.
 
     Parameters
     ----------
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
-    present : ndarray, shape (T, S), bool
-        Other views are left empty: their values are undefined.
-    baselines : ndarray, shape (T, S, 2), float64
-        Down and across from the reference view, in view steps.
+    baselines : ndarray, shape (V, 2), float64
+        Of the views: down and across from the reference view, in view steps.
     low, high : int
         The rows of the views that are wanted.
 
     Returns
     -------
-    ndarray, shape (T, S, high - low, W), float32
+    ndarray, shape (V, high - low, W), float32
         ``EMPTY`` where no pixel falls. A pixel between positions occludes two along either axis, since a bilinear
         sample between them reads its colour, too; otherwise it occludes the one that it falls on. The map's border
         values continue beyond the border.
     """
-    nearest = _with_margin(*present.shape, high - low, disparity.shape[1])
-    kernels.z_buffers(np.ascontiguousarray(disparity), present, baselines, low, high, nearest)
+    nearest = _with_margin(len(baselines), high - low, disparity.shape[1])
+    kernels.z_buffers(np.ascontiguousarray(disparity), baselines, low, high, nearest)
     return nearest
 
 

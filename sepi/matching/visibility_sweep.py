@@ -237,10 +237,10 @@ def occluded_in_any_view(
     baselines = light_field.baselines
     occluded = np.zeros(light_field.shape, bool)
     for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()), BYTES_PER_PIXEL):
-        nearest = z_buffers(disparity, present, baselines, *rows)
+        nearest = z_buffers(disparity, baselines[present], *rows)
         if light_field.missing is not None:
             # where a view has no pixels, nothing in it can occlude
-            nearest[light_field.missing[:, :, rows.low : rows.high]] = EMPTY
+            nearest[light_field.missing[present][:, rows.low : rows.high]] = EMPTY
         asked = (present, baselines, nearest, rows.low, occlusion_margin)
         kernels.occluded_in_any_view(disparity, asked, begin, end, occluded)
     return occluded
@@ -320,7 +320,7 @@ def _visibility(
 ) -> Visibility:
     """In which views the pixels of a band are seen: in all of them where no map tells."""
     if disparity is None or likely is None or not isinstance(parameters, VisibleViewsParameters):
-        everywhere = np.empty((*light_field.grid, band.rows.high - band.rows.low, 0), np.float32)
+        everywhere = np.empty((int(present.sum()), band.rows.high - band.rows.low, 0), np.float32)
         if light_field.missing is not None:
             everywhere = nearest_surfaces(light_field, None, present, band.rows)
         return Visibility(everywhere, np.float32(0), np.float32(1), present, np.empty((2, 0, 0), np.int32))

@@ -174,7 +174,7 @@ class Twin:
             down, across = y - d * v, x - d * u
             if min(down, across) < 0 or down > self.H - 1 or across > self.W - 1:
                 continue
-            if self.views.nearest[t, s, y - round(d * v), x - round(d * u)] <= d + self.views.margin:
+            if self.views.nearest[n, y - round(d * v), x - round(d * u)] <= d + self.views.margin:
                 found.append((n, cubic(self.pixels[t, s], down, across) * self.views.units[n]))
         return found
 

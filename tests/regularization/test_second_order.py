@@ -48,7 +48,8 @@ def sums_twin(light_field, decomposed, parameters, disparity, margin):
     t0, s0 = light_field.reference_position
     H, W = light_field.shape
     rows, columns = np.mgrid[:H, :W].astype(float)
-    nearest = z_buffers(disparity, light_field.present, light_field.baselines, 0, H)
+    baselines = light_field.baselines
+    nearest = z_buffers(disparity, baselines.reshape(-1, 2), 0, H).reshape(*light_field.grid, *disparity.shape)
     means, gradient, curvature = [], np.zeros((H, W)), np.zeros((H, W))
     for values, unit, scale, share in (
         (

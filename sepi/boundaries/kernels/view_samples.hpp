@@ -12,7 +12,7 @@ struct RimViews {
     Array<const float, 1> units;            // (N,)
     Strided<const std::int64_t, 2> places;  // (N, 2)
     Strided<const double, 2> baselines;     // (N, 2)
-    Array<const float, 4> nearest;          // (T, S, n, W)
+    Array<const float, 3> nearest;          // (N, n, W)
     Index low;                              // first row of nearest
     float margin;
 
@@ -40,7 +40,7 @@ struct ViewSamples {
     // Position of a pixel of disparity d in a view, if inside, before its last row and column.
     [[gnu::always_inline]] std::optional<Place> place_in(Index view, float d, Index y, Index x) const {
         const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
-        const Index W = views.nearest.shape[3];
+        const Index W = views.nearest.shape[2];
         if (!place_within(down, across, H, W)) return std::nullopt;
         const Index row = std::min(Index(down), H - 2), column = std::min(Index(across), W - 2);
         return Place{row, column, down - double(row), across - double(column)};
@@ -51,7 +51,7 @@ struct ViewSamples {
         const auto place = place_in(view, d, y, x);
         if (!place) return place;
         const auto [row, column] = place->nearest(y, x);
-        return views.nearest(views.places(view, 0), views.places(view, 1), row - views.low, column) <= d + views.margin ? place : std::nullopt;
+        return views.nearest(view, row - views.low, column) <= d + views.margin ? place : std::nullopt;
     }
 
     // Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since bilinear interpolation

@@ -193,11 +193,11 @@ def all_in_focus(
         for t, row in enumerate(_rows(others)):
             if not row.any():
                 continue
-            nearest = nearest_surfaces(light_field, surfaces, row, Rows(0, light_field.shape[0]))[t]
-            for s in np.flatnonzero(row[t]).tolist():
+            found = nearest_surfaces(light_field, surfaces, row, Rows(0, light_field.shape[0]))
+            for s, nearest in zip(np.flatnonzero(row[t]), found, strict=True):
                 view, margin = as_unit_float(light_field.views[t, s]), occlusion_margin
                 v, u = light_field.baselines[t, s]
-                kernels.add_view(view, v, u, disparity, nearest[s], margin, centre, float(scale2), sums, weights)
+                kernels.add_view(view, v, u, disparity, nearest, margin, centre, float(scale2), sums, weights)
             progress((number + (t + 1) / light_field.grid[0]) / ROUNDS)
         centre = centre + sums / weights[..., None]
     return np.clip(centre, 0, 1)
@@ -296,10 +296,10 @@ def _filled_between(
     """Sheared views ``(N, 3, H, W)`` of one row of the grid, each with the views round it."""
     baselines, cell = light_field.baselines, _cell(light_field)
     (t,) = np.flatnonzero(chosen.any(axis=1)).tolist()
-    nearest = z_buffers(surfaces, chosen[t : t + 1], baselines[t : t + 1], 0, len(surfaces))[0]
+    nearest = z_buffers(surfaces, baselines[chosen], 0, len(surfaces))
     filled = np.empty_like(views)
     for n, s in enumerate(np.flatnonzero(chosen[t]).tolist()):
-        seen = _without_holes(nearest[s], focus)
+        seen = _without_holes(nearest[n], focus)
         here = _sheared(seen, focus * baselines[t, s])
         kernels.fill_between(views[n], here, focus, cell, OCCLUSION_MARGIN, filled[n])
     return filled

@@ -65,8 +65,8 @@ void compare_depths(const Views &views, float unit, Array<const float, 2> dispar
         std::vector<Index> columns;
         for (Index x = 0; x < W; ++x)
             if (disparity(y, x) != farther(y, x)) columns.push_back(x);
-        asked.for_each([&](Index t, Index s, double down, double across) {
-            std::visit([&](const auto &some) { add_view(some[t][s], asked.nearest[t][s], down, across, y, columns); }, views);
+        asked.for_each([&](Index t, Index s, Array<const float, 2> nearest, double down, double across) {
+            std::visit([&](const auto &some) { add_view(some[t][s], nearest, down, across, y, columns); }, views);
         });
     });
 }

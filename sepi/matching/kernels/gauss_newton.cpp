@@ -26,7 +26,7 @@ struct SplineViews {
 
 // Where views are hidden: the fields of sepi.matching.aligned_views.Seeing.
 struct Seeing {
-    Array<const float, 4> nearest;  // (T, S, n, W), rows from the splines' low on
+    Array<const float, 3> nearest;  // (N, n, W), of the compared views, rows from the splines' low on
     float occlusion_margin;
 
     bool fields(auto visit) { return visit(nearest, occlusion_margin); }
@@ -74,8 +74,8 @@ struct View {
     const float down = views.baselines(n, 0), across = views.baselines(n, 1);
     const float bottom = float(H - 1), right = float(W - 1), unit = views.unit / (float(ONE) * float(ONE));
     const std::int32_t low = std::int32_t(views.low);
-    const std::int32_t pitch = std::int32_t(views.splines.strides[2]), width = std::int32_t(seeing.nearest.strides[2]);
-    const float *const nearest = seeing.nearest.at(t, s);
+    const std::int32_t pitch = std::int32_t(views.splines.strides[2]), width = std::int32_t(seeing.nearest.strides[1]);
+    const float *const nearest = seeing.nearest.at(n);
     // from the one before the picture on
     const std::int16_t *const coefficients = views.splines.at(t, s, SPLINE_MARGIN - 1, SPLINE_MARGIN - 1);
 

@@ -29,7 +29,7 @@ struct BaseDetail {
 
 // Which views see a pixel, and which candidates each view compares.
 struct Visibility {
-    Array<const float, 4> nearest;  // (T, S, n, W) or (T, S, n, 0), then LANES numbers; rows of the detail
+    Array<const float, 3> nearest;  // (V, n, W) or (V, n, 0) of the present views, then LANES numbers; rows of the detail
     float occlusion_margin, occluded_view_weight;
     Array<const bool, 2> searched;        // (T, S): the views that compare all candidates; others compare the likely ones
     Array<const std::int32_t, 3> likely;  // (2, H or 0, W): first and last likely candidate
@@ -150,14 +150,15 @@ struct VisibleRow {
             reference(3, 0, x) = float(views.reference_detail(y - views.low, x) * ONE);
         load_bends(y);
         const std::vector<Columns> everywhere(K, {{0, W}}), likely = likely_columns(y);
-        for (Index t = 0; t < views.present.shape[0]; ++t) {
+        for (Index t = 0, number = -1; t < views.present.shape[0]; ++t) {
             for (Index s = 0; s < views.present.shape[1]; ++s) {
+                number += views.present(t, s);
                 if (!views.present(t, s) || (t == views.t0 && s == views.s0)) continue;
                 const Index r = candidates.row(t, s);
                 const auto [low, high] = std::minmax<Index>({y + candidates.down(r, 0), y + candidates.down(r, K - 1)});
                 const Index first = std::clamp<Index>(low, 0, H - 2), last = std::clamp<Index>(high, 0, H - 2) + 2;
                 load_view(t, s, first, last);
-                add_view(t, s, first, y, visibility.searched(t, s) ? everywhere : likely);
+                add_view(t, s, visibility.nearest[number], first, y, visibility.searched(t, s) ? everywhere : likely);
             }
         }
         for (Index k = 0; k < K; ++k) {
@@ -215,9 +216,8 @@ struct VisibleRow {
     }
 
     // Add one view, whose rows from low on are loaded, to row y, in the columns of every candidate.
-    void add_view(Index t, Index s, Index low, Index y, const std::vector<Columns> &columns) {
+    void add_view(Index t, Index s, Array<const float, 2> nearest, Index low, Index y, const std::vector<Columns> &columns) {
         const Index r = candidates.row(t, s), c = candidates.column(t, s), pitch = width;
-        const auto nearest = visibility.nearest[t][s];
         const bool some_hide = nearest.shape[1] > 0, searched = visibility.searched(t, s);
         const Float8 hidden = spread(visibility.occluded_view_weight);
         const float margin = visibility.occlusion_margin, steepness = 1 / std::max(margin, LEAST_MARGIN);
@@ -295,17 +295,16 @@ struct VisibleRow {
     }
 };
 
-// Disparity map of the reference view as each view sees it, rows low..high: the nearest of the pixels that touch a
-// position; out (T, S, high - low, W).
-void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, Strided<const double, 3> baselines, Index low, Index high, Array<float, 4> out) {
+// Disparity map of the reference view as views at baselines (V, 2) see it, rows low..high: the nearest of the pixels that
+// touch a position; out (V, high - low, W).
+void z_buffers(Array<const float, 2> disparity, Strided<const double, 2> baselines, Index low, Index high, Array<float, 3> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const auto [least, most] = std::minmax_element(disparity.data, disparity.data + H * W);
-    over_stretches(present.shape, 1, 1, [&, least = double(*least), most = double(*most)](Index t, Index s, Index, Index) {
-        if (!present(t, s)) return;
-        const double v = baselines(t, s, 0), u = baselines(t, s, 1);
+    parallel_for(0, out.shape[0], [&, least = double(*least), most = double(*most)](Index n) {
+        const double v = baselines(n, 0), u = baselines(n, 1);
         // only rows that can reach these; the border continues beyond the picture
         const Index first = Index(std::floor(low - 1 + std::min(least * v, most * v))), last = Index(std::ceil(high + std::max(least * v, most * v))) + 1;
-        NearestInView view{v, u, out[t][s]};
+        NearestInView view{v, u, out[n]};
         for (Index y = first; y < last; ++y) view.add_row(disparity.at(clamped(y, H)), y - low);
         view.finish();
     });
@@ -315,11 +314,11 @@ void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, St
 void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &views, Index begin, Index end, Array<bool, 2> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for(begin, end, [&](Index y) {
-        views.for_each([&](Index t, Index s, double down, double across) {
+        views.for_each([&](Index, Index, Array<const float, 2> nearest, double down, double across) {
             for (Index x = 0; x < W; ++x) {
                 const float d = disparity(y, x);
                 const Index row = y - Index(std::nearbyint(d * down)), column = x - Index(std::nearbyint(d * across));
-                if (row >= 0 && column >= 0 && row < H && column < W) out(y, x) |= views.nearest(t, s, row - views.low, column) > d + views.margin;
+                if (row >= 0 && column >= 0 && row < H && column < W) out(y, x) |= nearest(row - views.low, column) > d + views.margin;
             }
         });
     });
