@@ -8,6 +8,7 @@ mixtures of both is none: surfaces are darker, or of another colour, towards the
 does, and all count for less.
 """
 
+import cv2
 import numpy as np
 
 from sepi.boundaries.parameters import BoundaryParameters
@@ -54,9 +55,9 @@ def mixture_evidence(
 
 def _trust(guide: FloatMap) -> np.float32:
     """Weight of the evidence of a colour between two others, 0..1: in a grey picture all are."""
-    colours = guide.reshape(-1, 3).astype(np.float64)
-    colours = colours - colours.mean(axis=0)
+    channels = cv2.split(guide)
     # exactly zero for grey, despite rounding
-    beside_grey = colours - colours[:, [1, 2, 0]]
-    chroma = (beside_grey**2).sum() / 3 / max((colours**2).sum(), 1e-12)
+    beside_grey = (channels[c] - channels[c - 1] for c in range(3))
+    own, between = (sum(float(cv2.meanStdDev(of)[1][0, 0]) ** 2 for of in some) for some in (channels, beside_grey))
+    chroma = between / 3 / max(own, 1e-12)
     return np.float32(_GREY_TRUST + (1 - _GREY_TRUST) * min(chroma / _COLOURED, 1.0))

@@ -17,10 +17,10 @@ class BoundaryParameters(OcclusionMarginParameters):
         0.3, gt=0, description="depth step beside which pixels may be of either surface, pixels per view step"
     )
     clean_radius: int = Field(
-        4, ge=1, le=20, description="distance within which unmixed colours of both surfaces are searched, in pixels"
+        7, ge=1, le=20, description="distance within which unmixed colours of both surfaces are searched, in pixels"
     )
     share_evidence: float = Field(
-        0.015,
+        0.018,
         ge=0,
         lt=1,
         description="cost of a change to the other surface, for a whole pixel, relative to the views' mean costs, 0..1",

@@ -36,8 +36,8 @@ def nearest_surfaces(light_field: LightField, disparity: FloatMap | None, presen
     Returns
     -------
     ndarray, shape (V, n, W), float32
-        Of the views wanted, row by row of the grid: from :func:`z_buffers`, with ``MISSING`` at pixels that a view does not show, and beside them, since samples
-        between pixels read them, too.
+        Of the views wanted, row by row of the grid: from :func:`z_buffers`, with ``MISSING`` at pixels that a view
+        does not show, and beside them, since samples between pixels read them, too.
     """
     if disparity is None:
         nearest = _with_margin(int(present.sum()), rows.high - rows.low, light_field.shape[1])

@@ -116,7 +116,8 @@ class Visibility(NamedTuple):
     ----------
     nearest : ndarray, shape (V, n, W) or (V, n, 0), float32
         From :func:`sepi.matching.nearest_surfaces.nearest_surfaces`, of the present views, for the rows of their
-        detail; empty: all views see all pixels. The memory goes on for :data:`sepi.kernels.LANES` numbers after its end.
+        detail; empty: all views see all pixels. The memory goes on for :data:`sepi.kernels.LANES` numbers after
+        its end.
     occlusion_margin : float32
         By how much an occluder must be nearer, pixels per view step.
     occluded_view_weight : float32

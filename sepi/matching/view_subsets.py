@@ -138,11 +138,12 @@ def views_without_aliases(light_field: LightField, at_least: int, *, far: bool =
     """About as many views as :func:`spread_views`, arranged so that a regular texture has fewer aliases.
 
     Views of every second row and column give twice as many aliases as all views, and a chess board does so for a
-    checkered texture. Three arrangements avoid this, with ``s`` and ``t`` counted from the reference view: a third of
-    the views, with ``s + t`` divisible by three; 13 views: the reference view, the corners, and eight that stand one
-    step from the border along one axis and one step from the reference view along the other; and three fifths of the
-    views, with ``|s| + |t|`` within one of a multiple of five. Grids beyond 9x9 have a mirrored lattice: views with
-    ``|s| + a |t|`` divisible by ``k``, for the ``a`` and ``k`` with which the views repeat least.
+    checkered texture. Four arrangements avoid this, with ``s`` and ``t`` counted from the reference view: a third of
+    the views, with ``s + t`` divisible by three; nine views: the reference view, and eight at the border along one axis
+    and one step from the reference view along the other; 13 views: the reference view, the corners, and eight that
+    stand one step from the border and one from the reference view; and three fifths of the views, with ``|s| + |t|``
+    within one of a multiple of five. Grids beyond 9x9 have a mirrored lattice: views with ``|s| + a |t|`` divisible by
+    ``k``, for the ``a`` and ``k`` with which the views repeat least.
 
     Parameters
     ----------
@@ -162,9 +163,10 @@ def views_without_aliases(light_field: LightField, at_least: int, *, far: bool =
     down, across = np.indices(light_field.grid) - np.array([t0, s0])[:, None, None]
     near, distant = np.sort(np.abs([down, across]), axis=0)
     third = (down + across) % 3 == 0
+    ring = (distant == 0) | ((near == 1) & (distant == reach))
     star = (distant == 0) | ((near == 1) & (distant == reach - 1)) | ((near == reach) & (distant == reach))
     fifths = (near + distant + 1) % 5 <= 2
-    for views in (fifths,) if far else (third, star, fifths):
+    for views in (fifths,) if far else (ring, third, star, fifths):
         few: BoolMap = light_field.present & views
         if reach > _SHORT and at_least <= few.sum() <= _HARDLY_MORE * at_least:
             return few

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import cv2
 import numpy as np
@@ -57,7 +57,7 @@ TEXTURE = 1.85
 In views without noise the measurement is of texture. In strong texture few pixels of a window have similar colours.
 """
 
-SHARE_AFTER_FIRST = 0.2
+SHARE_AFTER_FIRST = 0.13
 """Share of the texture around a pixel that widens its window after the first map, which needs all of it where texture
 repeats. More would join thin structures to what is behind them."""
 
@@ -71,6 +71,11 @@ BYTES_PER_PIXEL = 2 + 4
 """Per pixel of a view: the detail, and the z-buffer."""
 
 
+FirstViews = Annotated[
+    int, Field(ge=2, description="least number of views for all maps but the last; spread evenly over the grid")
+]
+
+
 class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, SmoothingParameters):
     """Parameters of a visibility sweep and its smoothing."""
 
@@ -78,9 +83,7 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
     needs: ClassVar[Needs] = Needs(bytes_per_candidate=BYTES_PER_CANDIDATE)
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/method/best_initial.md")
-    first_views: int = Field(
-        25, ge=2, description="least number of views for all maps but the last; spread evenly over the grid"
-    )
+    first_views: FirstViews = 25
     first_sampling: float = Field(2.0, ge=1, le=8, description="distance of their candidates, steps of num_disparities")
 
     @property
@@ -123,6 +126,7 @@ class VisibleViewsParameters(VisibilitySweepParameters, GapParameters):
 class FirstDepthParameters(VisibilitySweepParameters):
     """Parameters of the first depth map; a small colour scale limits the cost of views that do not see the pixel."""
 
+    first_views: FirstViews = 9
     colour_scale: ColourScale = 0.0077
     small_penalty: SmallPenalty = 0.04
 

@@ -197,9 +197,7 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool, geo
     seen = Visibility(nearest, np.float32(0.1), np.float32(0.05), searched, likely)
     candidates = sampled_candidates(disparities, baselines)
     visibility.sweep_visible_rows(views, seen, scales, shares, candidates, 0, 11, cost)
-    expected = sweep_twin(
-        light_field, views, hidden, disparities, np.float32(0.1), 0.05, scales, shares, compared
-    )
+    expected = sweep_twin(light_field, views, hidden, disparities, np.float32(0.1), 0.05, scales, shares, compared)
     np.testing.assert_allclose(cost, expected, atol=2e-5)
 
 
