@@ -46,7 +46,11 @@ _MOST_WIDENED = 2
 SmallPenalty = Annotated[
     float, Field(ge=0, description="cost of a change by one candidate along a path; more below 25 views")
 ]
-"""A parameter whose default is not the same for every sweep."""
+LargePenalty = Annotated[
+    float,
+    Field(ge=0, description="cost of a larger change where the colour does not change; more below 25 views"),
+]
+"""Parameters whose default is not the same for every sweep."""
 
 
 class SmoothingParameters(Parameters):
@@ -57,35 +61,36 @@ class SmoothingParameters(Parameters):
         0.01, ge=1e-6, le=10, description="colour distance at which a window pixel's weight falls, colours in 0..1"
     )
     small_penalty: SmallPenalty = 0.03
-    large_penalty: float = Field(
-        1.0, ge=0, description="cost of a larger change where the colour does not change; more below 25 views"
-    )
+    large_penalty: LargePenalty = 1.0
     colour_weakening: float = Field(
         65.0, ge=0, description="how much a colour change weakens the larger penalty, per sum of RGB differences"
     )
 
-    def for_views(self, views: int) -> Self:
-        """These parameters for light fields of few views: as given from :data:`ENOUGH_VIEWS` on.
+    def for_views(self, views: int, compared: int) -> Self:
+        """These parameters for few views: as given from :data:`ENOUGH_VIEWS` on.
 
         Costs are means over the views, and each view counts once as evidence against a smooth map. With a third of the
         views, a mean weighs a third as much, so penalties weigh three times as much. The window grows while it holds no
-        more samples of all views than with enough views.
+        more samples of all views than with enough views, also where not all of them are compared: repeated texture
+        needs narrow ones.
 
         Parameters
         ----------
         views : int
             Of the light field, at least 1.
+        compared : int
+            Of these, at least 1.
 
         Returns
         -------
         SmoothingParameters
         """
-        if views >= ENOUGH_VIEWS:
-            return self
         radius, samples = self.window_radius, ENOUGH_VIEWS * (2 * self.window_radius + 1) ** 2
         while radius < _MOST_WIDENED * self.window_radius and views * (2 * radius + 3) ** 2 <= samples:
             radius += 1
-        penalties = {name: getattr(self, name) * ENOUGH_VIEWS / views for name in ("small_penalty", "large_penalty")}
+        penalties = {
+            name: getattr(self, name) * max(1.0, ENOUGH_VIEWS / compared) for name in ("small_penalty", "large_penalty")
+        }
         return self.model_copy(update={"window_radius": radius, **penalties})
 
 

@@ -41,6 +41,7 @@ from sepi.matching.semi_global import (
     ROWS_AT_ONCE,
     AveragedCosts,
     CostVolumes,
+    LargePenalty,
     SmallPenalty,
     SmoothingParameters,
 )
@@ -57,7 +58,7 @@ TEXTURE = 1.85
 In views without noise the measurement is of texture. In strong texture few pixels of a window have similar colours.
 """
 
-SHARE_AFTER_FIRST = 0.13
+SHARE_AFTER_FIRST = 0.15
 """Share of the texture around a pixel that widens its window after the first map, which needs all of it where texture
 repeats. More would join thin structures to what is behind them."""
 
@@ -129,6 +130,7 @@ class FirstDepthParameters(VisibilitySweepParameters):
     first_views: FirstViews = 9
     colour_scale: ColourScale = 0.0077
     small_penalty: SmallPenalty = 0.04
+    large_penalty: LargePenalty = 0.8
 
 
 def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, progress: Progress) -> StageMaps:
@@ -275,7 +277,7 @@ def _sweep(
     shown = light_field.present
     if light_field.missing is not None:
         shown = shown & ~light_field.missing.all(axis=(2, 3))
-    smoothing = parameters.for_views(int(shown.sum()))
+    smoothing = parameters.for_views(int(shown.sum()), max(1, int((shown & present).sum())))
     costs = AveragedCosts(volumes, disparities, guide, contrast, smoothing, likely if refined else None)
     searched = np.zeros_like(present) if refined else _searched_views(light_field, present, parameters)
     candidates = sampled_candidates(disparities, light_field.baselines)
