@@ -21,6 +21,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import reference_residual_variance
+from sepi.image.texture import variance_within_surface
 from sepi.kernels import LANES
 from sepi.kernels import plane_sweep as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
@@ -40,6 +41,9 @@ CANDIDATES = CandidateRule(usual=181, finest=0.02, coarsest=0.5)
 
 TILE_WIDTH = 128
 """Columns computed at a time, which bounds the memory of a thread for any image width, and keeps it in the cache."""
+
+TEXTURE_SHARE = 0.05
+"""Of the texture around a pixel, that widens its window; more would join thin structures to what is behind them."""
 
 NOISE_LEFT_OUT = 0.9
 """Largest share of the cost of noise alone that confidence leaves out: with all of it, Eq. 5 would be 0 / 0 in pure
@@ -186,8 +190,8 @@ def sweep(
     to_correct = parameters.noise_to_correct(light_field)
     expected = expected_costs(light_field, to_correct, candidates, groups, chosen, squared_scale, LANES)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
-    # the kernel takes one for each pixel
-    variance = np.full((H, W), parameters.window_sigma**2 + noise, np.float32)
+    # where texture repeats, a window of one of its colours would hold all aliases alike
+    variance = variance_within_surface(light_field.reference_view, parameters.window_sigma**2 + noise, TEXTURE_SHARE)
     window = Window(guide, parameters.window_radius, variance)
     best, cost, mean = maps = np.full((3, len(chosen), H, W), np.nan, np.float32)
     height = _rows_at_a_stretch(H, threads_used())

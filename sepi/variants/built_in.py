@@ -31,7 +31,7 @@ ENTRIES: dict[str, dict[str, Any]] = {
     },
     # few views, candidates and rounds
     "fast": {
-        "initial": {"choice": "semi_global", "first_sampling": 3},
+        "initial": "semi_global",
         # in a single pass, the mean reference takes a tenth longer and gains next to nothing
         "occlusion": {"choice": "visibility", "passes": 1, "views": 25, "sampling": 2, "mean_noise": 1},
         "textureless": {"choice": "uniform_planes", "views": 9},
