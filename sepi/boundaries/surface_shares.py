@@ -160,8 +160,9 @@ def view_brightness(
     asked = np.ix_(*lines)
     here, disparity, clean = sides.guide[asked], sides.disparity[asked], sides.clean[asked]
     brightness, residual = np.ones(len(places)), np.full(len(places), np.nan)
+    views, baselines = light_field.rgb_views, light_field.baselines
     for n, (t, s) in enumerate(places.tolist()):
-        down, across = light_field.baselines[t, s]
+        down, across = baselines[t, s]
         y, x = (
             (lines[0][:, None] - disparity * down).astype(np.float32),
             (lines[1] - disparity * across).astype(np.float32),
@@ -171,11 +172,11 @@ def view_brightness(
             missing = light_field.missing[t, s].astype(np.float32)
             shown &= cv2.remap(missing, x, y, cv2.INTER_LINEAR) == 0
         if shown.any():
-            view = np.ascontiguousarray(light_field.rgb_views[t, s])
-            there = as_unit_float(cv2.remap(view, x, y, cv2.INTER_LINEAR))[shown]
-            own, other = (max(float(colours.sum(dtype=np.float64)), 1e-9) for colours in (here[shown], there))
-            brightness[n] = other / own
-            apart = np.abs(there / brightness[n] - here[shown])
+            view = np.ascontiguousarray(views[t, s])
+            there, own = as_unit_float(cv2.remap(view, x, y, cv2.INTER_LINEAR))[shown], here[shown]
+            shown_there, shown_here = (max(float(of.sum(dtype=np.float64)), 1e-9) for of in (there, own))
+            brightness[n] = shown_there / shown_here
+            apart = np.abs(there / brightness[n] - own)
             residual[n] = np.minimum(apart, _MOST_DIFFERENCE).mean(dtype=np.float64)
     return brightness, residual
 
