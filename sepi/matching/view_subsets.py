@@ -41,6 +41,8 @@ _HARDLY_MORE = 1.2
 _SHORT, _MODERATE = 1, 4
 # least mean squared distance of a lattice's views from the reference view, as a multiple of that of all views
 _WIDE = 0.99
+# of a single row's views, of which every second one repeats twice as often
+_FEWEST_OF_A_ROW = 25
 # least number of frequencies along each axis at which repetitions are searched
 _FREQUENCIES = 48
 
@@ -143,7 +145,8 @@ def views_without_aliases(light_field: LightField, at_least: int, *, far: bool =
     and one step from the reference view along the other; 13 views: the reference view, the corners, and eight that
     stand one step from the border and one from the reference view; and three fifths of the views, with ``|s| + |t|``
     within one of a multiple of five. Grids beyond 9x9 have a mirrored lattice: views with ``|s| + a |t|`` divisible by
-    ``k``, for the ``a`` and ``k`` with which the views repeat least.
+    ``k``, for the ``a`` and ``k`` with which the views repeat least. A single row keeps more views, every second or
+    fourth one.
 
     Parameters
     ----------
@@ -170,6 +173,8 @@ def views_without_aliases(light_field: LightField, at_least: int, *, far: bool =
         few: BoolMap = light_field.present & views
         if reach > _SHORT and at_least <= few.sum() <= _HARDLY_MORE * at_least:
             return few
+    if 1 in light_field.grid:
+        at_least = max(at_least, _FEWEST_OF_A_ROW)
     lattices = _mirrored_lattices(light_field, at_least) if reach > _MODERATE else []
     return min(lattices, key=_repetition) if lattices else spread_views(light_field, at_least)
 
