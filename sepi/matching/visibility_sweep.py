@@ -58,7 +58,7 @@ TEXTURE = 1.85
 In views without noise the measurement is of texture. In strong texture few pixels of a window have similar colours.
 """
 
-SHARE_AFTER_FIRST = 0.15
+SHARE_AFTER_FIRST = 0.18
 """Share of the texture around a pixel that widens its window after the first map, which needs all of it where texture
 repeats. More would join thin structures to what is behind them."""
 

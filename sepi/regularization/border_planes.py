@@ -48,7 +48,7 @@ of the shortest way round, two pixels wide."""
 class BorderPlaneParameters(Parameters):
     """Parameters of planes by borders."""
 
-    tolerance: float = Field(0.05, gt=0, description="largest distance of an inlier, pixels per view step")
+    tolerance: float = Field(0.07, gt=0, description="largest distance of an inlier, pixels per view step")
     behind_penalty: float = Field(2.0, ge=0, description="penalty on border behind the plane, relative to inliers")
     min_inlier_ratio: float = Field(0.25, ge=0, le=1, description="least share of inliers in the border")
     ransac_iterations: int = Field(500, ge=1, description="number of planes that are tried for each region")
