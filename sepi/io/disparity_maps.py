@@ -20,7 +20,7 @@ from sepi.errors import SepiError
 from sepi.io.files import atomic_path, reading
 from sepi.io.hdf5 import float_maps, has_dataset, open_hdf5, read_dataset
 from sepi.io.images import picture_header, png_texts, read_picture
-from sepi.io.readers.array_files import numpy_array, numpy_shapes
+from sepi.io.readers.array_files import numpy_arrays
 from sepi.io.readers.view_grid import cut_like_views
 from sepi.lightfield import FloatMap, full_scale
 from sepi.stage import ERROR_BARS, StageMaps
@@ -140,7 +140,7 @@ def is_disparity(path: Path) -> bool:
         return _is_float_tiff(path)
     if suffix in _NUMPY:
         with suppress(SepiError):
-            return all(len(shape) == 2 for shape, _ in numpy_shapes(path).values())
+            return all(len(one.shape) == 2 for one in numpy_arrays(path).values())
     return suffix in SUFFIXES
 
 
@@ -273,10 +273,10 @@ def _stored(path: Path, scaled: bool) -> npt.NDArray[Any]:
     if suffix in (".png", ".pgm", *_TIFF):
         return _read_levels(path, scaled)
     if suffix in _NUMPY:
-        shapes = numpy_shapes(path)
-        if len(shapes) != 1:
-            raise SepiError(f"{path}: expected one array of shape (H, W), found {', '.join(shapes) or 'none'}")
-        values = numpy_array(path, *shapes)
+        arrays = numpy_arrays(path)
+        if len(arrays) != 1:
+            raise SepiError(f"{path}: expected one array of shape (H, W), found {', '.join(arrays) or 'none'}")
+        (values,) = (one.read() for one in arrays.values())
     elif suffix in _HDF5:
         with open_hdf5(path) as file:
             values = read_dataset(path, file[_DATASET])
