@@ -18,12 +18,11 @@ import numpy.typing as npt
 from sepi.camera import Part
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path, reading
-from sepi.io.hdf5 import float_maps, has_dataset, open_hdf5, read_dataset
+from sepi.io.hdf5 import has_dataset, open_hdf5, read_dataset
 from sepi.io.images import picture_header, png_texts, read_picture
 from sepi.io.readers.array_files import numpy_arrays
 from sepi.io.readers.view_grid import cut_like_views
 from sepi.lightfield import FloatMap, full_scale
-from sepi.stage import ERROR_BARS, StageMaps
 from sepi.validation import described, is_finite, require_map, require_path
 
 # magic, width, height, scale (its sign gives the byte order), each ended by one white space
@@ -184,31 +183,6 @@ def read_disparity(path: str | Path, *, scale: float | None = None, offset: floa
         if not is_finite(value):
             raise SepiError(f"{path}: {name}: expected a finite number, got {described(value)}")
     return _scaled(_stored(path, scale is not None), scale, offset)
-
-
-def read_error_bars(path: Path) -> StageMaps | None:
-    """Disparity, confidence and error bars of one view; None if the file has no error bars.
-
-    Parameters
-    ----------
-    path : Path
-        As for :func:`read_disparity`.
-
-    Raises
-    ------
-    SepiError
-        If the file is damaged.
-    """
-    path = path / "result.h5" if path.is_dir() else path
-    if path.suffix.lower() not in _HDF5 or not path.is_file():
-        return None
-    with open_hdf5(path) as file:
-        if not {_DATASET, "confidence", *ERROR_BARS} <= set(file) or file[_DATASET].ndim != 2:
-            return None
-        maps = float_maps(path, file)
-    if len({values.shape for values in maps.values()}) > 1:
-        raise SepiError(f"{path}: damaged: error bars {maps[ERROR_BARS[0]].shape} do not fit the disparity")
-    return StageMaps(maps.pop(_DATASET), maps.pop("confidence"), maps)
 
 
 @dataclass(frozen=True)

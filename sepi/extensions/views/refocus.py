@@ -262,7 +262,8 @@ def _read_result(
     path: Path, light_field_path: Path, light_field: LightField, reading: Reading
 ) -> tuple[FloatMap, FloatMap, Camera | None]:
     """The map to focus by, the same with NaN at unknown pixels, and its camera if it records one."""
-    from sepi.io.all_views import read_disparity_at, read_origin_at, read_result_at
+    from sepi.io.all_views import read_disparity_at, read_origin_at
+    from sepi.io.result_folder import read_result
 
     view = reading.options.view
     disparity = read_disparity_at(path, view)
@@ -272,7 +273,7 @@ def _read_result(
         )
     if read_origin_at(path, view) is None:
         return disparity, disparity, None
-    result = read_result_at(path, view)
+    result = read_result(path, view)
     return disparity, np.where(result.unknown, np.float32(np.nan), disparity), result.camera
 
 
