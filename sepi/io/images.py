@@ -296,7 +296,7 @@ def _pillow_form(plugin: str, file: IO[bytes], path: Path, size: int) -> _Form:
 
 
 def _pillow_class(plugin: str) -> Any:
-    # ``Image.open`` and the class for WebP refuse images that are allowed here, with a limit for all threads
+    # ``Image.open`` refuses images that are allowed here, with a limit for all threads
     return getattr(import_module(f"PIL.{plugin}ImagePlugin"), f"{plugin}ImageFile")
 
 
@@ -304,18 +304,6 @@ def _avif_form(file: IO[bytes], path: Path, size: int) -> _Form:
     # the box 'ispe' holds the size of the image
     _, _, box = file.read(4096).partition(b"ispe\0\0\0\0")
     return int.from_bytes(box[4:8], "big"), int.from_bytes(box[:4], "big")
-
-
-def _webp_form(file: IO[bytes], path: Path, size: int) -> _Form:
-    head = file.read(30)
-    if head[12:16] == b"VP8X":
-        width, height = (1 + int.from_bytes(head[at : at + 3], "little") for at in (24, 27))
-    elif head[12:16] == b"VP8L":
-        bits = int.from_bytes(head[21:25], "little")
-        width, height = 1 + bits % 2**14, 1 + (bits >> 14) % 2**14
-    else:
-        width, height = (int.from_bytes(head[at : at + 2], "little") % 2**14 for at in (26, 28))
-    return height, width
 
 
 def _tiff_form(file: IO[bytes], path: Path, size: int) -> _Form:
@@ -384,6 +372,6 @@ _KINDS = {
     "GIF": _Kind(b"GIF8", partial(_pillow_form, "Gif"), partial(_codec_pixels, "gif")),
     "JPEG 2000": _Kind(_JPEG_2000, partial(_pillow_form, "Jpeg2K"), partial(_codec_pixels, "jpeg2k")),
     "AVIF": _Kind(_AVIF, _avif_form, partial(_codec_pixels, "avif")),
-    "WebP": _Kind(b"RIFF", _webp_form, partial(_codec_pixels, "webp")),
+    "WebP": _Kind(b"RIFF", partial(_pillow_form, "WebP"), partial(_codec_pixels, "webp")),
     "PNM": _Kind((b"P2", b"P3", b"P5", b"P6"), _pnm_form, lambda _, data: pnm_pixels(data)),
 }

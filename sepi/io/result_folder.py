@@ -254,10 +254,7 @@ def result_in(path: Path, view: _View | None, check: bool = True) -> Result:
         if missing := {"disparity", "confidence"}.difference(maps):
             raise SepiError(f"damaged result of 'sepi depth': it has no {' and no '.join(sorted(missing))}")
         picture = hdf5.read_dataset(path, file["view" if place is ... else "picture"], place)
-        # earlier versions had rows as far apart as columns, and all views on the grid
-        told = "from_centre" in file.attrs
-        centre = hdf5.attribute(file, "from_centre") if told else np.subtract(own, hdf5.attribute(file, "grid") // 2)
-        rig = hdf5.read_rig(file)
+        centre, rig = hdf5.attribute(file, "from_centre"), hdf5.read_rig(file)
         if place is ...:
             unknown = (
                 hdf5.read_dataset(path, file[UNKNOWN]) > 0 if UNKNOWN in file else np.zeros(picture.shape[:2], bool)

@@ -45,8 +45,8 @@ class Format(NamedTuple):
         Whether it reads values of any scale, and uses the option ``white``.
     loose : bool
         Whether it also matches what another format describes better; formats of extensions are asked before.
-    read_views, read_truth : callable, optional
-        Light field without ground truth and masks, and these alone; default: both come from ``read``.
+    read_truth : callable, optional
+        Ground truth and masks alone, if ``read`` gives a light field without them; default: both come from ``read``.
     truth_files : callable
         Files of a path with ground truth and masks.
     size_of : callable, optional
@@ -64,7 +64,6 @@ class Format(NamedTuple):
     options: tuple[str, ...] = ()
     scales: bool = True
     loose: bool = False
-    read_views: Callable[[Path, ReadOptions], LightField] | None = None
     read_truth: Callable[[Path, ReadOptions], Truth] | None = None
     truth_files: Callable[[Path], Sequence[Path]] = lambda _: ()
     size_of: Callable[[Path], tuple[int, int, int, int]] | None = None
@@ -105,7 +104,6 @@ _OWN = {
         hci.matches,
         hci.read,
         ("grid", "follow_links"),
-        read_views=hci.read_views,
         read_truth=hci.read_truth,
         truth_files=hci.truth_files,
     ),
@@ -224,10 +222,12 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None, *, tr
     known = format_of(path, file_format)
     _require_used(path, known, options)
     with naming(path):
-        of_views = known.read if truth or known.read_views is None else known.read_views
-        light_field = of_views(path, options)
+        light_field = known.read(path, options)
         if not truth:
             light_field = replace(light_field, ground_truth=None, masks={})
+        elif known.read_truth is not None:
+            ground_truth, masks = known.read_truth(path, options)
+            light_field = replace(light_field, ground_truth=ground_truth, masks=masks)
         if options.white is not None and not known.scales:
             views = with_white(light_field.views, light_field.present, path, options.white)
             light_field = replace(light_field, views=views)
