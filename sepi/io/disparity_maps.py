@@ -111,8 +111,6 @@ SUFFIXES: tuple[str, ...] = (".pfm", *_NUMPY, ".png", ".pgm", *_TIFF, *_HDF5)
 """Suffixes of the files that are read, in lower case."""
 
 _DATASET = "disparity"
-# colour type of a grey PNG, byte 26 of its header
-_GREY = 0
 # text chunks of `disparity_16bit.png`
 _SCALE, _OFFSET = "scale", "offset"
 
@@ -272,7 +270,8 @@ def _read_levels(path: Path, scaled: bool) -> npt.NDArray[Any]:
     levels, header = read_picture(path, any_floats=True)[:, :, 0], picture_header(path)
     if levels.dtype == np.float32 and header.grey and header.kind == "TIFF":
         return levels
-    if not header.grey or header.kind not in ("PNG", "TIFF", "PNM") or (header.kind == "PNG" and _is_packed(path)):
+    # decoding stretches fewer than 8 bits
+    if not header.grey or not (header.white or header.kind == "TIFF"):
         raise _no_map(path)
     texts = png_texts(path)
     if {_SCALE, _OFFSET} <= set(texts):
@@ -284,13 +283,6 @@ def _read_levels(path: Path, scaled: bool) -> npt.NDArray[Any]:
         raise SepiError(f"{path}: {kind} does not say what its levels mean; give a scale, or write it as .pfm or .npy")
     # the levels of a PGM end at a white of its own
     return np.rint(levels * (header.white / full_scale(levels.dtype))).astype(int) if header.white else levels
-
-
-def _is_packed(path: Path) -> bool:
-    """Whether a PNG has fewer than 8 bits, which decoding stretches to 8, or is not grey."""
-    with path.open("rb") as file:
-        head = file.read(26)
-    return head[24] not in (8, 16) or head[25] != _GREY
 
 
 def _number(path: Path, key: str, text: str) -> float:

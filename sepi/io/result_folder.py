@@ -21,7 +21,7 @@ from sepi.camera.rig import Rig
 from sepi.errors import SepiError
 from sepi.io import hdf5, map_pictures
 from sepi.io.disparity_maps import write_pfm
-from sepi.io.files import atomic_path, filled_folder, remove_files
+from sepi.io.files import atomic_folder, atomic_path, remove_files
 from sepi.io.images import write_png
 from sepi.io.point_cloud import point_cloud, write_ply
 from sepi.io.provenance import DIGEST, RESULT, result_attributes
@@ -192,7 +192,7 @@ def write_result(
     if light_field.camera is not None:
         warn_of_infinity(folder, light_field.camera, maps.disparity, maps.sigma, maps.mask(UNKNOWN))
     earlier = require_own(folder, light_field, force=force)
-    with filled_folder(folder) as temporary:
+    with atomic_folder(folder, add=True) as temporary:
         names = _write_files(temporary, light_field, maps, attributes or {}, seconds, beside)
     remove_files(folder, earlier.difference(names))
     return names

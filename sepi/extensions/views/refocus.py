@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, read_light_field_of, reading_flags
 from sepi.errors import SepiError
-from sepi.io.files import atomic_path, filled_folder, naming, remove_files
+from sepi.io.files import atomic_folder, atomic_path, naming, remove_files
 from sepi.io.images import write_png
 from sepi.lightfield import FloatMap, full_scale
 from sepi.process.command import SepiCommand, progress_bar
@@ -84,7 +84,7 @@ def write_refocused(
     others = [name for name in made if name not in before and os.path.lexists(folder / name)]
     if others:
         raise SepiError(f"{folder}: {others[0]} there was not written by 'sepi refocus'; choose another folder")
-    with filled_folder(folder) as temporary:
+    with atomic_folder(folder, add=True) as temporary:
         frames = []
         for name, picture in zip(made, pictures, strict=False):
             write_png(temporary / name, _levels(picture, dtype))

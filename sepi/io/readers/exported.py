@@ -19,7 +19,7 @@ from pydantic import Field
 from sepi.errors import SepiError
 from sepi.io.codecs import write_tiff
 from sepi.io.disparity_maps import read_pfm, write_pfm
-from sepi.io.files import atomic_path, filled_folder, naming, reading, remove_files
+from sepi.io.files import atomic_folder, atomic_path, naming, reading, remove_files
 from sepi.io.hdf5 import Properties, has_dataset, is_own, read_light_field, write_light_field
 from sepi.io.images import SUFFIXES, read_picture, write_png
 from sepi.io.readers.arrays import rearrange
@@ -172,7 +172,7 @@ def write_exported(path: Path, light_field: LightField, *, force: bool = False) 
         write_light_field(path, light_field)
         return
     before = _earlier_files(path)
-    with filled_folder(path) as temporary:
+    with atomic_folder(path, add=True) as temporary:
         made = _write_folder(temporary, light_field)
     remove_files(path, before - made)
 
