@@ -250,5 +250,5 @@ def test_ground_truth_lies_apart_whatever_the_scene_is(tmp_path: Path, kind: str
     write_light_field(views, scene(None))
     result = CliRunner().invoke(truth.main, flags)
     assert f"{own}: ground truth is (64, 64), the views are (40, 40)" in result.output
-    with pytest.raises(SepiError, match=f"^{apart}: .*ground_truth must have the views' shape"):
+    with pytest.raises(SepiError, match=f"^{apart}: .*ground_truth must be numbers of shape"):
         read_with_truth(views, apart)
