@@ -74,8 +74,6 @@ class Views:
         self.factor = _reduction(light_field, most_pixels)
         self._grey: dict[tuple[int, int, int], FloatMap] = {}
         self._detail: dict[tuple[int, int, int], FloatMap] = {}
-        self._means: dict[tuple[int, int, int], float] = {}
-        self._lights: dict[Baseline, tuple[float, float]] = {}
         positions = np.argwhere(light_field.present)
         distance = abs(positions - np.array(light_field.grid) // 2).sum(axis=1)
         t0, s0 = self.middle = middle or tuple(map(int, positions[distance.argmin()]))
@@ -114,8 +112,9 @@ class Views:
         Lenses darken and blur the views towards the edge of the grid, so that hardly more than noise is left.
         """
         self.details(baselines)
-        worth = [self._is_worth_matching(baseline) for baseline in baselines]
-        kept = [baseline for baseline, is_worth in zip(baselines, worth, strict=True) if is_worth]
+        own, *lights = np.array([self._light(baseline) for baseline in ((0, 0), *baselines)])
+        least = own * (_LEAST_BRIGHTNESS, _LEAST_CONTRAST)
+        kept = [baseline for baseline, light in zip(baselines, lights, strict=True) if (light >= least).all()]
         return kept if 2 * len(kept) >= min(len(baselines), 4) else baselines
 
     def details(self, baselines: list[Baseline]) -> list[FloatMap]:
@@ -126,27 +125,15 @@ class Views:
         with ThreadPoolExecutor(threads_used()) as pool:
             return list(pool.map(self.detail, baselines))
 
-    def _is_worth_matching(self, baseline: Baseline) -> bool:
-        (mean, contrast), (own_mean, own_contrast) = self._light(baseline), self._light((0, 0))
-        return mean >= _LEAST_BRIGHTNESS * own_mean and contrast >= _LEAST_CONTRAST * own_contrast
-
     def _light(self, baseline: Baseline) -> tuple[float, float]:
         """Mean and contrast of a view as it is."""
-        if baseline not in self._lights:
-            contrast = float(cv2.meanStdDev(self.detail(baseline, 1))[1][0, 0])
-            self._lights[baseline] = self._mean(baseline, 1), contrast / self._gain(baseline, 1)
-        return self._lights[baseline]
-
-    def _mean(self, baseline: Baseline, factor: int) -> float:
-        key = (*baseline, factor)
-        if key not in self._means:
-            self._means[key] = float(cv2.mean(self._read(baseline, factor))[0])
-        return self._means[key]
+        contrast = cv2.meanStdDev(self.detail(baseline))[1][0, 0]
+        return cv2.mean(self._read(baseline, 1))[0], contrast / self._gain(baseline, 1)
 
     def _gain(self, baseline: Baseline, factor: int) -> float:
         """What makes a view as bright as the reference."""
-        mean = self._mean(baseline, factor)
-        return self._mean((0, 0), factor) / mean if mean > 0 else 1.0
+        own, mean = (cv2.mean(self._read(at, factor))[0] for at in ((0, 0), baseline))
+        return own / mean if mean > 0 else 1.0
 
     def plain(self, baseline: Baseline, factor: int = 1) -> FloatMap:
         """Grey, slightly blurred view, (H, W) float32, reduced by a further factor; as bright as the reference."""
