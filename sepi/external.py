@@ -9,6 +9,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -18,7 +19,7 @@ from sepi.errors import SepiError, warn
 from sepi.evaluate import evaluations_of
 from sepi.io.disparity_maps import map_file, read_disparity
 from sepi.io.hdf5 import read_with_truth
-from sepi.io.scores import ExternalMap, ExternalSource, write_external
+from sepi.io.scores import Evaluation, ExternalSource, write_scores
 from sepi.lightfield import LightField
 from sepi.process.command import PATH, SepiCommand, bad_thresholds
 
@@ -32,7 +33,7 @@ _SOURCES = TypeAdapter(dict[str, ExternalSource])
 
 def external_maps(
     light_field: LightField, sources: Mapping[str, ExternalSource], scene: str = "", thresholds: Sequence[float] = ()
-) -> dict[str, ExternalMap]:
+) -> dict[str, Evaluation]:
     """External methods' maps of a light field with their scores, or with their problems.
 
     For each problem, a :class:`SepiWarning` names method, scene, file and reason. Values that are not finite stay; such
@@ -51,27 +52,26 @@ def external_maps(
 
     Returns
     -------
-    dict of str to ExternalMap
+    dict of str to Evaluation
         In the order of ``sources``. A map that is missing, cannot be read, or has another size than the views or no
         finite value is None, with a problem: ``no file``, ``not readable``, ``800x600 instead of 512x512`` (width x
         height) or ``no finite value``.
     """
     scene = scene or light_field.name
     found = {method: _read(light_field, scene, method, source) for method, source in sources.items()}
-    maps = {method: external.disparity for method, external in found.items() if external.disparity is not None}
-    for method, evaluation in evaluations_of(light_field, maps, thresholds).items():
-        found[method] = replace(found[method], evaluation=evaluation)
-    return found
+    maps = {method: told["disparity"] for method, told in found.items() if "disparity" in told}
+    scored = evaluations_of(light_field, maps, thresholds)
+    return {method: replace(scored.get(method, Evaluation()), **told) for method, told in found.items()}
 
 
-def _read(light_field: LightField, scene: str, method: str, source: ExternalSource) -> ExternalMap:
-    """The map of a method, or its problem, without scores."""
+def _read(light_field: LightField, scene: str, method: str, source: ExternalSource) -> dict[str, Any]:
+    """Attributes of an evaluation but scores: the map of a method, or its problem."""
     path = Path(source.path)
     digest = ""
 
-    def without_map(problem: str, reason: str) -> ExternalMap:
+    def without_map(problem: str, reason: str) -> dict[str, Any]:
         warn(f"external {method}, scene {scene}: {reason}", up=3)
-        return ExternalMap(str(path), problem, digest)
+        return {"source": str(path), "problem": problem, "sha256": digest}
 
     try:
         path = map_file(path)
@@ -93,7 +93,7 @@ def _read(light_field: LightField, scene: str, method: str, source: ExternalSour
     if unknown:
         values = f"{unknown} of {disparity.size} values"
         warn(f"external {method}, scene {scene}: {path}: {values} are not finite; they count as bad pixels", up=2)
-    return ExternalMap(str(path), "", digest, disparity)
+    return {"source": str(path), "sha256": digest, "disparity": disparity}
 
 
 def _sources(text: str) -> dict[str, ExternalSource]:
@@ -114,7 +114,7 @@ def _sources(text: str) -> dict[str, ExternalSource]:
 @click.option("--output", type=PATH, required=True, help="File to write (HDF5).")
 def command(path: Path, truth: Path | None, maps: str, scene: str, thresholds: tuple[float, ...], output: Path) -> None:
     """Read and score the disparity maps that external methods made of a light field."""
-    write_external(output, external_maps(read_with_truth(path, truth), _sources(maps), scene, thresholds))
+    write_scores(output, external_maps(read_with_truth(path, truth), _sources(maps), scene, thresholds), {})
 
 
 if __name__ == "__main__":

@@ -208,10 +208,8 @@ class LightField:
     def __post_init__(self) -> None:
         for key, (kind, expected) in _TYPES.items():
             require_type(f"{self.name}: {key}", getattr(self, key), kind, expected)
-        for what, values in {"notes": self.notes, "masks": self.masks.values()}.items():
-            kind, expected = (str, "a tuple of texts") if what == "notes" else (np.ndarray, "names with arrays")
-            for value in values:
-                require_type(f"{self.name}: {what}", value, kind, expected)
+        for note in self.notes:
+            require_type(f"{self.name}: notes", note, str, "a tuple of texts")
         if self.present is None:
             object.__setattr__(self, "present", np.ones(self.views.shape[:2], bool))
         if self.view is not None:
@@ -223,15 +221,7 @@ class LightField:
         object.__setattr__(self, "notes", tuple(map(_shown, self.notes)))
         self._require_views()
         self._require_positions()
-        for name, mask in self.masks.items():
-            self._require(mask.dtype == bool, f"masks must be bool, got {name} of {mask.dtype}")
-        for what, array in {"ground_truth": self.ground_truth, **self.masks}.items():
-            if array is not None:
-                expected = f"must have the views' shape (H, W) = {self.shape}, got {array.shape}"
-                self._require(array.shape == self.shape, f"{what} {expected}")
         if self.ground_truth is not None:
-            stored = self.ground_truth.dtype
-            self._require(stored.kind in "fiu", f"ground_truth must be float32, got {stored}")
             object.__setattr__(self, "ground_truth", self.ground_truth.astype(np.float32, copy=False))
         if self.disparity_range is not None:
             require_known(f"{self.name}: source of the disparity range", [self.disparity_range.source], RANGE_SOURCES)
@@ -239,6 +229,14 @@ class LightField:
     def _require(self, holds: object, message: str) -> None:
         if not holds:
             raise SepiError(f"{self.name}: {message}")
+
+    def _require_array(self, what: str, array: object, shape: tuple[int, ...], kinds: str) -> None:
+        if array is not None:
+            require_type(f"{self.name}: {what}", array, np.ndarray, "an array")
+            assert isinstance(array, np.ndarray)
+            expected = f"must be {'bool' if kinds == 'b' else 'numbers'} of shape {shape}"
+            got = f"{array.dtype} of shape {array.shape}"
+            self._require(array.shape == shape and array.dtype.kind in kinds, f"{what} {expected}, got {got}")
 
     def _require_views(self) -> None:
         """Raise unless the views have the right form, and the reference view and another one are present."""
@@ -255,10 +253,12 @@ class LightField:
         self._require(min(height, width) >= MIN_SIZE, f"views must be at least {least}")
         known = v.dtype in (np.uint8, np.uint16, np.float32)
         self._require(known, f"views must be uint8, uint16 or float32, got {v.dtype}")
-        for what, shape in {"present": v.shape[:2], "missing": v.shape[:4]}.items():
-            if (array := getattr(self, what)) is not None:
-                sound = array.shape == shape and array.dtype == bool
-                self._require(sound, f"{what} must be bool of shape {shape}, got {array.shape}")
+        self._require_array("present", self.present, v.shape[:2], "b")
+        self._require_array("missing", self.missing, v.shape[:4], "b")
+        self._require_array("positions", self.positions, (rows, columns, 2), "fiu")
+        self._require_array("ground_truth", self.ground_truth, self.shape, "fiu")
+        for name, mask in self.masks.items():
+            self._require_array(f"mask {name}", mask, self.shape, "b")
         t, s = self.reference_position
         ends = f"rows go from 0 to {rows - 1}, columns from 0 to {columns - 1}"
         self._require(0 <= t < rows and 0 <= s < columns, f"view {t},{s} lies outside the grid; {ends}")
@@ -278,9 +278,7 @@ class LightField:
         message = f"row_spacing must be a positive number, got {described(spacing)}"
         self._require(is_finite(spacing) and spacing > 0, message)
         if at is not None:
-            shape = (*self.grid, 2)
-            sound = at.shape == shape and at.dtype.kind in "fiu" and np.isfinite(at[self.present]).all()
-            self._require(sound, f"positions must be finite, of shape (T, S, 2) = {shape}, got {at.shape}")
+            self._require(np.isfinite(at[self.present]).all(), "positions must be finite")
             same = len(np.unique(at[self.present], axis=0)) == 1
             self._require(not same, "positions must differ, got the same for all views")
 
@@ -427,12 +425,10 @@ class LightField:
         return replace(self, view=view, ground_truth=None, masks={})
 
 
-_ARRAY = (np.ndarray, NoneType), "an array"
 # field to its types, and what they are called
 _TYPES: dict[str, tuple[type | tuple[type, ...], str]] = {
     **dict.fromkeys(("name", "source", "reading"), (str, "text")),
     "views": (np.ndarray, "an array of shape (T, S, H, W, C)"),
-    **dict.fromkeys(("present", "missing", "positions", "ground_truth"), _ARRAY),
     "disparity_range": ((DisparityRange, NoneType), "a DisparityRange"),
     "camera": ((Camera, NoneType), "a Camera"),
     "notes": ((tuple, list), "a tuple of texts"),

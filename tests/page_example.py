@@ -20,7 +20,7 @@ from sepi.external import ExternalSource, external_maps
 from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage, write_truth
 from sepi.io.provenance import scene_attributes, stage_attributes
-from sepi.io.scores import ExternalMap, map_name, write_external, write_scores
+from sepi.io.scores import Evaluation, map_name, write_scores
 from sepi.lightfield import FloatMap, LightField
 from sepi.process.machine import this_machine
 from sepi.report import numbers
@@ -128,8 +128,11 @@ def write_results(plan: Plan, scene: tuple[str, str]) -> None:
         run_stages(plan, scene, light_field, variant)
     write_plan_scores(plan, scene, light_field)
     maps = methods_maps(plan, light_field) if scene == COTTON else {}
-    absent = {method: ExternalMap(f"/maps/{method}/{light_field.name}.pfm", "no file") for method in plan.external}
-    write_external(plan.files(*scene).external, absent | maps)
+    absent = {
+        method: Evaluation(source=f"/maps/{method}/{light_field.name}.pfm", problem="no file")
+        for method in plan.external
+    }
+    write_scores(plan.files(*scene).external, absent | maps, {})
 
 
 def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, variant: str) -> None:
@@ -153,7 +156,7 @@ def write_plan_scores(plan: Plan, scene: tuple[str, str], light_field: LightFiel
     write_scores(plan.scores_file(*scene), evaluations_of(light_field, maps), scene_attributes(light_field))
 
 
-def methods_maps(plan: Plan, light_field: LightField) -> Mapping[str, ExternalMap]:
+def methods_maps(plan: Plan, light_field: LightField) -> Mapping[str, Evaluation]:
     """One method's map with unknown pixels, and one of the wrong size."""
     files = {"SPO": external_map(light_field.ground_truth), "wrong_size": np.zeros((5, 7), np.float32)}
     for method, values in files.items():

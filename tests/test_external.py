@@ -14,7 +14,7 @@ from sepi.evaluate import evaluation_of
 from sepi.external import ExternalSource, command, external_maps
 from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import write_light_field
-from sepi.io.scores import ExternalMap, read_external, without_nan, write_external
+from sepi.io.scores import Evaluation, read_evaluations, without_nan, write_scores
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
 
@@ -62,13 +62,13 @@ class TestImport:
         assert external.problem == ""
         assert external.source == str(tmp_path / "noise.pfm")
         np.testing.assert_array_equal(external.disparity, estimate)
-        assert without_nan(external.evaluation.scores) == without_nan(expected.scores)
-        assert external.evaluation.region_sources == expected.region_sources
+        assert without_nan(external.scores) == without_nan(expected.scores)
+        assert external.region_sources == expected.region_sources
         sources = {"occluded": "computed", "textureless": "scene", "discontinuities": "computed"}
         assert expected.region_sources == sources
-        np.testing.assert_array_equal(external.evaluation.error, expected.error)
+        np.testing.assert_array_equal(external.error, expected.error)
         for name, mask in expected.regions.items():
-            np.testing.assert_array_equal(external.evaluation.regions[name], mask)
+            np.testing.assert_array_equal(external.regions[name], mask)
 
     def test_scale_and_offset_are_used(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         file = saved(tmp_path / "noise.pfm", -2 * estimate + 3)
@@ -80,7 +80,7 @@ class TestImport:
         external = external_maps(bare, {"SPO": saved(tmp_path / "noise.pfm", np.ones(SHAPE, np.float32))})["SPO"]
         assert external.problem == ""
         assert external.disparity is not None
-        assert external.evaluation.scores == {}
+        assert external.scores == {}
 
     def test_unknown_pixels_count_as_bad(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         estimate[20, 20:23] = [np.nan, np.inf, -np.inf]
@@ -89,7 +89,7 @@ class TestImport:
             external = external_maps(light_field, {"SPO": file})["SPO"]
         assert external.problem == ""
         np.testing.assert_array_equal(external.disparity, estimate)
-        whole = external.evaluation.scores["paper"]["all"]
+        whole = external.scores["paper"]["all"]
         assert whole["non_finite"] == 3
         assert whole["badpix007"] >= 100 * 3 / 1760
 
@@ -120,29 +120,30 @@ class TestImport:
         assert reason in line
         assert found["bad"].problem == problem
         assert found["bad"].disparity is None
-        assert found["bad"].evaluation.scores == {}
+        assert found["bad"].scores == {}
         assert (found["bad"].sha256 == "") == (values is None)
         assert found["good"].problem == ""
-        assert found["good"].evaluation.scores["paper"]["all"]["mse100"] > 0
+        assert found["good"].scores["paper"]["all"]["mse100"] > 0
 
 
 class TestFile:
-    def external(self, light_field: LightField, estimate: np.ndarray) -> ExternalMap:
-        return ExternalMap("maps/noise.pfm", "", "ab" * 32, estimate, evaluation_of(light_field, estimate))
+    def external(self, light_field: LightField, estimate: np.ndarray) -> Evaluation:
+        found = evaluation_of(light_field, estimate)
+        return replace(found, source="maps/noise.pfm", sha256="ab" * 32, disparity=estimate)
 
     def test_comes_back_unchanged(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         external = self.external(light_field, estimate)
-        maps = {"SPO": external, "lost": ExternalMap("maps/ü.pfm", "no file")}
-        write_external(tmp_path / "a.h5", maps)
-        back = read_external(tmp_path / "a.h5")
+        maps = {"SPO": external, "lost": Evaluation(source="maps/ü.pfm", problem="no file")}
+        write_scores(tmp_path / "a.h5", maps, {})
+        back = read_evaluations(tmp_path / "a.h5")
         assert list(back) == ["SPO", "lost"]
         assert back["lost"] == maps["lost"]
         assert (back["SPO"].source, back["SPO"].sha256) == (external.source, external.sha256)
-        assert without_nan(back["SPO"].evaluation.scores) == without_nan(external.evaluation.scores)
+        assert without_nan(back["SPO"].scores) == without_nan(external.scores)
         np.testing.assert_array_equal(back["SPO"].disparity, estimate)
-        np.testing.assert_array_equal(back["SPO"].evaluation.error, external.evaluation.error)
-        assert set(back["SPO"].evaluation.regions) == {"occluded", "textureless", "discontinuities"}
-        write_external(tmp_path / "b.h5", maps)
+        np.testing.assert_array_equal(back["SPO"].error, external.error)
+        assert set(back["SPO"].regions) == {"occluded", "textureless", "discontinuities"}
+        write_scores(tmp_path / "b.h5", maps, {})
         assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
 
@@ -159,9 +160,9 @@ class TestCommand:
         assert result.stderr.splitlines() == [
             f"sepi: warning: external AMNorm, scene noise: {tmp_path / 'absent.pfm'}: no such file"
         ]
-        back = read_external(tmp_path / "external.h5")
+        back = read_evaluations(tmp_path / "external.h5")
         assert [external.problem for external in back.values()] == ["", "no file"]
-        assert without_nan(back["SPO"].evaluation.scores) == without_nan(evaluation_of(light_field, estimate).scores)
+        assert without_nan(back["SPO"].scores) == without_nan(evaluation_of(light_field, estimate).scores)
         written = (tmp_path / "external.h5").read_bytes()
         assert call(tmp_path, light_field, json.dumps(maps)).exit_code == 0
         assert (tmp_path / "external.h5").read_bytes() == written
@@ -191,7 +192,7 @@ def test_published_maps_score_as_an_independent_program_scores_them(hci: Path, r
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         external = external_maps(scene, {"SPO": ExternalSource(path=str(folder / "SPO" / "cotton.pfm"))})["SPO"]
-    scores = external.evaluation.scores
+    scores = external.scores
     assert scores["paper"]["all"]["mse100"] == pytest.approx(1.7786, abs=5e-5)
     assert scores["benchmark"]["all"]["mse100"] == pytest.approx(1.3130, abs=5e-5)
     assert scores["paper"]["all"]["non_finite"] == 0

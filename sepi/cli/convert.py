@@ -57,17 +57,17 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
       sepi convert cotton-depth corner.pfm --view 0,0
       sepi convert cotton-depth cotton.png --to rgbd
     """
-    from sepi.io.all_views import read_result_at
     from sepi.io.codecs import EXR, TIFF, write_exr, write_tiff
     from sepi.io.disparity_maps import write_pfm
     from sepi.io.images import write_png
     from sepi.io.map_pictures import colour_and_depth
+    from sepi.io.result_folder import read_result
 
     suffix = output.suffix.lower()
     if kind is not None:
         if suffix != ".png" or name is not None:
             raise SepiError(f"{output}: --to rgbd writes a PNG of view and disparity; expected NAME.png, and no --map")
-        result = read_result_at(result_path, seen["view"])
+        result = read_result(result_path, seen["view"])
         write_png(output, colour_and_depth(result.picture, result.disparity, result.unknown))
         click.echo(f"written: {output} (the view, and its disparity: black is far, white near)")
         return
@@ -94,9 +94,9 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
 
 def _maps(path: Path, view: tuple[int, int] | None, geometry: Geometry | None) -> dict[str, FloatMap]:
     """Maps of a result by name, with depth if the camera is known, and error bars if there are any."""
-    from sepi.io.all_views import read_result_at
+    from sepi.io.result_folder import read_result
 
-    result = read_result_at(path, view)
+    result = read_result(path, view)
     camera = camera_of(path, view, result, geometry)
     maps = {
         "disparity": result.disparity,
@@ -148,10 +148,10 @@ def points(
       sepi points cotton-depth --max-sigma 0.02
       sepi points views-depth -o views.ply --focal-length 50 --baseline 10 --focus-distance 2 --sensor-size 36
     """
-    from sepi.io.all_views import read_result_at
     from sepi.io.point_cloud import point_cloud, write_ply
+    from sepi.io.result_folder import read_result
 
-    result = read_result_at(result_path, view)
+    result = read_result(result_path, view)
     if max_sigma is not None and result.sigma is None:
         raise SepiError(f"{result_path}: --max-sigma: the result has no error bars, like those of compared methods")
     cloud = point_cloud(

@@ -23,7 +23,7 @@ from sepi.inspection import view_layouts
 from sepi.inspection.view_layouts import AT_END, FEWEST_POINTS, MATCHED, MOVEMENT, Baseline, Views, is_clear, matched
 from sepi.inspection.view_order import odd_views
 from sepi.io.readers.options import ReadOptions
-from sepi.io.readers.view_grid import arrange_numbers
+from sepi.io.readers.view_grid import arrange_numbers, taken
 from sepi.lightfield import LightField
 
 Positions = npt.NDArray[np.int64]
@@ -208,12 +208,8 @@ def _placed(light_field: LightField, way: Arrangement, options: ReadOptions, not
     numbers = arrange_numbers(light_field.source or light_field.name, way.grid, options)
     # number in the grid to number in the sequence; -1 for missing and excluded views
     order = np.where(numbers >= 0, sequence.ravel()[numbers], -1)
-    present = (order >= 0) & light_field.present[0][order]
-    files = None if light_field.files is None else np.where(present, light_field.files[0][order], "")
-    views = light_field.views[0][order]
-    views[~present] = 0
-    known = {"views": views, "present": present, "files": files, "notes": (*light_field.notes, note)}
-    return replace(light_field, view=options.view, arranged=True, **known)
+    notes = (*light_field.notes, note)
+    return replace(light_field, view=options.view, arranged=True, notes=notes, **taken(light_field, order))
 
 
 # Spacings tried, and how many between one and its double

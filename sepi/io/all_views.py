@@ -13,10 +13,9 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io import hdf5
-from sepi.io.disparity_maps import read_disparity, read_error_bars
-from sepi.io.provenance import Origin, read_origin
-from sepi.io.result_files import ALL_VIEWS
-from sepi.io.result_folder import Result, read_result
+from sepi.io.disparity_maps import read_disparity
+from sepi.io.provenance import RESULT, Origin, read_origin
+from sepi.io.result_folder import all_views_file, place_in, read_result, result_in
 from sepi.lightfield import FloatMap, LightField
 from sepi.process.interrupts import interruptibly
 from sepi.stage import ERROR_BARS, StageMaps
@@ -25,9 +24,6 @@ View = tuple[int, int]
 _Maps = Mapping[str, npt.NDArray[Any]]
 _Attributes = Mapping[str, hdf5.Attribute]
 
-_KIND = "file of maps of all views, of this version of 'sepi depth --all-views'"
-# dataset that only this kind of file has
-_MARK = "extended"
 _MISSING = dict.fromkeys(("disparity", *ERROR_BARS), np.nan)
 
 
@@ -68,54 +64,38 @@ def write_all_views(
                 _dataset(file, name, light_field.grid, values)[position] = values
 
 
-def read_result_at(path: Path, view: View | None = None) -> Result:
-    """Result of one view.
+def read_disparity_at(path: Path, view: View | None) -> FloatMap:
+    """Disparity map, (H, W) float32: that of ``view`` if the file has maps of all views, else the only one."""
+    return read_disparity(path) if all_views_file(path, view) is None else read_result(path, view).disparity
 
-    Parameters
-    ----------
-    path : Path
-        Folder of a result, its ``result.h5``, or a file of maps of all views.
-    view : (int, int), optional
-        Row and column in the grid; default: the result's own view. In other views, pixels that no map shows and pixels
-        of confidence 0 are unknown.
+
+def read_error_bars_at(path: Path, view: View | None = None) -> StageMaps | None:
+    """The map of :func:`read_disparity_at` with its confidence and error bars; None if the file has none.
 
     Raises
     ------
     SepiError
-        If the file has no map of this view, or is damaged.
+        If the file is damaged.
     """
-    file_path = _file_of(path, view)
-    if file_path is not None:
-        return _read_view(file_path, view)
-    result, origin = read_result(path), read_origin(path)
-    if view is not None and (origin is None or origin.view != view):
-        own = "" if origin is None else " {},{}".format(*origin.view)
-        raise SepiError(f"{path}: holds the map of view{own} alone; 'sepi depth --all-views' makes those of all")
-    return result
-
-
-def read_disparity_at(path: Path, view: View | None) -> FloatMap:
-    """Disparity map, (H, W) float32: that of ``view`` if the file has maps of all views, else the only one."""
-    return read_disparity(path) if _file_of(path, view) is None else read_result_at(path, view).disparity
-
-
-def read_error_bars_at(path: Path, view: View | None) -> StageMaps | None:
-    """The map of :func:`read_disparity_at` with its confidence and error bars; None if there are none."""
-    if _file_of(path, view) is None:
-        return read_error_bars(path)
-    result = read_result_at(path, view)
-    if result.sigma is None:
+    path = all_views_file(path, view) or (path / RESULT if path.is_dir() else path)
+    if path.suffix.lower() not in (".h5", ".hdf5") or not path.is_file():
         return None
-    return StageMaps(result.disparity, result.confidence, {name: getattr(result, name) for name in ERROR_BARS})
+    with hdf5.open_hdf5(path) as file:
+        maps = hdf5.float_maps(path, file, place_in(path, file, view))
+    if not {"disparity", "confidence", *ERROR_BARS} <= set(maps) or maps["disparity"].ndim != 2:
+        return None
+    if len({values.shape for values in maps.values()}) > 1:
+        raise SepiError(f"{path}: damaged: error bars {maps[ERROR_BARS[0]].shape} do not fit the disparity")
+    return StageMaps(maps.pop("disparity"), maps.pop("confidence"), maps)
 
 
 def read_origin_at(path: Path, view: View | None) -> Origin | None:
     """Light field that a map was made from, as its file records it; for ``view`` if the file has maps of all views."""
-    file_path = _file_of(path, view)
+    file_path = all_views_file(path, view)
     origin = read_origin(file_path or path)
     if origin is None or file_path is None:
         return origin
-    return replace(origin, view=view or origin.view, picture=read_result_at(path, view).picture)
+    return replace(origin, view=view or origin.view, picture=read_result(path, view).picture)
 
 
 def surfaces_of(path: Path, name: str = "disparity") -> Callable[[View], FloatMap] | None:
@@ -124,56 +104,24 @@ def surfaces_of(path: Path, name: str = "disparity") -> Callable[[View], FloatMa
     Parameters
     ----------
     path : Path
-        As for :func:`read_result_at`.
+        As for :func:`sepi.read_result`.
     name : str
         ``"disparity"`` or ``"sigma"``.
     """
-    file_path = _file_of(path, (0, 0))
+    file_path = all_views_file(path, (0, 0))
     if file_path is None:
         return None
 
     # check once, not for each view
-    with hdf5.open_hdf5(file_path, _KIND) as file:
+    with hdf5.open_hdf5(file_path) as file:
         if name not in file:
             return None
 
     def surface(view: View) -> FloatMap:
-        result = _read_view(file_path, view, check=False)
+        result = result_in(file_path, view, check=False)
         return np.where(result.unknown, np.float32(np.nan), getattr(result, name))
 
     return surface
-
-
-def _file_of(path: Path, view: View | None) -> Path | None:
-    """The file of maps of all views; None: the map of a result's own view, or of another program."""
-    path = path / ALL_VIEWS if path.is_dir() and view is not None else path
-    # reading reports a damaged file
-    return path if hdf5.has_dataset(path, _MARK, if_damaged=True) else None
-
-
-def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result:
-    """Maps of a view; ``check=False`` does not read the whole file for its digest."""
-    with hdf5.open_hdf5(file_path, _KIND, check) as file:
-        position = _position(file_path, file, view)
-        baseline = hdf5.read_dataset(file_path, file["baselines"])[position]
-        down, across = (baseline + hdf5.attribute(file, "from_centre")).tolist()
-        rig = hdf5.read_rig(file)
-        maps = hdf5.float_maps(file_path, file, position)
-        extended, picture = (hdf5.read_dataset(file_path, file[name], position) for name in (_MARK, "picture"))
-        unknown = extended.astype(bool) | (maps["confidence"] == 0)
-        rig = None if rig is None else rig.seen_from(baseline)
-        scene, camera = str(hdf5.attribute(file, "scene")), hdf5.read_camera(file)
-        return Result(scene, picture, **maps, unknown=unknown, camera=camera, from_centre=(down, across), rig=rig)
-
-
-def _position(path: Path, file: h5py.File, view: View | None) -> View:
-    """Row and column of a present view; default: the reference view."""
-    t, s = map(int, hdf5.attribute(file, "view_position")) if view is None else view
-    present = hdf5.read_dataset(path, file["present"])
-    rows, columns = present.shape
-    if not (0 <= t < rows and 0 <= s < columns and present[t, s]):
-        raise SepiError(f"{path}: has no view {t},{s}; there are {present.sum()} of {rows}x{columns}, counted from 0")
-    return t, s
 
 
 def _dataset(file: h5py.File, name: str, grid: tuple[int, int], values: npt.NDArray[Any]) -> h5py.Dataset:

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from pathlib import Path
 from types import ModuleType
-from typing import IO, TYPE_CHECKING, Any, NamedTuple
+from typing import IO, TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -308,19 +308,16 @@ _GAP = rb"(?:\s|#[^\n]*\n)++"
 _PNM = re.compile(rb"P([2356])" + _GAP + rb"([0-9]{1,9})" + _GAP + rb"([0-9]{1,9})" + _GAP + rb"([0-9]{1,5})\s")
 
 
-class PnmForm(NamedTuple):
-    """Header of a PGM or PPM: size, channels, value of white, whether pixels are text, and their first byte."""
+def pnm_form(head: bytes, size: int) -> tuple[int, int, int, int, bool, int]:
+    """Parse the first bytes of a PGM or PPM of ``size`` bytes.
 
-    height: int
-    width: int
-    channels: int
-    white: int
-    digits: bool
-    start: int
-
-
-def pnm_form(head: bytes, size: int) -> PnmForm:
-    """Parse the first bytes of a file of ``size`` bytes.
+    Returns
+    -------
+    height, width, channels, white : int
+    digits : bool
+        Whether pixels are text.
+    start : int
+        Place of the first byte of the pixels.
 
     Raises
     ------
@@ -333,11 +330,11 @@ def pnm_form(head: bytes, size: int) -> PnmForm:
     kind, width, height, white = map(int, match.groups())
     if not 1 <= white <= 65535:
         raise SepiError(f"damaged PNM: expected a value of white of 1 to 65535, got {white}")
-    form = PnmForm(height, width, 1 if kind in (2, 5) else 3, white, kind in (2, 3), match.end())
-    values = height * width * form.channels
-    if form.start + (2 * values - 1 if form.digits else values * (1 if white < 256 else 2)) > size:
+    channels, digits, start = 1 if kind in (2, 5) else 3, kind in (2, 3), match.end()
+    values = height * width * channels
+    if start + (2 * values - 1 if digits else values * (1 if white < 256 else 2)) > size:
         raise SepiError(f"damaged PNM: the file is cut off after {size} bytes")
-    return form
+    return height, width, channels, white, digits, start
 
 
 def pnm_pixels(data: bytes) -> npt.NDArray[np.unsignedinteger]:

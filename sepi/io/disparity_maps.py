@@ -18,12 +18,11 @@ import numpy.typing as npt
 from sepi.camera import Part
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path, reading
-from sepi.io.hdf5 import float_maps, has_dataset, open_hdf5, read_dataset
+from sepi.io.hdf5 import has_dataset, open_hdf5, read_dataset
 from sepi.io.images import picture_header, png_texts, read_picture
-from sepi.io.readers.array_files import numpy_array, numpy_shapes
+from sepi.io.readers.array_files import numpy_arrays
 from sepi.io.readers.view_grid import cut_like_views
 from sepi.lightfield import FloatMap, full_scale
-from sepi.stage import ERROR_BARS, StageMaps
 from sepi.validation import described, is_finite, require_map, require_path
 
 # magic, width, height, scale (its sign gives the byte order), each ended by one white space
@@ -112,8 +111,6 @@ SUFFIXES: tuple[str, ...] = (".pfm", *_NUMPY, ".png", ".pgm", *_TIFF, *_HDF5)
 """Suffixes of the files that are read, in lower case."""
 
 _DATASET = "disparity"
-# colour type of a grey PNG, byte 26 of its header
-_GREY = 0
 # text chunks of `disparity_16bit.png`
 _SCALE, _OFFSET = "scale", "offset"
 
@@ -140,7 +137,7 @@ def is_disparity(path: Path) -> bool:
         return _is_float_tiff(path)
     if suffix in _NUMPY:
         with suppress(SepiError):
-            return all(len(shape) == 2 for shape, _ in numpy_shapes(path).values())
+            return all(len(one.shape) == 2 for one in numpy_arrays(path).values())
     return suffix in SUFFIXES
 
 
@@ -184,31 +181,6 @@ def read_disparity(path: str | Path, *, scale: float | None = None, offset: floa
         if not is_finite(value):
             raise SepiError(f"{path}: {name}: expected a finite number, got {described(value)}")
     return _scaled(_stored(path, scale is not None), scale, offset)
-
-
-def read_error_bars(path: Path) -> StageMaps | None:
-    """Disparity, confidence and error bars of one view; None if the file has no error bars.
-
-    Parameters
-    ----------
-    path : Path
-        As for :func:`read_disparity`.
-
-    Raises
-    ------
-    SepiError
-        If the file is damaged.
-    """
-    path = path / "result.h5" if path.is_dir() else path
-    if path.suffix.lower() not in _HDF5 or not path.is_file():
-        return None
-    with open_hdf5(path) as file:
-        if not {_DATASET, "confidence", *ERROR_BARS} <= set(file) or file[_DATASET].ndim != 2:
-            return None
-        maps = float_maps(path, file)
-    if len({values.shape for values in maps.values()}) > 1:
-        raise SepiError(f"{path}: damaged: error bars {maps[ERROR_BARS[0]].shape} do not fit the disparity")
-    return StageMaps(maps.pop(_DATASET), maps.pop("confidence"), maps)
 
 
 @dataclass(frozen=True)
@@ -273,10 +245,10 @@ def _stored(path: Path, scaled: bool) -> npt.NDArray[Any]:
     if suffix in (".png", ".pgm", *_TIFF):
         return _read_levels(path, scaled)
     if suffix in _NUMPY:
-        shapes = numpy_shapes(path)
-        if len(shapes) != 1:
-            raise SepiError(f"{path}: expected one array of shape (H, W), found {', '.join(shapes) or 'none'}")
-        values = numpy_array(path, *shapes)
+        arrays = numpy_arrays(path)
+        if len(arrays) != 1:
+            raise SepiError(f"{path}: expected one array of shape (H, W), found {', '.join(arrays) or 'none'}")
+        (values,) = (one.read() for one in arrays.values())
     elif suffix in _HDF5:
         with open_hdf5(path) as file:
             values = read_dataset(path, file[_DATASET])
@@ -298,7 +270,8 @@ def _read_levels(path: Path, scaled: bool) -> npt.NDArray[Any]:
     levels, header = read_picture(path, any_floats=True)[:, :, 0], picture_header(path)
     if levels.dtype == np.float32 and header.grey and header.kind == "TIFF":
         return levels
-    if not header.grey or header.kind not in ("PNG", "TIFF", "PNM") or (header.kind == "PNG" and _is_packed(path)):
+    # decoding stretches fewer than 8 bits
+    if not header.grey or not (header.white or header.kind == "TIFF"):
         raise _no_map(path)
     texts = png_texts(path)
     if {_SCALE, _OFFSET} <= set(texts):
@@ -310,13 +283,6 @@ def _read_levels(path: Path, scaled: bool) -> npt.NDArray[Any]:
         raise SepiError(f"{path}: {kind} does not say what its levels mean; give a scale, or write it as .pfm or .npy")
     # the levels of a PGM end at a white of its own
     return np.rint(levels * (header.white / full_scale(levels.dtype))).astype(int) if header.white else levels
-
-
-def _is_packed(path: Path) -> bool:
-    """Whether a PNG has fewer than 8 bits, which decoding stretches to 8, or is not grey."""
-    with path.open("rb") as file:
-        head = file.read(26)
-    return head[24] not in (8, 16) or head[25] != _GREY
 
 
 def _number(path: Path, key: str, text: str) -> float:

@@ -95,49 +95,33 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic_folder(path: Path, replace: bool = False) -> Iterator[Path]:
-    """Give a temporary folder beside ``path`` to fill; rename it on success, remove it on any failure.
+def atomic_folder(path: Path, *, replace: bool = False, add: bool = False) -> Iterator[Path]:
+    """Give a temporary folder to fill; rename it on success, remove it on any failure.
 
-    With ``replace``, it replaces an existing folder. If ``path`` is a link, the folder that it leads to is written.
+    With ``replace``, it replaces an existing folder. With ``add``, its files move into a folder that has files, in the
+    order in which they were made. If ``path`` is a link, the folder that it leads to is written.
 
     Raises
     ------
     SepiError
         If ``path`` exists and is not an empty folder, or cannot be made or written to, or the disk is full.
     """
-    path = Path(os.path.realpath(path)) if path.is_symlink() else path
-    if path.exists() and not (path.is_dir() and (replace or not any(path.iterdir()))):
+    path = path.resolve() if add or path.is_symlink() else path
+    full = path.is_dir() and any(path.iterdir())
+    if path.exists() and (not path.is_dir() or (full and not replace and not add)):
         raise SepiError(f"{path}: exists already; remove it or choose a folder that does not exist")
-    with _temporary_beside(path, "", path) as temporary:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    made = path / "files" if full and add else path
+    with _temporary_beside(made, "", path) as temporary:
+        made.parent.mkdir(parents=True, exist_ok=True)
         temporary.mkdir()
         yield temporary
         if replace:
             shutil.rmtree(path, ignore_errors=True)
-        temporary.replace(path)
-
-
-@contextmanager
-def filled_folder(folder: Path) -> Iterator[Path]:
-    """Give a temporary folder to fill: it becomes ``folder``, or its files move into a ``folder`` that has files.
-
-    Files move in the order in which they were made. ``folder`` may be a link.
-
-    Raises
-    ------
-    SepiError
-        As :func:`atomic_folder`, except that ``folder`` may have files.
-    """
-    folder = folder.resolve()
-    if not (folder.is_dir() and any(folder.iterdir())):
-        with atomic_folder(folder) as temporary:
-            yield temporary
-        return
-    with _temporary_beside(folder / "files", "", folder) as temporary:
-        temporary.mkdir()
-        yield temporary
-        for path in sorted(temporary.iterdir(), key=lambda path: path.stat().st_mtime_ns):
-            path.replace(folder / path.name)
+        if made == path:
+            temporary.replace(path)
+            return
+        for file in sorted(temporary.iterdir(), key=lambda file: file.stat().st_mtime_ns):
+            file.replace(path / file.name)
 
 
 def remove_files(folder: Path, names: Iterable[str]) -> None:

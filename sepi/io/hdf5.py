@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -26,15 +27,17 @@ from typing import Any
 import h5py
 import numpy as np
 import numpy.typing as npt
+from pydantic import BaseModel
 
-from sepi.camera import Camera, numbers_of
+from sepi.camera import Camera
 from sepi.camera.rig import Rig
 from sepi.errors import SepiError, printable
 from sepi.io.files import DEFLATE_RATIO, PatientFile, atomic_path, reading
-from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
+from sepi.lightfield import DisparityRange, LightField, Truth, require_light_field
 from sepi.process.interrupts import no_interrupt_lost
 from sepi.stage import ERROR_BARS, LIGHT_DEVIATION, CostVolume, StageMaps
-from sepi.validation import require_known, require_path
+from sepi.validation import require_path
+from sepi.validation.models import validated
 
 BLOCK = 512
 """Bytes of the user block; HDF5 wants a power of two, at least 512."""
@@ -94,10 +97,10 @@ def fixed_text(text: str) -> np.bytes_:
 Attribute = str | float | int | tuple[float, ...]
 
 RIG = "rig"
-"""Dataset of a light field, or attribute of a result: poses of the calibrated cameras, as JSON."""
+"""Attribute of a result: poses of the calibrated cameras, as JSON."""
 
-# attributes of a light field that are read; others may be of any kind
-_KNOWN = ("name", "source", "reading", "row_spacing", "view", "notes", "disparity_range", "disparity_range_source")
+# datasets of a light field: its arrays, and the rest as JSON
+_ARRAYS, _PROPERTIES = ("views", "present", "missing", "positions"), "properties"
 # datasets of a cost volume
 _COSTS, _CANDIDATES = "cost_volume", "candidates"
 
@@ -161,6 +164,31 @@ COMPARABLE = "comparable"
 """Attribute of a light field: whether stages compare its views as they are (:mod:`sepi.inspection.coded_views`)."""
 
 
+class Properties(BaseModel, defer_build=True):
+    """What a light field has beside its arrays, as its files keep it."""
+
+    name: str
+    source: str = ""
+    reading: str = ""
+    view: tuple[int, int] | None = None
+    row_spacing: float = 1.0
+    disparity_range: DisparityRange | None = None
+    camera: Camera | None = None
+    notes: tuple[str, ...] = ()
+    rig: str | None = None
+
+    @staticmethod
+    def of(light_field: LightField) -> dict[str, Any]:
+        """The properties of a light field, by name."""
+        own = {key: getattr(light_field, key) for key in Properties.model_fields}
+        return own | {"rig": light_field.rig and light_field.rig.to_text()}
+
+    def fields(self) -> dict[str, Any]:
+        """The fields of a light field with these properties."""
+        own = {key: getattr(self, key) for key in Properties.model_fields}
+        return own | {"rig": None if self.rig is None else Rig.from_text(self.rig), "settled": True}
+
+
 def write_light_field(path: str | Path, light_field: LightField, comparable: bool = False) -> None:
     """Write a light field with all its properties, whole or not at all; reading gives it back unchanged.
 
@@ -195,28 +223,21 @@ def write_light_field(path: str | Path, light_field: LightField, comparable: boo
     """
     path = require_path("light field to write", path)
     require_light_field(light_field)
-    known, rig = light_field.disparity_range, light_field.rig
+    known = light_field.disparity_range
     with create_hdf5(path) as file:
         # gzip takes 1.8 s to halve the 64 MB of a benchmark scene: too slow for an intermediate file
         file.create_dataset("views", data=light_field.views).attrs["axes"] = "t s y x channel"
-        put(file, "present", light_field.present)
-        if light_field.missing is not None:
-            put(file, "missing", light_field.missing)
-        if light_field.positions is not None:
-            put(file, "positions", light_field.positions, axes="t s (down, across)")
-        if rig is not None:
-            put(file, RIG, np.frombuffer(rig.to_text().encode(), np.uint8))
-        texts = {"name": light_field.name, "source": light_field.source, "reading": light_field.reading or None}
-        # jobs on this file need the reach, and must not read the views for it
-        numbers: dict[str, Any] = {"reach": light_field.reach, "row_spacing": light_field.row_spacing}
-        numbers |= {"view": light_field.view, "camera": light_field.camera and numbers_of(light_field.camera)}
-        numbers |= {COMPARABLE: comparable or None}
+        for name in _ARRAYS[1:]:
+            if (values := getattr(light_field, name)) is not None:
+                put(file, name, values)
+        text = Properties(**Properties.of(light_field)).model_dump_json()
+        put(file, _PROPERTIES, np.frombuffer(text.encode(), np.uint8))
+        # jobs on this file need these, and must not read the views for them
+        file.attrs["reach"] = light_field.reach
         if known is not None:
-            numbers["disparity_range"], texts["disparity_range_source"] = (known.minimum, known.maximum), known.source
-        file.attrs.update({key: value for key, value in numbers.items() if value is not None})
-        file.attrs.update({key: fixed_text(text) for key, text in texts.items() if text is not None})
-        if light_field.notes:
-            file.attrs["notes"] = [fixed_text(note) for note in light_field.notes]
+            file.attrs["disparity_range"] = known.minimum, known.maximum
+        if comparable:
+            file.attrs[COMPARABLE] = True
         put_truth(file, (light_field.ground_truth, light_field.masks))
 
 
@@ -258,35 +279,14 @@ def read_light_field(path: Path) -> LightField:
     with open_hdf5(path, "light field of this package") as file:
         if "render" in file.attrs:
             raise SepiError(f"{path}: light of a path-traced scene, not a light field; give the scene's folder instead")
-        own_arrays = ("views", "present", "missing", "positions")
-        arrays: dict[str, Any] = {name: read_dataset(path, file[name]) for name in own_arrays if name in file}
-        known = {key: attribute(file, key) for key in _KNOWN if key in file.attrs}
+        arrays: dict[str, Any] = {name: read_dataset(path, file[name]) for name in _ARRAYS if name in file}
         ground_truth, masks = truth_in(path, file)
-        searched = None
-        if "disparity_range" in known:
-            low, high = map(float, known["disparity_range"])
-            searched = DisparityRange(low, high, str(known["disparity_range_source"]))
-            require_known("disparity range", [searched.source], RANGE_SOURCES)
-        rig = read_dataset(path, file[RIG]).tobytes().decode("utf-8", "replace") if RIG in file else None
-        return LightField(
-            **arrays,
-            name=str(known["name"]),
-            source=str(known["source"]),
-            reading=str(known.get("reading", "")),
-            view=known.get("view"),
-            row_spacing=float(known.get("row_spacing", 1.0)),
-            settled="row_spacing" in known,
-            camera=read_camera(file),
-            notes=tuple(note.decode("utf-8", "replace") for note in known.get("notes", ())),
-            disparity_range=searched,
-            ground_truth=ground_truth,
-            masks=masks,
-            rig=None if rig is None else Rig.from_text(rig),
-        )
+        known = validated(Properties, json.loads(read_dataset(path, file[_PROPERTIES]).tobytes()), "light field")
+        return LightField(**arrays, **known.fields(), ground_truth=ground_truth, masks=masks)
 
 
 def read_camera(file: h5py.File) -> Camera | None:
-    """Camera of a light field or a result; None if the file has none."""
+    """Camera of a result; None if the file has none."""
     return Camera(*map(float, attribute(file, "camera"))) if "camera" in file.attrs else None
 
 

@@ -69,7 +69,7 @@ class Header(NamedTuple):
     grey : bool
         Whether it has no colours; False if the header does not say.
     white : int
-        PNM: the value of white; else 0.
+        PNM, and PNG that has grey of 8 or 16 bit alone: the value of white; else 0.
     """
 
     kind: str
@@ -185,17 +185,10 @@ def picture_header(path: Path) -> Header:
 
 
 def png_texts(path: Path) -> dict[str, str]:
-    """Uncompressed text chunks of a PNG by key; empty if the file cannot be read or is not a PNG."""
-    data, at, texts = b"", len(_PNG), {}
-    with suppress(OSError):
-        data = path.read_bytes() if path.is_file() else b""
-    while data.startswith(_PNG) and at + 12 <= len(data):
-        end = at + 8 + int.from_bytes(data[at : at + 4], "big")
-        if data[at + 4 : at + 8] == b"tEXt" and data[end : end + 4] == _checksum(data[at + 4 : end]):
-            key, _, text = data[at + 8 : end].decode("latin-1").partition("\0")
-            texts[key] = text
-        at = end + 4
-    return texts
+    """Text chunks of a PNG before its pixels, by key; empty if the file cannot be read or is not a PNG."""
+    with suppress(SepiError), _opened(path) as file, _pillow_class("Png")(file) as image:
+        return {key: text for key, text in image.info.items() if isinstance(text, str)}
+    return {}
 
 
 def _checksum(chunk: bytes) -> bytes:
@@ -283,10 +276,10 @@ def _png_form(file: IO[bytes], path: Path, size: int) -> _Form:
         raise ValueError("its header is missing")
     # decoding turns grey with transparency, or a palette, into colours
     width, height, bits, colours = struct.unpack_from(">IIBB", head, 16)
-    grey = colours in (0, 4)
+    grey, plain = colours in (0, 4), colours == 0 and bits in (8, 16)
     if not width * height:
         raise ValueError("no pixels")
-    return height, width, (1 if grey else 3) * (2 if bits == 16 else 1), grey
+    return height, width, (1 if grey else 3) * (2 if bits == 16 else 1), grey, plain * (2**bits - 1)
 
 
 def _pillow_form(plugin: str, file: IO[bytes], path: Path, size: int) -> _Form:
@@ -296,7 +289,7 @@ def _pillow_form(plugin: str, file: IO[bytes], path: Path, size: int) -> _Form:
 
 
 def _pillow_class(plugin: str) -> Any:
-    # ``Image.open`` and the class for WebP refuse images that are allowed here, with a limit for all threads
+    # ``Image.open`` refuses images that are allowed here, with a limit for all threads
     return getattr(import_module(f"PIL.{plugin}ImagePlugin"), f"{plugin}ImageFile")
 
 
@@ -304,18 +297,6 @@ def _avif_form(file: IO[bytes], path: Path, size: int) -> _Form:
     # the box 'ispe' holds the size of the image
     _, _, box = file.read(4096).partition(b"ispe\0\0\0\0")
     return int.from_bytes(box[4:8], "big"), int.from_bytes(box[:4], "big")
-
-
-def _webp_form(file: IO[bytes], path: Path, size: int) -> _Form:
-    head = file.read(30)
-    if head[12:16] == b"VP8X":
-        width, height = (1 + int.from_bytes(head[at : at + 3], "little") for at in (24, 27))
-    elif head[12:16] == b"VP8L":
-        bits = int.from_bytes(head[21:25], "little")
-        width, height = 1 + bits % 2**14, 1 + (bits >> 14) % 2**14
-    else:
-        width, height = (int.from_bytes(head[at : at + 2], "little") % 2**14 for at in (26, 28))
-    return height, width
 
 
 def _tiff_form(file: IO[bytes], path: Path, size: int) -> _Form:
@@ -384,6 +365,6 @@ _KINDS = {
     "GIF": _Kind(b"GIF8", partial(_pillow_form, "Gif"), partial(_codec_pixels, "gif")),
     "JPEG 2000": _Kind(_JPEG_2000, partial(_pillow_form, "Jpeg2K"), partial(_codec_pixels, "jpeg2k")),
     "AVIF": _Kind(_AVIF, _avif_form, partial(_codec_pixels, "avif")),
-    "WebP": _Kind(b"RIFF", _webp_form, partial(_codec_pixels, "webp")),
+    "WebP": _Kind(b"RIFF", partial(_pillow_form, "WebP"), partial(_codec_pixels, "webp")),
     "PNM": _Kind((b"P2", b"P3", b"P5", b"P6"), _pnm_form, lambda _, data: pnm_pixels(data)),
 }

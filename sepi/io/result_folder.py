@@ -12,6 +12,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
+import h5py
 import numpy as np
 import numpy.typing as npt
 
@@ -20,11 +21,20 @@ from sepi.camera.rig import Rig
 from sepi.errors import SepiError
 from sepi.io import hdf5, map_pictures
 from sepi.io.disparity_maps import write_pfm
-from sepi.io.files import atomic_path, filled_folder, remove_files
+from sepi.io.files import atomic_folder, atomic_path, remove_files
 from sepi.io.images import write_png
 from sepi.io.point_cloud import point_cloud, write_ply
 from sepi.io.provenance import DIGEST, RESULT, result_attributes
-from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, UNKNOWN, names_as_taken, require_own, sound_maps
+from sepi.io.result_files import (
+    ALL_VIEWS,
+    DEPTH,
+    RESULT_FILES,
+    RUNTIME,
+    UNKNOWN,
+    names_as_taken,
+    require_own,
+    sound_maps,
+)
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.process.threads import available_cores
 from sepi.stage import StageMaps
@@ -33,6 +43,9 @@ from sepi.validation import described, is_finite, require_path, require_type
 _Attributes = Mapping[str, hdf5.Attribute]
 _Names = tuple[str, ...]
 _View = tuple[int, int]
+
+EXTENDED = "extended"
+"""Dataset that only a file of maps of all views has: pixels that no map shows."""
 
 _MASK_TEXT = {"Software": "sepi", "Description": "mask: 255 inside, 0 outside"}
 
@@ -179,19 +192,22 @@ def write_result(
     if light_field.camera is not None:
         warn_of_infinity(folder, light_field.camera, maps.disparity, maps.sigma, maps.mask(UNKNOWN))
     earlier = require_own(folder, light_field, force=force)
-    with filled_folder(folder) as temporary:
+    with atomic_folder(folder, add=True) as temporary:
         names = _write_files(temporary, light_field, maps, attributes or {}, seconds, beside)
     remove_files(folder, earlier.difference(names))
     return names
 
 
-def read_result(path: str | Path) -> Result:
-    """Read the maps of a result.
+def read_result(path: str | Path, view: _View | None = None) -> Result:
+    """Read the maps of one view of a result.
 
     Parameters
     ----------
     path : str or Path
-        Folder written by :func:`write_result`, or its ``result.h5``.
+        Folder written by :func:`write_result`, its ``result.h5``, or a file of maps of all views.
+    view : (int, int), optional
+        Row and column in the grid; default: the result's own view. In other views, pixels that no map shows and pixels
+        of confidence 0 are unknown.
 
     Returns
     -------
@@ -200,7 +216,7 @@ def read_result(path: str | Path) -> Result:
     Raises
     ------
     SepiError
-        If the result is missing or damaged.
+        If there is no map of this view, or the result is missing or damaged.
 
     Examples
     --------
@@ -216,23 +232,55 @@ def read_result(path: str | Path) -> Result:
     (True, True)
     """
     path = require_path("result", path)
-    path = path / RESULT if path.is_dir() else path
-    with hdf5.open_hdf5(path, "result of 'sepi depth'") as file:
-        picture, maps = hdf5.read_dataset(path, file["view"]), hdf5.float_maps(path, file)
+    return result_in(all_views_file(path, view) or (path / RESULT if path.is_dir() else path), view)
+
+
+def all_views_file(path: Path, view: _View | None) -> Path | None:
+    """The file of maps of all views; None: the map of a result's own view, or of another program."""
+    path = path / ALL_VIEWS if path.is_dir() and view is not None else path
+    # reading reports a damaged file
+    return path if hdf5.has_dataset(path, EXTENDED, if_damaged=True) else None
+
+
+def result_in(path: Path, view: _View | None, check: bool = True) -> Result:
+    """Result of a view in a file; ``check=False`` does not read the whole file for its digest."""
+    with hdf5.open_hdf5(path, "result of 'sepi depth'", check) as file:
+        own = tuple(map(int, hdf5.attribute(file, "view_position")))
+        place = place_in(path, file, view)
+        if place is ... and view not in (None, own):
+            alone = f"holds the map of view {own[0]},{own[1]} alone"
+            raise SepiError(f"{path}: {alone}; 'sepi depth --all-views' makes those of all")
+        maps = hdf5.float_maps(path, file, place)
         if missing := {"disparity", "confidence"}.difference(maps):
             raise SepiError(f"damaged result of 'sepi depth': it has no {' and no '.join(sorted(missing))}")
-        unknown = hdf5.read_dataset(path, file[UNKNOWN]) if UNKNOWN in file else np.zeros(maps["disparity"].shape)
-        (t, s), (rows, columns) = (map(int, hdf5.attribute(file, name)) for name in ("view_position", "grid"))
-        # earlier versions had rows as far apart as columns, and all views on the grid
-        told = hdf5.attribute(file, "from_centre") if "from_centre" in file.attrs else (t - rows // 2, s - columns // 2)
-        down, across = map(float, told)
+        picture = hdf5.read_dataset(path, file["view" if place is ... else "picture"], place)
+        centre, rig = hdf5.attribute(file, "from_centre"), hdf5.read_rig(file)
+        if place is ...:
+            unknown = (
+                hdf5.read_dataset(path, file[UNKNOWN]) > 0 if UNKNOWN in file else np.zeros(picture.shape[:2], bool)
+            )
+        else:
+            unknown = (hdf5.read_dataset(path, file[EXTENDED], place) > 0) | (maps["confidence"] == 0)
+            baseline = hdf5.read_dataset(path, file["baselines"])[place]
+            centre, rig = centre + baseline, rig and rig.seen_from(baseline)
         scene = str(hdf5.attribute(file, "scene")) if "scene" in file.attrs else ""
-        camera = hdf5.read_camera(file)
-        rig = hdf5.read_rig(file)
+        camera, (down, across) = hdf5.read_camera(file), map(float, centre)
     shapes = {name: values.shape for name, values in (*maps.items(), (UNKNOWN, unknown))}
     if set(shapes.values()) != {picture.shape[:2]} or picture.shape[2:] not in ((1,), (3,)):
         raise SepiError(f"{path}: damaged: view {picture.shape} and maps {shapes} do not fit together")
-    return Result(scene, picture, **maps, unknown=unknown > 0, camera=camera, from_centre=(down, across), rig=rig)
+    return Result(scene, picture, **maps, unknown=unknown, camera=camera, from_centre=(down, across), rig=rig)
+
+
+def place_in(path: Path, file: h5py.File, view: _View | None) -> Any:
+    """Index of a view, by default the reference view, in a file of maps of all views; in other files that of all."""
+    if EXTENDED not in file:
+        return ...
+    t, s = map(int, hdf5.attribute(file, "view_position")) if view is None else view
+    present = hdf5.read_dataset(path, file["present"])
+    rows, columns = present.shape
+    if not (0 <= t < rows and 0 <= s < columns and present[t, s]):
+        raise SepiError(f"{path}: has no view {t},{s}; there are {present.sum()} of {rows}x{columns}, counted from 0")
+    return t, s
 
 
 def _write_files(

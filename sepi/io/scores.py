@@ -1,4 +1,4 @@
-"""Score files of a scene's disparity maps, and files of external methods' maps with their scores.
+"""Score files of a scene's disparity maps, those of external methods among them.
 
 A score file has a group ``maps/NAME`` for each map. It holds ``scores``, JSON from protocol and region to scores, the
 signed error map ``error (H, W)``, and the masks ``regions/NAME (H, W)``, which all maps share and which are stored
@@ -16,7 +16,7 @@ import json
 import math
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +27,13 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES, map_file
-from sepi.io.hdf5 import Attribute, attribute, create_hdf5, float_maps, members, open_hdf5, put, read_dataset
+from sepi.io.hdf5 import Attribute, attribute, create_hdf5, members, open_hdf5, put, read_dataset
 from sepi.lightfield import BoolMap, FloatMap
 
 _MAPS, _SCORES = "maps", "scores"
 _RELIABILITY = "reliability"
-_KIND = "score file (written by python -m sepi.evaluate)"
+_KIND = "score file (written by python -m sepi.evaluate or sepi.external)"
+_TOLD = ("source", "problem", "sha256")
 
 Scores = dict[str, float]
 """Score to value, for one protocol and region."""
@@ -58,6 +59,14 @@ class Evaluation:
     reliability : ndarray, shape (3, 10), or None
         Reliability of the confidence over the whole map (:class:`sepi.scoring.error_bars.Reliability`); None without
         error bars.
+    source : str
+        Path of an external method's map, even if it is missing; else empty.
+    problem : str
+        Why an external method has no map, in a few words for the cell of a table; empty if there is one.
+    sha256 : str
+        Digest of that file, 64 hexadecimal digits; empty if it could not be read.
+    disparity : ndarray, shape (H, W), float32, or None
+        An external method's map, pixels per view step, NaN or infinite where unknown; None if there is a problem.
 
     Examples
     --------
@@ -78,6 +87,10 @@ class Evaluation:
     regions: Mapping[str, BoolMap] = field(default_factory=dict)
     region_sources: Mapping[str, str] = field(default_factory=dict)
     reliability: npt.NDArray[np.float64] | None = None
+    source: str = ""
+    problem: str = ""
+    sha256: str = ""
+    disparity: FloatMap | None = None
 
 
 def map_name(stages: Path, file: Path) -> str:
@@ -106,15 +119,16 @@ def write_scores(path: Path, maps: Mapping[str, Evaluation], attributes: Mapping
         for name, evaluation in maps.items():
             # a slash would make nested groups; no label of a choice has a colon
             group = groups.create_group(name.replace("/", ":"))
-            own = {region: mask for region, mask in evaluation.regions.items() if region not in shared}
-            put_evaluation(group, replace(evaluation, regions=own))
-            for region in sorted(shared.keys() & evaluation.regions.keys()):
-                group[f"regions/{region}"] = shared[region]
+            _put_evaluation(group, evaluation, shared)
             shared = shared or dict(members(group.get("regions", {})))
 
 
-def read_scores(path: Path, names: Collection[str] | None = None) -> dict[str, AllScores]:
-    """Map to protocol to region to scores, for ``names`` or all maps; no protocols without ground truth.
+def read_evaluations(
+    path: Path, names: Collection[str] | None = None, *, with_maps: bool = True
+) -> dict[str, Evaluation]:
+    """Evaluations of these maps, or of all maps in a score file, in the order in which they were written.
+
+    ``with_maps=False`` reads scores and reliability alone, without disparity, errors and regions.
 
     Raises
     ------
@@ -122,65 +136,46 @@ def read_scores(path: Path, names: Collection[str] | None = None) -> dict[str, A
         If the file is missing, not a score file, or lacks one of the maps.
     """
     with open_hdf5(path, _KIND) as file:
-        return {name: scores_in(group) for name, group in _groups(path, file, names).items()}
+        groups = {stored.replace(":", "/"): group for stored, group in members(file[_MAPS])}
+        for name in names or ():
+            if name not in groups:
+                raise SepiError(f"{path}: no scores of '{name}'; it holds: {', '.join(groups) or 'none'}")
+        wanted = groups if names is None else names
+        return {name: _evaluation_in(path, groups[name], with_maps) for name in wanted}
 
 
-def read_reliability(path: Path, names: Collection[str]) -> dict[str, npt.NDArray[np.float64]]:
-    """Reliability of those of these maps that have error bars.
-
-    Raises
-    ------
-    SepiError
-        As :func:`read_scores`.
-    """
-    with open_hdf5(path, _KIND) as file:
-        found = {name: group.get(_RELIABILITY) for name, group in _groups(path, file, names).items()}
-        return {name: read_dataset(path, values) for name, values in found.items() if values is not None}
-
-
-def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[str, Evaluation]:
-    """Evaluations of these maps, or of all maps in a score file.
-
-    Raises
-    ------
-    SepiError
-        As :func:`read_scores`.
-    """
-    with open_hdf5(path, _KIND) as file:
-        return {name: evaluation_in(group) for name, group in _groups(path, file, names).items()}
-
-
-def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
-    """Write an evaluation into an empty group or a file's root; reading and writing it again gives the same bytes."""
+def _put_evaluation(group: h5py.Group, evaluation: Evaluation, shared: Mapping[str, h5py.Dataset]) -> None:
+    """Write an evaluation into an empty group; regions that are there already are linked."""
+    group.attrs.update({name: text for name in _TOLD if (text := getattr(evaluation, name))})
     if evaluation.scores:
         # as JSON, since thousands of attributes in groups would take seconds to read
         put(group, _SCORES, np.frombuffer(json.dumps(evaluation.scores, sort_keys=True).encode(), np.uint8))
-    if evaluation.error is not None:
-        put(group, "error", evaluation.error)
+    for name in ("disparity", "error"):
+        if (values := getattr(evaluation, name)) is not None:
+            put(group, name, values)
     if evaluation.reliability is not None:
         put(group, _RELIABILITY, evaluation.reliability, axes="(pixels, said, found) said_tenth")
     for name, mask in sorted(evaluation.regions.items()):
-        put(group, f"regions/{name}", mask, source=evaluation.region_sources[name])
+        if name in shared:
+            group[f"regions/{name}"] = shared[name]
+        else:
+            put(group, f"regions/{name}", mask, source=evaluation.region_sources[name])
 
 
-def scores_in(group: h5py.Group) -> AllScores:
-    """Protocol to region to scores, as :func:`put_evaluation` wrote them."""
-    if _SCORES not in group:
-        return {}
-    found = json.loads(read_dataset(Path(group.file.filename), group[_SCORES]).tobytes())
-    return {protocol: {region: dict(cell) for region, cell in regions.items()} for protocol, regions in found.items()}
-
-
-def evaluation_in(group: h5py.Group) -> Evaluation:
-    """Evaluation that :func:`put_evaluation` wrote."""
-    path = Path(group.file.filename)
-    regions = members(group.get("regions", {}))
+def _evaluation_in(path: Path, group: h5py.Group, with_maps: bool) -> Evaluation:
+    numbers = {name: read_dataset(path, group[name]) for name in (_SCORES, _RELIABILITY) if name in group}
+    scores = json.loads(numbers[_SCORES].tobytes()) if _SCORES in numbers else {}
+    regions = members(group.get("regions", {})) if with_maps else []
+    more: dict[str, Any] = {name: str(attribute(group, name)) for name in _TOLD if name in group.attrs}
+    for name in ("disparity", "error"):
+        if with_maps and name in group:
+            more[name] = read_dataset(path, group[name]).astype(np.float32)
     return Evaluation(
-        scores=scores_in(group),
-        error=read_dataset(path, group["error"]).astype(np.float32) if "error" in group else None,
+        scores={protocol: {region: dict(cell) for region, cell in of.items()} for protocol, of in scores.items()},
         regions={name: read_dataset(path, mask).astype(bool) for name, mask in regions},
         region_sources={name: str(attribute(mask, "source")) for name, mask in regions},
-        reliability=read_dataset(path, group[_RELIABILITY]) if _RELIABILITY in group else None,
+        reliability=numbers.get(_RELIABILITY),
+        **more,
     )
 
 
@@ -191,18 +186,6 @@ def without_nan(value: Any) -> Any:
     if isinstance(value, list):
         return [without_nan(inner) for inner in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _groups(path: Path, file: h5py.File, names: Collection[str] | None) -> dict[str, h5py.Group]:
-    groups = {stored.replace(":", "/"): group for stored, group in members(file[_MAPS])}
-    for name in names or ():
-        if name not in groups:
-            raise SepiError(f"{path}: no scores of '{name}'; it holds: {', '.join(groups) or 'none'}")
-    return groups if names is None else {name: groups[name] for name in names}
-
-
-_METHODS = "methods"
-_ATTRIBUTES = ("source", "problem", "sha256")
 
 
 class ExternalSource(BaseModel):
@@ -233,63 +216,7 @@ class ExternalSource(BaseModel):
         except OSError:
             names = []
         expected = [f"{scene}{suffix}" for suffix in SUFFIXES]
-        exact = [name for name in expected if name in names]
-        alike = [other for name in expected for other in names if other.casefold() == name.casefold()]
-        return next(filter(os.path.isfile, (path / name for name in (*exact, *alike))), path / expected[0])
-
-
-@dataclass(frozen=True)
-class ExternalMap:
-    """An external method's map of a scene.
-
-    Attributes
-    ----------
-    source : str
-        Path of its file, even if it is missing.
-    problem : str
-        Why there is no map, in a few words for the cell of a table; empty if there is one.
-    sha256 : str
-        Digest of the file, 64 hexadecimal digits; empty if it could not be read.
-    disparity : ndarray, shape (H, W), float32, or None
-        Pixels per view step, NaN or infinite where unknown; None if there is a problem.
-    evaluation : Evaluation
-        Scores; empty if there is a problem, or the scene has no ground truth.
-    """
-
-    source: str
-    problem: str = ""
-    sha256: str = ""
-    disparity: FloatMap | None = None
-    evaluation: Evaluation = field(default_factory=Evaluation)
-
-
-def write_external(path: Path, maps: Mapping[str, ExternalMap]) -> None:
-    """Write the external maps of a scene, by method; equal content gives equal bytes."""
-    with create_hdf5(path) as file:
-        methods = file.create_group(_METHODS, track_order=True)
-        for name, external in maps.items():
-            group = methods.create_group(name)
-            group.attrs.update({key: getattr(external, key) for key in _ATTRIBUTES})
-            if external.disparity is not None:
-                put(group, "disparity", external.disparity)
-            put_evaluation(group, external.evaluation)
-
-
-def read_external(path: Path, *, with_maps: bool = True) -> dict[str, ExternalMap]:
-    """Method to its external map, in the order in which :func:`write_external` wrote them.
-
-    Parameters
-    ----------
-    path : Path
-    with_maps : bool
-        False: read the scores alone, without disparity, errors and regions.
-    """
-    with open_hdf5(path, "file of external maps (written by python -m sepi.external)") as file:
-        return {
-            name: ExternalMap(
-                **{key: str(attribute(group, key)) for key in _ATTRIBUTES},
-                disparity=float_maps(path, group).get("disparity") if with_maps else None,
-                evaluation=evaluation_in(group) if with_maps else Evaluation(scores_in(group)),
-            )
-            for name, group in members(file[_METHODS])
-        }
+        found = [
+            other for one in (str, str.casefold) for name in expected for other in names if one(other) == one(name)
+        ]
+        return next(filter(os.path.isfile, (path / name for name in found)), path / expected[0])

@@ -21,16 +21,7 @@ import pandas as pd
 
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_with_truth
-from sepi.io.scores import (
-    Evaluation,
-    ExternalMap,
-    Scores,
-    read_evaluations,
-    read_external,
-    read_reliability,
-    read_scores,
-    without_nan,
-)
+from sepi.io.scores import Evaluation, Scores, read_evaluations, without_nan
 from sepi.report.plan import PARTS, Plan
 from sepi.report.runs import EXTERNAL, KEYS, TENTHS, Runs, read_json
 from sepi.scoring.scores import PROTOCOLS, SCORED_REGIONS, WHOLE_MAP
@@ -48,9 +39,9 @@ def pooled_q25(plan: Plan) -> Iterator[tuple[str, str, str, float]]:
             key = plan.stage_key(variant, plan.stages[-1])
             of_scenes = (read_evaluations(plan.scores_file(DATASET, scene), [key])[key] for scene in scenes)
             yield from ((level, variant, *quarter) for quarter in _quarters(of_scenes))
-        maps = [read_external(plan.files(DATASET, scene).external) for scene in scenes] if plan.external else []
+        maps = [read_evaluations(plan.files(DATASET, scene).external) for scene in scenes] if plan.external else []
         for method in plan.external:
-            yield from ((level, method, *quarter) for quarter in _quarters(found[method].evaluation for found in maps))
+            yield from ((level, method, *quarter) for quarter in _quarters(found[method] for found in maps))
 
 
 def level_of(scene: str) -> str:
@@ -189,24 +180,25 @@ def _scores_of_scene(plan: Plan, dataset: str, scene: str) -> Iterator[_Number]:
     """Scores of a scene's maps."""
     path = plan.scores_file(dataset, scene)
     keys = dict.fromkeys(itertools.starmap(plan.stage_key, itertools.product(plan.variants, plan.scored_stages)))
-    scores, reliability = read_scores(path, keys), read_reliability(path, keys)
+    scored = read_evaluations(path, keys, with_maps=False)
     for variant, stage in itertools.product(plan.variants, plan.stages):
         about = (dataset, scene, variant, stage, plan.variants[variant][stage])
-        key = plan.stage_key(variant, stage)
-        yield from ((*about, *score) for score in _scores(scores.get(key, {})))
-        for name, values in zip(("pixels", "said", "found"), reliability.get(key, ()), strict=False):
+        found = scored.get(plan.stage_key(variant, stage), Evaluation())
+        yield from ((*about, *score) for score in _scores(found.scores))
+        reliability = () if found.reliability is None else found.reliability
+        for name, values in zip(("pixels", "said", "found"), reliability, strict=False):
             yield from ((*about, TENTHS, str(tenth), name, float(value)) for tenth, value in enumerate(values))
     for method, external in _external(plan, dataset, scene).items():
         about = (dataset, scene, method, EXTERNAL, "")
-        yield from ((*about, *score) for score in _scores(external.evaluation.scores))
+        yield from ((*about, *score) for score in _scores(external.scores))
 
 
-def _external(plan: Plan, dataset: str, scene: str) -> dict[str, ExternalMap]:
+def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Evaluation]:
     """The external methods' maps, without their pixels."""
     if not plan.external:
         return {}
     path = plan.files(dataset, scene).external
-    maps = read_external(path, with_maps=False)
+    maps = read_evaluations(path, with_maps=False)
     require_known(str(path), plan.external, maps)
     return {method: maps[method] for method in plan.external}
 

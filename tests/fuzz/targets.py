@@ -24,7 +24,8 @@ from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.extensions.benchmark.hci_submission import SHAPE as SUBMITTED
 from sepi.extensions.benchmark.hci_submission import problems_of
-from sepi.io.disparity_maps import TruthFile, is_disparity, read_disparity, read_error_bars, write_pfm
+from sepi.io.all_views import read_error_bars_at
+from sepi.io.disparity_maps import TruthFile, is_disparity, read_disparity, write_pfm
 from sepi.io.hdf5 import read_light_field as read_own
 from sepi.io.hdf5 import read_stage, write_light_field, write_stage
 from sepi.io.images import picture_header, png_texts, read_picture, write_png
@@ -515,7 +516,7 @@ TARGETS: dict[str, Target] = {
     "result": Target(
         "a.h5",
         own(*(lambda path, one=one: write_one_result(path, one) for one in FIELDS)),
-        each(read_result, read_origin, read_error_bars, read_map),
+        each(read_result, read_origin, read_error_bars_at, read_map),
     ),
     "submission": Target("a.zip", lambda _: [zipped("disp_maps/cotton.pfm")(FLAT)], submission),
     "json": Target("a.json", JSONS, read_numbers, partly=True),

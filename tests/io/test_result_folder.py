@@ -162,9 +162,6 @@ def test_result_says_where_the_views_stood(tmp_path: Path, light_field: LightFie
             spacing, kind, place = (file.attrs[key] for key in ("row_spacing", "positions", "from_centre"))
         assert (spacing, kind, *place) == pytest.approx(expected)
         assert read_result(tmp_path / name).from_centre == pytest.approx(expected[2:])
-    with changed(tmp_path / "closer" / "result.h5") as file:
-        del file.attrs["from_centre"]  # as earlier versions wrote it
-    assert read_result(tmp_path / "closer").from_centre == (-1, 2)
 
 
 def test_error_bars_in_view_steps_and_metres(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:

@@ -16,7 +16,7 @@ from sepi import variants as built_in
 from sepi.evaluate import evaluation_of, evaluations_of
 from sepi.external import NO_FILE
 from sepi.io.hdf5 import read_stage, write_light_field, write_stage, write_truth
-from sepi.io.scores import Evaluation, ExternalMap, map_name, write_external, write_scores
+from sepi.io.scores import Evaluation, map_name, write_scores
 from sepi.lightfield import DisparityRange, LightField
 from sepi.report import numbers, tables
 from sepi.report.plan import Plan
@@ -120,18 +120,18 @@ def with_results(made: Plan) -> Plan:
             write_scores(one.scores_file(dataset, name), scored, {"scene": name})
         if made.external:
             maps = {method: external_map(scene, EXTERNAL[method][name]) for method in made.external}
-            write_external(made.files(dataset, name).external, maps)
+            write_scores(made.files(dataset, name).external, maps, {})
     return made
 
 
-def external_map(scene: LightField, what: float | str) -> ExternalMap:
+def external_map(scene: LightField, what: float | str) -> Evaluation:
     """A map with this error added to the ground truth, or one with this problem."""
     if isinstance(what, str):
-        return ExternalMap("/maps/none.pfm", what)
+        return Evaluation(source="/maps/none.pfm", problem=what)
     ground_truth = np.zeros(scene.shape, np.float32) if scene.ground_truth is None else scene.ground_truth
     disparity = ground_truth + np.float32(what)
     scores = Evaluation() if scene.ground_truth is None else evaluation_of(scene, disparity)
-    return ExternalMap("/maps/some.pfm", "", 64 * "a", disparity, scores)
+    return replace(scores, source="/maps/some.pfm", sha256=64 * "a", disparity=disparity)
 
 
 def numbers_of(plan: Plan) -> Runs:

@@ -123,10 +123,11 @@ def poses(
     """
     from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
     from sepi.extensions.cameras.posed_views import posed_views
-    from sepi.io.all_views import read_result_at, surfaces_of
+    from sepi.io.all_views import surfaces_of
+    from sepi.io.result_folder import read_result
 
     light_field = read_light_field_of(light_field_path, result_path, reading, bare=False)
-    result = read_result_at(result_path, reading.options.view)
+    result = read_result(result_path, reading.options.view)
     folder = output or default_folder(light_field_path, kind)
     posed = posed_views(
         light_field,

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, read_light_field_of, reading_flags
 from sepi.errors import SepiError
-from sepi.io.files import atomic_path, filled_folder, naming, remove_files
+from sepi.io.files import atomic_folder, atomic_path, naming, remove_files
 from sepi.io.images import write_png
 from sepi.lightfield import FloatMap, full_scale
 from sepi.process.command import SepiCommand, progress_bar
@@ -84,7 +84,7 @@ def write_refocused(
     others = [name for name in made if name not in before and os.path.lexists(folder / name)]
     if others:
         raise SepiError(f"{folder}: {others[0]} there was not written by 'sepi refocus'; choose another folder")
-    with filled_folder(folder) as temporary:
+    with atomic_folder(folder, add=True) as temporary:
         frames = []
         for name, picture in zip(made, pictures, strict=False):
             write_png(temporary / name, _levels(picture, dtype))
@@ -262,7 +262,8 @@ def _read_result(
     path: Path, light_field_path: Path, light_field: LightField, reading: Reading
 ) -> tuple[FloatMap, FloatMap, Camera | None]:
     """The map to focus by, the same with NaN at unknown pixels, and its camera if it records one."""
-    from sepi.io.all_views import read_disparity_at, read_origin_at, read_result_at
+    from sepi.io.all_views import read_disparity_at, read_origin_at
+    from sepi.io.result_folder import read_result
 
     view = reading.options.view
     disparity = read_disparity_at(path, view)
@@ -272,7 +273,7 @@ def _read_result(
         )
     if read_origin_at(path, view) is None:
         return disparity, disparity, None
-    result = read_result_at(path, view)
+    result = read_result(path, view)
     return disparity, np.where(result.unknown, np.float32(np.nan), disparity), result.camera
 
 

@@ -6,15 +6,15 @@ have any name, at the root or in groups.
 
 from __future__ import annotations
 
-import functools
 import math
 import re
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -29,8 +29,17 @@ from sepi.io.readers.view_files import MAX_VIEWS
 from sepi.lightfield import LightField
 from sepi.validation import require_known
 
-Shapes = Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]
-"""Name of each array in a file to its shape and type."""
+
+class StoredArray(NamedTuple):
+    """An array in a file: its shape and type, and what reads its values."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    read: Callable[[], Array]
+
+
+Arrays = Mapping[str, StoredArray]
+"""Name of each array in a file to the array."""
 
 # words for the channels, long and short
 _COLOURS = (("red", "green", "blue"), ("r", "g", "b"))
@@ -39,30 +48,28 @@ _STYLES = (str.lower, str.upper, str.capitalize)
 _LISTED = 12
 
 
-def light_field_of(path: Path, shapes: Shapes, options: ReadOptions, load: Callable[[str], Array]) -> LightField:
+def light_field_of(path: Path, arrays: Arrays, options: ReadOptions) -> LightField:
     """Light field from one of a file's arrays, or from three that are its channels.
 
     Parameters
     ----------
     path : Path
-    shapes : mapping of str to tuple
-        Name of each array to its shape and type.
+    arrays : mapping of str to StoredArray
     options : ReadOptions
         ``variable`` names an array; for others see :func:`sepi.io.readers.arrays.light_field_from_array`.
-    load : callable
-        Reads an array by name.
 
     Raises
     ------
     SepiError
         If no array or several can be the light field, or it cannot be read.
     """
-    names = _arrays_of(path, shapes, options.variable)
+    names = _chosen(path, arrays, options.variable)
     if len(names) == 1:
-        return light_field_from_array(load(names[0]), path, options)
+        return light_field_from_array(arrays[names[0]].read(), path, options)
     if options.axes is not None:
         options = replace(options, axes=re.sub("[cC]", "", options.axes) + "C")
-    light_field = light_field_from_array(np.stack([load(name) for name in names], axis=-1), path, options)
+    channels = np.stack([arrays[name].read() for name in names], axis=-1)
+    light_field = light_field_from_array(channels, path, options)
     note = f"the arrays {', '.join(map(printable, names))} are taken as red, green and blue"
     return replace(light_field, notes=(note, *light_field.notes))
 
@@ -74,12 +81,12 @@ def _channels_from(red: str) -> Iterator[tuple[str, ...]]:
             yield red, *(red[: match.start()] + word + red[match.end() :] for word in others)
 
 
-def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, ...]:
+def _chosen(path: Path, arrays: Arrays, requested: str | None) -> tuple[str, ...]:
     """Name of the array that is the light field, or names of its red, green and blue arrays.
 
     Unless the user chooses, it is the only array whose axes fit, or among several the only ``LF``, or three channels.
     """
-    shapes = {name: shape for name, (shape, kind) in arrays.items() if kind.kind in "iuf" or name == requested}
+    shapes = {name: one.shape for name, one in arrays.items() if one.dtype.kind in "iuf" or name == requested}
     if requested is not None:
         require_known(f"{path}: --variable", [requested], shapes)
         return (requested,)
@@ -92,7 +99,9 @@ def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, 
     if len(called) == 1:
         return (called[0],)
     triples = [names for name in fitting for names in _channels_from(name) if set(names) <= set(fitting)]
-    triples = [names for names in triples if len({arrays[name] for name in names}) == 1 and len(shapes[names[0]]) == 4]
+    triples = [
+        names for names in triples if len({arrays[name][:2] for name in names}) == 1 and len(shapes[names[0]]) == 4
+    ]
     if len(triples) == 1:
         return triples[0]
     if fitting:
@@ -101,16 +110,16 @@ def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, 
     raise SepiError(f"{path}: {no_light_field(arrays)}")
 
 
-def no_light_field(arrays: Shapes) -> str:
+def no_light_field(arrays: Arrays) -> str:
     """Message for a file without a light field: the arrays that it holds."""
     found = _listed(arrays) or "nothing"
     return f"holds no array of numbers of 4 or 5 axes (found: {found}); for an image of all views pass --format mosaic"
 
 
-def _listed(arrays: Shapes) -> str:
+def _listed(arrays: Arrays) -> str:
     return ", ".join(
-        f"{printable(name)} {'x'.join(map(str, shape))}{'' if kind.kind in 'iuf' else f' of {kind}'}"
-        for name, (shape, kind) in list(arrays.items())[:_LISTED]
+        f"{printable(name)} {'x'.join(map(str, one.shape))}{'' if one.dtype.kind in 'iuf' else f' of {one.dtype}'}"
+        for name, one in list(arrays.items())[:_LISTED]
     )
 
 
@@ -123,28 +132,28 @@ _NUMBERS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "single", "ui
 _CELL, _MOST_CELLS = "cell", 8 * MAX_VIEWS
 
 
-def hdf5_shapes(path: Path, check: bool = True) -> Shapes:
-    """Shape and type of each array of numbers; arrays in groups only if none outside may be a light field.
+def hdf5_arrays(path: Path, check: bool = True) -> Arrays:
+    """Each array of numbers; arrays in groups only if none outside may be a light field.
 
     No values are read; ``check=False`` does not read the whole file for its digest.
     """
-    found: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {}
+    found: dict[str, StoredArray] = {}
     with open_hdf5(path, check=check) as file:
 
         def take(name: str, entry: object) -> None:
             # '#refs#' holds the contents of cells
             if not name.startswith("#") and (cells := _cells(entry)):
-                found[name] = (*_outer(entry), *cells[0].shape[:: _turn(path, cells[0])]), cells[0].dtype
+                shape = *_outer(entry), *cells[0].shape[:: _turn(path, cells[0])]
+                found[name] = StoredArray(shape, cells[0].dtype, partial(_hdf5_array, path, name))
 
         for name in file:
             take(name, file.get(name))
-        if not any(is_likely(shape) for shape, _ in found.values()):
+        if not any(is_likely(one.shape) for one in found.values()):
             file.visititems(take)
     return found
 
 
-def hdf5_array(path: Path, name: str) -> Array:
-    """Array of a name from :func:`hdf5_shapes`."""
+def _hdf5_array(path: Path, name: str) -> Array:
     with open_hdf5(path) as file:
         cells = _cells(file[name])
         arrays = [read_dataset(path, cell).transpose([*range(cell.ndim)][:: _turn(path, cell)]) for cell in cells]
@@ -197,15 +206,15 @@ _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0
 
 def matches_numpy(path: Path) -> bool:
     """Whether ``path`` is a file or an archive of NumPy, by its content or its suffix ``.npy`` or ``.npz``."""
-    return path.is_file() and (path.suffix.lower() in (".npy", ".npz") or bool(numpy_shapes(path)))
+    return path.is_file() and (path.suffix.lower() in (".npy", ".npz") or bool(numpy_arrays(path)))
 
 
 def read_numpy(path: Path, options: ReadOptions) -> LightField:
     """Light field from the array of a NumPy file; of an archive, ``options.variable`` or the array that fits."""
-    return light_field_of(path, numpy_shapes(path), options, functools.partial(numpy_array, path))
+    return light_field_of(path, numpy_arrays(path), options)
 
 
-def read_array(path: Path) -> Array:
+def _mapped_array(path: Path) -> Array:
     """Array of a ``.npy`` file, memory-mapped: values are read when used."""
     with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"):
         with path.open("rb") as file:
@@ -220,12 +229,14 @@ def read_array(path: Path) -> Array:
         return array
 
 
-def numpy_shapes(path: Path) -> Shapes:
-    """Shape and type of each array by name; a ``.npy`` has the file's own name. No values are read."""
+def numpy_arrays(path: Path) -> Arrays:
+    """Each array by name; a ``.npy`` has the file's own name. No values are read."""
     found = {}
-    if not _is_zipped(path):
-        array = read_array(path)
-        return {path.stem: (array.shape, array.dtype)}
+    with reading(path, _NUMPY), path.open("rb") as file:
+        is_zipped = file.read(4) in _ZIP_MAGICS
+    if not is_zipped:
+        array = _mapped_array(path)
+        return {path.stem: StoredArray(array.shape, array.dtype, lambda: array)}
     with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"), zipfile.ZipFile(path) as archive:
         for info in archive.infolist():
             if info.filename.endswith(".npy"):
@@ -235,24 +246,17 @@ def numpy_shapes(path: Path) -> Shapes:
                 # NumPy allocates this shape before it reads
                 if math.prod(shape) * kind.itemsize > info.file_size:
                     raise ValueError(f"{info.filename} of shape {shape} cannot lie in {info.file_size} bytes")
-                found[info.filename.removesuffix(".npy")] = shape, kind
+                name = info.filename.removesuffix(".npy")
+                found[name] = StoredArray(shape, kind, partial(_packed_array, path, name, kind))
     return found
 
 
-def numpy_array(path: Path, name: str) -> Array:
-    """Array of a name from :func:`numpy_shapes`."""
-    if not _is_zipped(path):
-        return read_array(path)
+def _packed_array(path: Path, name: str, kind: np.dtype[Any]) -> Array:
     with reading(path, _NUMPY), np.load(path, allow_pickle=False) as archive:
-        if numpy_shapes(path)[name][1].hasobject:
+        if kind.hasobject:
             raise SepiError(_OBJECTS)
         array: Array = archive[name]
         return array
-
-
-def _is_zipped(path: Path) -> bool:
-    with reading(path, _NUMPY), path.open("rb") as file:
-        return file.read(4) in _ZIP_MAGICS
 
 
 def _require_room(path: Path, info: zipfile.ZipInfo) -> None:
@@ -265,9 +269,9 @@ def _require_room(path: Path, info: zipfile.ZipInfo) -> None:
 def matches_hdf5(path: Path) -> bool:
     """Whether ``path`` is an HDF5 file of another program, with an array that may be a light field."""
     others = has_dataset(path, "/", lambda root: not is_own(root))
-    return others and any(is_likely(shape) for shape, _ in hdf5_shapes(path).values())
+    return others and any(is_likely(one.shape) for one in hdf5_arrays(path).values())
 
 
 def read_hdf5(path: Path, options: ReadOptions) -> LightField:
     """Light field from the array ``options.variable``; default: the array that can be a light field."""
-    return light_field_of(path, hdf5_shapes(path), options, functools.partial(hdf5_array, path))
+    return light_field_of(path, hdf5_arrays(path), options)

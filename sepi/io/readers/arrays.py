@@ -16,7 +16,7 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.io.readers.camera_positions import reordered
 from sepi.io.readers.options import ReadOptions, unarranged
-from sepi.io.readers.view_grid import Numbers, arrange_numbers, position_of
+from sepi.io.readers.view_grid import Numbers, arrange_numbers, position_of, taken
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
 
 # integer types that values of other types may stand for, and the least maximum of floats that are not whole numbers:
@@ -187,6 +187,8 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     if array.dtype.kind not in "iuf" or array.dtype.itemsize > 8:
         raise SepiError(f"{source}: values of type {array.dtype}; expected integers such as uint8, or floats in 0..1")
     given = axes or options.axes
+    # MATLAB drops axes of size 1 at the end
+    array = array.reshape(*array.shape, *[1] * (len(given or "") - array.ndim))
     letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
     # drop a batch axis of size 1
     array = array.reshape(array.shape[array.ndim - len(letters) :])
@@ -219,19 +221,12 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
     T, S = light_field.grid
     if np.array_equal(numbers, np.arange(T * S).reshape(T, S)):
         return light_field
-    # -1 picks the last view, which `present` then marks as missing
-    places = np.divmod(numbers, S)
-    present = light_field.present[places] & (numbers >= 0)
-    views = light_field.views[places]
-    views[~present] = 0
-    missing = None if light_field.missing is None else light_field.missing[places] & present[..., None, None]
     positions, row_spacing = reordered(light_field.positions, light_field.row_spacing, options.order, numbers)
     truth: dict[str, Any] = {"view": options.view, "ground_truth": None, "masks": {}}
     position = position_of(numbers, light_field.reference_position[0] * S + light_field.reference_position[1])
     if position is not None and (light_field.view is not None or light_field.ground_truth is not None):
         truth = {"view": position}
-    where: dict[str, Any] = {"positions": positions, "row_spacing": row_spacing, "missing": missing}
-    return replace(light_field, views=views, present=present, **where, **truth)
+    return replace(light_field, **taken(light_field, numbers), **truth, positions=positions, row_spacing=row_spacing)
 
 
 def with_white(views: Array, present: BoolMap, path: Path, white: float) -> Array:
@@ -243,8 +238,7 @@ def _checked_axes(source: str, array: Array, text: str) -> str:
     letters = text.upper()
     if sorted(letters) not in map(sorted, _LAYOUTS):
         raise SepiError(f"{source}: --axes {text}: expected T, S, H and W once each, C for colours ({_AXES_HELP})")
-    spare = array.ndim - len(letters)
-    if spare < 0 or prod(array.shape[:spare]) != 1:
+    if prod(array.shape[: array.ndim - len(letters)]) != 1:
         raise SepiError(f"{source}: --axes {text} names {len(letters)} axes, the array has {array.ndim}: {array.shape}")
     return letters
 

@@ -14,48 +14,38 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import Field
 
-from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.io.codecs import write_tiff
 from sepi.io.disparity_maps import read_pfm, write_pfm
-from sepi.io.files import atomic_path, filled_folder, naming, reading, remove_files
-from sepi.io.hdf5 import has_dataset, is_own, read_light_field, write_light_field
+from sepi.io.files import atomic_folder, atomic_path, naming, reading, remove_files
+from sepi.io.hdf5 import Properties, has_dataset, is_own, read_light_field, write_light_field
 from sepi.io.images import SUFFIXES, read_picture, write_png
 from sepi.io.readers.arrays import rearrange
 from sepi.io.readers.options import ReadOptions, in_grid, unarranged
 from sepi.io.readers.view_files import read_grid
 from sepi.io.result_files import require_target
-from sepi.lightfield import BoolMap, DisparityRange, LightField
+from sepi.lightfield import BoolMap, LightField
 from sepi.validation.models import validated
 
 MANIFEST = "light_field.json"
+# properties that are not told there
+_APART = {"source", "reading", "rig"}
 
 
-class Manifest(BaseModel, defer_build=True):
+class Manifest(Properties, defer_build=True):
     """Content of ``light_field.json``: the fields of a light field, with file names instead of arrays.
 
     For each row and column of the grid, ``views`` has a file name, or null for a missing view; ``positions`` a pair
     ``[down, across]`` in view steps; and ``missing`` a mask of the pixels that the view does not show, or null.
     """
 
-    name: str
     views: list[list[str | None]]
-    view: tuple[int, int] | None = None
-    row_spacing: float = 1.0
     positions: list[list[tuple[float, float] | None]] | None = None
     missing: list[list[str | None]] | None = None
-    disparity_range: DisparityRange | None = None
-    camera: Camera | None = None
     ground_truth: str | None = None
-    masks: dict[str, str] = {}
-    notes: tuple[str, ...] = ()
-
-
-def _same(known: Manifest | LightField) -> dict[str, Any]:
-    """Fields that a light field and its manifest share."""
-    return {key: getattr(known, key) for key in ("name", "view", "row_spacing", "disparity_range", "camera", "notes")}
+    masks: dict[str, str] = Field(default={})
 
 
 def read_manifest(path: Path) -> Manifest:
@@ -116,7 +106,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     masks = {name: _read_mask(path / mask) for name, mask in known.masks.items()}
     truth: dict[str, Any] = {"ground_truth": ground_truth, "masks": masks, "positions": positions, "missing": missing}
     with naming(file):
-        light_field = LightField(views, source=str(path), present=present, settled=True, **truth, **_same(known))
+        light_field = LightField(views, present=present, **truth, **known.fields() | {"source": str(path)})
     return rearrange(light_field, in_grid(options))
 
 
@@ -182,7 +172,7 @@ def write_exported(path: Path, light_field: LightField, *, force: bool = False) 
         write_light_field(path, light_field)
         return
     before = _earlier_files(path)
-    with filled_folder(path) as temporary:
+    with atomic_folder(path, add=True) as temporary:
         made = _write_folder(temporary, light_field)
     remove_files(path, before - made)
 
@@ -214,10 +204,13 @@ def _write_folder(folder: Path, light_field: LightField) -> set[str]:
         missing=None if light_field.missing is None else hidden.tolist(),
         ground_truth=None if light_field.ground_truth is None else _TRUTH,
         masks=masks,
-        **_same(light_field),
+        **Properties.of(light_field),
     )
     # one line for each key
-    lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in known.model_dump(mode="json").items()]
+    lines = [
+        f"  {json.dumps(key)}: {json.dumps(value)}"
+        for key, value in known.model_dump(mode="json", exclude=_APART).items()
+    ]
     with atomic_path(folder / MANIFEST) as temporary:
         temporary.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="ascii")
     return {path.name for path in folder.iterdir()}

@@ -19,7 +19,7 @@ from sepi.io.files import DEFLATE_RATIO, naming
 from sepi.io.hdf5 import has_dataset
 from sepi.io.images import SUFFIXES, picture_header
 from sepi.io.readers import array_files, eslf, exported, hci, image_folder, matlab
-from sepi.io.readers.array_files import Shapes, hdf5_shapes, no_light_field
+from sepi.io.readers.array_files import Arrays, hdf5_arrays, no_light_field
 from sepi.io.readers.arrays import is_likely, readings, with_white
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import has_rows
@@ -45,8 +45,8 @@ class Format(NamedTuple):
         Whether it reads values of any scale, and uses the option ``white``.
     loose : bool
         Whether it also matches what another format describes better; formats of extensions are asked before.
-    read_views, read_truth : callable, optional
-        Light field without ground truth and masks, and these alone; default: both come from ``read``.
+    read_truth : callable, optional
+        Ground truth and masks alone, if ``read`` gives a light field without them; default: both come from ``read``.
     truth_files : callable
         Files of a path with ground truth and masks.
     size_of : callable, optional
@@ -64,7 +64,6 @@ class Format(NamedTuple):
     options: tuple[str, ...] = ()
     scales: bool = True
     loose: bool = False
-    read_views: Callable[[Path, ReadOptions], LightField] | None = None
     read_truth: Callable[[Path, ReadOptions], Truth] | None = None
     truth_files: Callable[[Path], Sequence[Path]] = lambda _: ()
     size_of: Callable[[Path], tuple[int, int, int, int]] | None = None
@@ -105,7 +104,6 @@ _OWN = {
         hci.matches,
         hci.read,
         ("grid", "follow_links"),
-        read_views=hci.read_views,
         read_truth=hci.read_truth,
         truth_files=hci.truth_files,
     ),
@@ -224,10 +222,12 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None, *, tr
     known = format_of(path, file_format)
     _require_used(path, known, options)
     with naming(path):
-        of_views = known.read if truth or known.read_views is None else known.read_views
-        light_field = of_views(path, options)
+        light_field = known.read(path, options)
         if not truth:
             light_field = replace(light_field, ground_truth=None, masks={})
+        elif known.read_truth is not None:
+            ground_truth, masks = known.read_truth(path, options)
+            light_field = replace(light_field, ground_truth=ground_truth, masks=masks)
         if options.white is not None and not known.scales:
             views = with_white(light_field.views, light_field.present, path, options.white)
             light_field = replace(light_field, views=views)
@@ -264,8 +264,8 @@ def _what_else(path: Path) -> str:
         return "a single image; give the folder of all views, or --format mosaic or eslf with --grid ROWSxCOLUMNS"
     if path.is_file() and h5py.is_hdf5(path):
         with suppress(SepiError):
-            arrays = hdf5_shapes(path)
-            if any(len(shape) > 1 for shape, _ in arrays.values()):
+            arrays = hdf5_arrays(path)
+            if any(len(one.shape) > 1 for one in arrays.values()):
                 return no_light_field(arrays)
     return "not a light field of a known format"
 
@@ -360,15 +360,15 @@ def _of_array(shape: tuple[int, ...], itemsize: int) -> Size:
 
 def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
     """Shape and bytes of a value of each array in a file that may be a light field, and that the file can hold."""
-    shapes: Shapes = {}
+    arrays: Arrays = {}
     with suppress(SepiError):
         if _matches(_OWN["numpy"], path):
-            shapes = array_files.numpy_shapes(path)
+            arrays = array_files.numpy_arrays(path)
         elif _matches(_OWN["matlab"], path):
-            shapes = matlab.array_shapes(path)
+            arrays = matlab.arrays_in(path)
         else:
             # no digest check for many files: whoever reads the views checks the file
-            shapes = hdf5_shapes(path, check=False)
+            arrays = hdf5_arrays(path, check=False)
     most = path.stat().st_size * DEFLATE_RATIO
-    sized = [(shape, kind.itemsize) for shape, kind in shapes.values() if is_likely(shape)]
+    sized = [(one.shape, one.dtype.itemsize) for one in arrays.values() if is_likely(one.shape)]
     return [(shape, itemsize) for shape, itemsize in sized if 0 < math.prod(shape) * itemsize <= most]

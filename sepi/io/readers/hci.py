@@ -85,24 +85,8 @@ def matches(path: Path) -> bool:
     return named and not any((path / name).exists() for name in CALIBRATED)
 
 
-def read(path: Path, options: ReadOptions) -> LightField:
-    """Read a benchmark folder.
-
-    Returns
-    -------
-    LightField
-        With the scene's own disparity range, ground truth and masks if the folder has them.
-    """
-    light_field = read_views(path, options)
-    of, _ = _view_of_truth(path, options)
-    if of is None or not light_field.present[of] or options.view not in (None, of) or not truth_files(path):
-        return light_field
-    ground_truth, masks = _truth_of(path, light_field.shape, options.part)
-    return replace(light_field, view=of, ground_truth=ground_truth, masks=masks)
-
-
 def read_truth(path: Path, options: ReadOptions) -> Truth:
-    """Ground truth and masks of a folder, if they belong to the reference view of :func:`read_views`."""
+    """Ground truth and masks of a folder, if they belong to the reference view of :func:`read`."""
     of, (rows, columns) = _view_of_truth(path, options)
     reference = options.view or (rows // 2, columns // 2)
     if of == reference:
@@ -119,7 +103,7 @@ def truth_files(folder: Path) -> list[Path]:
     return sorted(path for name in (TRUTH, "mask_*.png") for path in folder.glob(name) if path.is_file())
 
 
-def read_views(path: Path, options: ReadOptions) -> LightField:
+def read(path: Path, options: ReadOptions) -> LightField:
     """Light field of a folder without ground truth and masks, so that a change in these affects no map."""
     file = path / PARAMETERS
     parameters = _parameters_of(path)

@@ -32,8 +32,8 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import DEFLATE_RATIO, reading
-from sepi.io.readers.array_files import MATLAB_HDF5, Shapes, hdf5_array, hdf5_shapes, light_field_of
-from sepi.io.readers.arrays import Array, is_likely
+from sepi.io.readers.array_files import MATLAB_HDF5, Arrays, StoredArray, hdf5_arrays, light_field_of
+from sepi.io.readers.arrays import is_likely
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
@@ -64,8 +64,8 @@ class _Part(NamedTuple):
     data: bytes | memoryview
 
 
-def shapes_of_version_5(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
-    """Shape and type of the arrays of real numbers, as MATLAB shows them.
+def _arrays_of_version_5(path: Path) -> Arrays:
+    """The arrays of real numbers, as MATLAB shows them.
 
     Arrays in structures, ``scene/LF`` or ``scene(2)/LF``, and cell arrays of equal shapes count only if no other array
     may be a light field.
@@ -75,22 +75,21 @@ def shapes_of_version_5(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype
     SepiError, ValueError
         If the file is damaged.
     """
-    found = {name: _form(order, parts)[:2] for order, name, parts, _ in _variables(path) if _is_real(order, parts)}
-    if not any(is_likely(shape) for shape, _ in found.values()):
-        found |= {name: (array.shape, array.dtype) for name, array in _arrays(path)}
+    found, holders = {}, []
+    for order, name, parts, whole in _variables(path):
+        if _is_real(order, parts):
+            found[name] = StoredArray(*_form(order, parts)[:2], partial(_values, path, order, whole, name))
+        elif _flags(order, parts) & 0xFF in (_CELLS, _STRUCTURE):
+            holders.append((order, whole, name))
+    if not any(is_likely(one.shape) for one in found.values()):
+        inner = (one for order, whole, name in holders for one in _fields(order, whole(), name))
+        found |= {name: StoredArray(array.shape, array.dtype, partial(np.asarray, array)) for name, array in inner}
     return found
 
 
-def read_version_5(path: Path, name: str) -> npt.NDArray[Any]:
-    """Array of a name from :func:`shapes_of_version_5`."""
-    return next(array for found, array in _arrays(path, name) if found == name)
-
-
-def _arrays(path: Path, wanted: str = "") -> Iterator[tuple[str, npt.NDArray[Any]]]:
-    """Arrays in structures and cells, and the wanted one."""
-    for order, name, parts, whole in _variables(path):
-        if _flags(order, parts) & 0xFF in (_CELLS, _STRUCTURE) or name == wanted:
-            yield from _fields(order, whole(), name)
+def _values(path: Path, order: str, whole: Callable[[], memoryview], name: str) -> npt.NDArray[Any]:
+    with reading(path, _KIND):
+        return next(array for _, array in _fields(order, whole(), name))
 
 
 def _form(order: str, parts: list[_Part]) -> tuple[tuple[int, ...], np.dtype[Any], np.dtype[Any]]:
@@ -212,27 +211,18 @@ def matches(path: Path) -> bool:
 
 def read(path: Path, options: ReadOptions) -> LightField:
     """Light field from the array ``options.variable``; default: the array that can be a light field."""
-
-    def load(name: str) -> Array:
-        with reading(path, _KIND):
-            array: Array = (hdf5_array if h5py.is_hdf5(path) else read_version_5)(path, name)
-        # restore the axes that MATLAB dropped
-        while array.ndim < len(options.axes or "") <= 5:
-            array = array[..., None]
-        return array
-
-    return light_field_of(path, array_shapes(path), options, load)
+    return light_field_of(path, arrays_in(path), options)
 
 
-def array_shapes(path: Path) -> Shapes:
-    """Shape and type, as MATLAB shows them, of each array of real numbers in a file; no values are read."""
+def arrays_in(path: Path) -> Arrays:
+    """Each array of real numbers in a file, as MATLAB shows it; no values are read but those in structures."""
     head = _head(path)
     # version 4 begins with a zero
     if head[-4:] in _ORDERS and 0 not in head[:4]:
         with reading(path, _KIND):
-            return shapes_of_version_5(path)
+            return _arrays_of_version_5(path)
     if h5py.is_hdf5(path):
-        return hdf5_shapes(path)
+        return hdf5_arrays(path)
     what = "is damaged" if head.startswith(MATLAB_HDF5) else "is not a MATLAB file of version 5 or 7.3"
     raise SepiError(f"{path}: {what}; save it in MATLAB with -v7 or -v7.3")
 

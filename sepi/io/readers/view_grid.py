@@ -11,6 +11,7 @@ import numpy.typing as npt
 from sepi.camera import Part
 from sepi.errors import SepiError
 from sepi.io.readers.options import ORDERS, POSITION, ReadOptions
+from sepi.lightfield import LightField
 from sepi.validation import require_known
 
 Numbers = npt.NDArray[np.int64]
@@ -65,6 +66,18 @@ def arrange_numbers(source: str, grid: tuple[int, int], options: ReadOptions, na
         _require_inside(source, numbers, options.view)
     excluded = [_excluded(source, view, numbers, names) for view in options.exclude]
     return np.where(np.isin(numbers, excluded), -1, numbers)
+
+
+def taken(light_field: LightField, numbers: Numbers) -> dict[str, Any]:
+    """Fields of a light field for its views with these numbers ``t * S + s``; -1 for none."""
+    # -1 picks the last view, which `present` then marks as missing
+    places = np.divmod(numbers, light_field.grid[1])
+    present = light_field.present[places] & (numbers >= 0)
+    views = light_field.views[places]
+    views[~present] = 0
+    missing = None if light_field.missing is None else light_field.missing[places] & present[..., None, None]
+    files = None if light_field.files is None else np.where(present, light_field.files[places], "")
+    return {"views": views, "present": present, "missing": missing, "files": files}
 
 
 def position_of(numbers: Numbers, number: int) -> tuple[int, int] | None:

@@ -25,7 +25,7 @@ from sepi.extensions.cameras.files import rotation_of
 from sepi.extensions.cameras.posed_views import posed_views
 from sepi.extensions.cameras.reader import read_model
 from sepi.extensions.cameras.rectification import light_field_of, rectification_of
-from sepi.io.all_views import read_result_at, write_all_views
+from sepi.io.all_views import write_all_views
 from sepi.io.disparity_maps import read_pfm
 from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import origin_attributes
@@ -203,7 +203,7 @@ def test_depth_command_reads_a_table_and_its_light_field_is_kept(folder: Path, t
     views = {(0, *other): {"disparity": maps.disparity, "confidence": maps.confidence, "extended": maps.disparity > 0}}
     about = {"scene": "rig", **origin_attributes(light_field)}
     write_all_views(tmp_path / "all.h5", light_field, views.items(), about)
-    seen = read_result_at(tmp_path / "all.h5", (0, *other)).rig
+    seen = sepi.read_result(tmp_path / "all.h5", (0, *other)).rig
     np.testing.assert_allclose(seen.origin, light_field.rig.centre(light_field.positions[(0, *other)]))
 
 
