@@ -22,40 +22,40 @@ rule plan:
 
 # All numbers of a report in one table with facts about the scenes beside it, and what is made of them alone: tables,
 # and charts in print quality. The parts of variant best have files of their own, since `all` does not run those variants.
-for which, (_, plan) in NUMBERS.items():
+for plan in PLANS.values():
+    scenes_of_plan = [SETTINGS.scene(*pair) for pair in plan.pairs]
 
     rule:
         name:
-            f"numbers{which}"
+            f"numbers{plan.ending}"
         input:
-            plan=f"reports/page/plan{which}.json",
-            measured=measured_files(which),
+            plan=f"reports/page/plan{plan.ending}.json",
+            measured=lambda wildcards, plan=plan: plan.number_inputs(),
             published=sorted(PUBLISHED.glob("*.csv")),
         output:
-            report(table_files(which, ["csv"]), caption="captions/tables.rst", category="Tables"),
-            table_files(which, ["md", "tex"]),
+            report(table_files(plan, ["csv"]), caption="captions/tables.rst", category="Tables"),
+            table_files(plan, ["md", "tex"]),
             charts=[file for name in plan.charts for file in as_chart(name)],
-            numbers=multiext(f"reports/report{which}", ".json", ".csv"),
+            numbers=number_files(plan),
         log:
-            f"logs/report{which}.log",
+            f"logs/report{plan.ending}.log",
         benchmark:
-            f"benchmarks/report{which}.tsv"
-        threads: 1
+            f"benchmarks/report{plan.ending}.tsv"
         resources:
             # light fields are read one by one
-            mem_mb=600 + max((scene.samples for scene in scenes_of(which)), default=0) * 8 // 2**20,
-            runtime=5 + sum(scene.minutes(0.1) for scene in scenes_of(which)) // 5,
+            mem_mb=600 + max((scene.samples for scene in scenes_of_plan), default=0) * 8 // 2**20,
+            runtime=5 + sum(scene.minutes(0.1) for scene in scenes_of_plan) // 5,
         params:
             results=placed(RESULTS),
             tables=folder_of_output,
-            charts=flags_of_charts,
+            charts=placed(CHARTS),
             code=code_digest("sepi.report.tables"),
         message:
             "numbers, tables and charts of the report"
         shell:
             command(
                 "sepi.report.tables --results {params.results:q} --plan {input.plan:q} --output {output.numbers[0]:q} "
-                "--tables {params.tables:q} {params.charts:q} 2> {log:q}"
+                "--tables {params.tables:q} --charts {params.charts:q} 2> {log:q}"
             )
 
 
@@ -79,7 +79,6 @@ rule maps:
         "benchmarks/{dataset}/{scene}/{report}maps.tsv"
     group:
         GROUP
-    threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=1000),
         runtime=minutes_for(0.05, 15),
@@ -108,7 +107,6 @@ rule scene:
         touch(SCENE_COMPLETE),
     group:
         GROUP
-    threads: 1
     resources:
         mem_mb=100,
         runtime=1,

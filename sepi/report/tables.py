@@ -62,19 +62,18 @@ def write_tables(runs: Runs, folder: Path) -> None:
 @click.option("--plan", "path", type=PATH, required=True, help="JSON: scenes of datasets, choices of variants.")
 @click.option("--output", type=PATH, required=True, help="JSON file to write, a CSV beside it.")
 @click.option("--tables", "folder", type=PATH, required=True, help="Folder for the tables.")
-@click.option("--charts", "figures", type=PATH, help="Folder for the charts; default: none are drawn.")
-def command(results: Path, path: Path, output: Path, folder: Path, figures: Path | None) -> None:
+@click.option("--charts", "figures", type=PATH, required=True, help="Folder for the charts, if the report has any.")
+def command(results: Path, path: Path, output: Path, folder: Path, figures: Path) -> None:
     """Write all numbers of a report, its tables, and its charts."""
     told = read_json(path, {"scenes", "variants"}, "the plan of a report", "snakemake")
     write_numbers(collect(Plan.from_json(results, json.dumps(told))), output)
     # as a page reads them
     runs = read_numbers(output)
     write_tables(runs, folder)
-    if figures is not None:
+    for name in runs.plan.charts:
         from sepi.report.charts import CHARTS
 
-        for name in runs.plan.charts:
-            CHARTS[name](figures, name, runs)
+        CHARTS[name](figures, name, runs)
 
 
 if __name__ == "__main__":

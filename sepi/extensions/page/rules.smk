@@ -5,7 +5,7 @@ TEMPLATES = sorted(Path(find_spec("sepi.extensions.page").origin).with_name("tem
 # Page of a report: all numbers, tables and scenes in one file
 rule page:
     input:
-        numbers=lambda wildcards: multiext(f"reports/report{report_of(wildcards).ending}", ".json", ".csv"),
+        numbers=lambda wildcards: number_files(report_of(wildcards)),
         published=sorted(PUBLISHED.glob("*.csv")),
         parts=lambda wildcards: [] if wildcards.report else PARTS_OF_BEST,
         scenes=pages_of_scenes,
@@ -17,7 +17,6 @@ rule page:
     benchmark:
         "benchmarks/{report}page.tsv"
     localrule: True
-    threads: 1
     resources:
         mem_mb=1000,
     params:
