@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,7 +18,6 @@ from matplotlib.colors import Colormap
 from sepi.io.files import atomic_path
 from sepi.process.command import SepiCommand
 from sepi.report import charts, published
-from sepi.report.charts import known
 from sepi.report.pictures import error_scale, scale_colours
 from sepi.report.runs import Runs, count_note, own_key, read_json, read_numbers
 from sepi.report.tables import table
@@ -89,6 +89,11 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
             title = f"{dataset}, average of {len(others)}" if len(others) > 1 else f"{dataset}/{others[0]}"
             rows.append({"scene": title, "published": [None, None], **ours(dataset, others)})
     return rows
+
+
+def known(figure: float) -> float | None:
+    """The figure, None for NaN."""
+    return None if math.isnan(figure) else float(figure)
 
 
 def missing_scenes(runs: Runs) -> dict[str, list[str]]:
