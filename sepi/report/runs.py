@@ -36,33 +36,6 @@ def own_key(variant: str) -> str:
     return "ours" if variant == MAIN_VARIANT else f"ours_{variant}"
 
 
-def compared_methods(plan: Plan) -> pd.DataFrame:
-    """All methods in the order of the tables: ours, their ratios to published figures, published, external.
-
-    Returns
-    -------
-    DataFrame
-        By keys, their names in CSV files: ``name`` of the variant or method; ``head`` on the pages; ``kind``; and
-        ``learning`` as in :func:`sepi.report.published.methods`, empty if unknown or not applicable.
-    """
-    signs = {"none": "", "supervised": "*", "unsupervised": "**"}
-    rows = [(own_key(v), v, f"this code, {v}", Kind.OURS, "none") for v in plan.compared]
-    rows += [(f"ratio{own_key(v)[4:]}", v, f"{v} / published", Kind.RATIO, "") for v in plan.compared]
-    rows += [
-        (str(key), str(key), row["label"] + signs[row["learning"]], Kind.PUBLISHED, row["learning"])
-        for key, row in published.methods().iterrows()
-    ]
-    taken = {"dataset", "scene", "row", "method", "learning", *(key for key, *_ in rows), *map(own_key, plan.variants)}
-    for name in plan.external:
-        key = name
-        # a name that a column has already gets a suffix
-        while key in taken:
-            key += " (external)"
-        taken.add(key)
-        rows.append((key, name, f"{name} (external)", Kind.EXTERNAL, ""))
-    return pd.DataFrame(rows, columns=["key", "name", "head", "kind", "learning"]).set_index("key")
-
-
 def datasets_of(plan: Plan) -> list[str]:
     """Available datasets, then the paper's others."""
     return list(dict.fromkeys([*plan.scenes, *published.DATASETS]))
@@ -107,8 +80,44 @@ class Runs:
 
     @cached_property
     def methods(self) -> pd.DataFrame:
-        """Methods of the tables, as :func:`compared_methods`."""
-        return compared_methods(self.plan)
+        """All methods in the order of the tables: ours, their ratios to published figures, published, external.
+
+        Returns
+        -------
+        DataFrame
+            By keys, their names in CSV files: ``name`` of the variant or method; ``head`` on the pages; ``kind``; and
+            ``learning`` as in :func:`sepi.report.published.methods`, empty if unknown or not applicable.
+        """
+        compared, signs = self.plan.compared, {"none": "", "supervised": "*", "unsupervised": "**"}
+        rows = [(own_key(v), v, f"this code, {v}", Kind.OURS, "none") for v in compared]
+        rows += [(f"ratio{own_key(v)[4:]}", v, f"{v} / published", Kind.RATIO, "") for v in compared]
+        rows += [
+            (str(key), str(key), row["label"] + signs[row["learning"]], Kind.PUBLISHED, row["learning"])
+            for key, row in published.methods().iterrows()
+        ]
+        taken = {"dataset", "scene", "row", "method", "learning", *(key for key, *_ in rows)}
+        taken.update(map(own_key, self.plan.variants))
+        for name in self.plan.external:
+            key = name
+            # a name that a column has already gets a suffix
+            while key in taken:
+                key += " (external)"
+            taken.add(key)
+            rows.append((key, name, f"{name} (external)", Kind.EXTERNAL, ""))
+        return pd.DataFrame(rows, columns=["key", "name", "head", "kind", "learning"]).set_index("key")
+
+    def external_of(self, dataset: str) -> pd.DataFrame:
+        """Those of the external :attr:`methods` that tables of a dataset show.
+
+        A method with files for other datasets only is not shown. A method without any file is, to show the problem.
+        """
+        every = self.methods[self.methods["kind"] == Kind.EXTERNAL]
+
+        def is_shown(method: str) -> bool:
+            pairs = [pair for pair in self.plan.pairs if self.problem(pair[0], pair[1:], method) != NO_FILE]
+            return dataset in {one for one, _ in pairs or self.plan.pairs}
+
+        return every[every["name"].map(is_shown).astype(bool)]
 
     @cached_property
     def maps(self) -> pd.DataFrame:
@@ -179,14 +188,6 @@ class Runs:
         found = self.methods[["name", "kind"]].itertuples(index=False)
         told = [self.problem(dataset, scenes, name) if kind == EXTERNAL else "" for name, kind in found]
         return pd.Series(told, self.methods.index, dtype=object)
-
-    def has_column(self, dataset: str, method: str) -> bool:
-        """Whether an external method has a column on a dataset's page.
-
-        A method with files for other datasets only has none. A method without any file has one, to show the problem.
-        """
-        with_file = {one for one, scene in self.plan.pairs if self.problem(one, [scene], method) != NO_FILE}
-        return dataset in with_file or (not with_file and dataset in self.plan.scenes)
 
 
 def weighted_means(values: pd.DataFrame, pixels: pd.Series, by: Any) -> pd.DataFrame:
