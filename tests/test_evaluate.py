@@ -16,7 +16,7 @@ from sepi.errors import SepiError
 from sepi.evaluate import command, evaluation_of, evaluations_of
 from sepi.io.hdf5 import read_with_truth, write_light_field, write_stage
 from sepi.io.images import write_png
-from sepi.io.scores import read_evaluations, read_reliability, read_scores
+from sepi.io.scores import read_evaluations
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.unknown import unknown_pixels
 from sepi.scenes import render, write_hci
@@ -164,13 +164,13 @@ def test_command_writes_what_evaluate_finds(tmp_path: Path) -> None:
     maps = {"sepi": noisy(ground_truth, 6), "sepi/half_sepi": noisy(ground_truth, 7)}
     light_field = scene(ground_truth)
     path, _ = run_command(tmp_path, light_field, maps)
-    written, back = read_scores(path), read_evaluations(path)
+    written, back = read_evaluations(path, with_maps=False), read_evaluations(path)
     assert list(written) == list(back) == list(maps)
     for name, estimate in maps.items():
-        assert set(written[name]) == {"paper", "benchmark"}
+        assert set(written[name].scores) == {"paper", "benchmark"}
         for protocol, cells in evaluation_of(light_field, estimate).scores.items():
             for region, scores in cells.items():
-                assert written[name][protocol][region] == pytest.approx(scores, nan_ok=True)
+                assert written[name].scores[protocol][region] == pytest.approx(scores, nan_ok=True)
         found = back[name]
         np.testing.assert_array_equal(found.error, estimate - ground_truth)
         assert found.region_sources == dict.fromkeys(["occluded", "textureless", "discontinuities"], "computed")
@@ -199,15 +199,16 @@ def test_command_scores_error_bars_as_users_get_them(tmp_path: Path) -> None:
     pixels, said, found = final.reliability
     assert (pixels[0], pixels[7]) == (unknown.sum(), (~unknown).sum())
     assert (said[0], said[7], found[0], found[7]) == (0, 0.75, 0, 0)
-    np.testing.assert_array_equal(read_reliability(path, ["sepi", "sepi/none"])["sepi/none"], final.reliability)
-    assert list(read_reliability(path, ["sepi", "sepi/none"])) == ["sepi/none"]
+    alone = read_evaluations(path, ["sepi/none"], with_maps=False)["sepi/none"]
+    np.testing.assert_array_equal(alone.reliability, final.reliability)
+    assert (alone.scores, alone.error, alone.regions) == (final.scores, None, {})
 
 
 def test_command_says_that_there_is_no_truth(tmp_path: Path) -> None:
     """A real picture goes through the workflow: a file is written, without scores."""
     path, told = run_command(tmp_path, scene(None), {"sepi": np.zeros((40, 40), np.float32)})
     assert "no ground truth, no scores" in told
-    assert read_scores(path) == {"sepi": {}}
+    assert read_evaluations(path)["sepi"].scores == {}
     assert read_evaluations(path)["sepi"].error is None
     with h5py.File(path) as file:
         assert not file.attrs["ground_truth"]

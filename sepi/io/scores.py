@@ -113,8 +113,17 @@ def write_scores(path: Path, maps: Mapping[str, Evaluation], attributes: Mapping
             shared = shared or dict(members(group.get("regions", {})))
 
 
-def read_scores(path: Path, names: Collection[str] | None = None) -> dict[str, AllScores]:
-    """Map to protocol to region to scores, for ``names`` or all maps; no protocols without ground truth.
+def read_evaluations(
+    path: Path, names: Collection[str] | None = None, *, with_maps: bool = True
+) -> dict[str, Evaluation]:
+    """Evaluations of these maps, or of all maps in a score file.
+
+    Parameters
+    ----------
+    path : Path
+    names : collection of str, optional
+    with_maps : bool
+        False: scores and reliability alone, without errors and regions.
 
     Raises
     ------
@@ -122,32 +131,7 @@ def read_scores(path: Path, names: Collection[str] | None = None) -> dict[str, A
         If the file is missing, not a score file, or lacks one of the maps.
     """
     with open_hdf5(path, _KIND) as file:
-        return {name: scores_in(group) for name, group in _groups(path, file, names).items()}
-
-
-def read_reliability(path: Path, names: Collection[str]) -> dict[str, npt.NDArray[np.float64]]:
-    """Reliability of those of these maps that have error bars.
-
-    Raises
-    ------
-    SepiError
-        As :func:`read_scores`.
-    """
-    with open_hdf5(path, _KIND) as file:
-        found = {name: group.get(_RELIABILITY) for name, group in _groups(path, file, names).items()}
-        return {name: read_dataset(path, values) for name, values in found.items() if values is not None}
-
-
-def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[str, Evaluation]:
-    """Evaluations of these maps, or of all maps in a score file.
-
-    Raises
-    ------
-    SepiError
-        As :func:`read_scores`.
-    """
-    with open_hdf5(path, _KIND) as file:
-        return {name: evaluation_in(group) for name, group in _groups(path, file, names).items()}
+        return {name: evaluation_in(group, with_maps=with_maps) for name, group in _groups(path, file, names).items()}
 
 
 def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
@@ -163,21 +147,13 @@ def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
         put(group, f"regions/{name}", mask, source=evaluation.region_sources[name])
 
 
-def scores_in(group: h5py.Group) -> AllScores:
-    """Protocol to region to scores, as :func:`put_evaluation` wrote them."""
-    if _SCORES not in group:
-        return {}
-    found = json.loads(read_dataset(Path(group.file.filename), group[_SCORES]).tobytes())
-    return {protocol: {region: dict(cell) for region, cell in regions.items()} for protocol, regions in found.items()}
-
-
-def evaluation_in(group: h5py.Group) -> Evaluation:
-    """Evaluation that :func:`put_evaluation` wrote."""
+def evaluation_in(group: h5py.Group, *, with_maps: bool = True) -> Evaluation:
+    """Evaluation that :func:`put_evaluation` wrote, with or without errors and regions."""
     path = Path(group.file.filename)
-    regions = members(group.get("regions", {}))
+    regions = members(group.get("regions", {}) if with_maps else {})
     return Evaluation(
-        scores=scores_in(group),
-        error=read_dataset(path, group["error"]).astype(np.float32) if "error" in group else None,
+        scores=json.loads(read_dataset(path, group[_SCORES]).tobytes()) if _SCORES in group else {},
+        error=read_dataset(path, group["error"]).astype(np.float32) if with_maps and "error" in group else None,
         regions={name: read_dataset(path, mask).astype(bool) for name, mask in regions},
         region_sources={name: str(attribute(mask, "source")) for name, mask in regions},
         reliability=read_dataset(path, group[_RELIABILITY]) if _RELIABILITY in group else None,
@@ -289,7 +265,7 @@ def read_external(path: Path, *, with_maps: bool = True) -> dict[str, ExternalMa
             name: ExternalMap(
                 **{key: str(attribute(group, key)) for key in _ATTRIBUTES},
                 disparity=float_maps(path, group).get("disparity") if with_maps else None,
-                evaluation=evaluation_in(group) if with_maps else Evaluation(scores_in(group)),
+                evaluation=evaluation_in(group, with_maps=with_maps),
             )
             for name, group in members(file[_METHODS])
         }

@@ -125,9 +125,10 @@ def stage_times(runs: Runs) -> pd.DataFrame:
     DataFrame
         Rows ``(scene, variant)``, columns ``(score, stage)``.
     """
-    every = itertools.product(runs.plan.pairs, runs.plan.compared)
-    times = {("/".join(pair), variant): runs.took(pair, variant).fillna(0.0).unstack() for pair, variant in every}
-    return pd.DataFrame(times).T
+    rows = [(*pair, variant) for pair in runs.plan.pairs for variant in runs.plan.compared]
+    columns = pd.MultiIndex.from_product([runs.times.columns, runs.plan.stages])
+    found = runs.times.unstack("stage").reindex(index=rows, columns=columns).fillna(0.0)
+    return found.set_axis(pd.MultiIndex.from_tuples([("/".join(pair), variant) for *pair, variant in rows]))
 
 
 def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:

@@ -27,8 +27,6 @@ from sepi.io.scores import (
     Scores,
     read_evaluations,
     read_external,
-    read_reliability,
-    read_scores,
     without_nan,
 )
 from sepi.report.plan import PARTS, Plan
@@ -73,6 +71,9 @@ def _quarters(evaluations: Iterable[Evaluation]) -> Iterator[tuple[str, float]]:
         known, place = np.concatenate(parts), counts[region] // 4
         yield region, 100 * float(np.partition(known, place)[place]) if place < known.size else float("nan")
 
+
+# of each tenth of a confidence
+_SAID = "pixels", "said", "found"
 
 _Number = tuple[str, str, str, str, str, str, str, str, float]
 """A row of :attr:`sepi.report.runs.Runs.numbers`."""
@@ -189,12 +190,12 @@ def _scores_of_scene(plan: Plan, dataset: str, scene: str) -> Iterator[_Number]:
     """Scores of a scene's maps."""
     path = plan.scores_file(dataset, scene)
     keys = dict.fromkeys(itertools.starmap(plan.stage_key, itertools.product(plan.variants, plan.scored_stages)))
-    scores, reliability = read_scores(path, keys), read_reliability(path, keys)
+    known = read_evaluations(path, keys, with_maps=False)
     for variant, stage in itertools.product(plan.variants, plan.stages):
         about = (dataset, scene, variant, stage, plan.variants[variant][stage])
-        key = plan.stage_key(variant, stage)
-        yield from ((*about, *score) for score in _scores(scores.get(key, {})))
-        for name, values in zip(("pixels", "said", "found"), reliability.get(key, ()), strict=False):
+        found = known.get(plan.stage_key(variant, stage), Evaluation())
+        yield from ((*about, *score) for score in _scores(found.scores))
+        for name, values in () if found.reliability is None else zip(_SAID, found.reliability, strict=True):
             yield from ((*about, TENTHS, str(tenth), name, float(value)) for tenth, value in enumerate(values))
     for method, external in _external(plan, dataset, scene).items():
         about = (dataset, scene, method, EXTERNAL, "")

@@ -168,8 +168,10 @@ def _rows(runs: Runs, variant: str) -> pd.DataFrame:
     found = found.set_index(["dataset", "scene"]).loc[runs.scored_pairs].reset_index()
     found = found[["dataset", "scene", "region", "pixels", *ERROR_BAR_SCORES]]
     found["title"] = found["dataset"] + "/" + found["scene"]
-    noise = found["scene"].map(lambda scene: f", noise {rendered_scene(scene).noise}")
-    levels = "all scenes" + noise.where(found["dataset"] == DATASET, "")
+    levels = [
+        f"all scenes, noise {rendered_scene(scene).noise}" if dataset == DATASET else "all scenes"
+        for dataset, scene in zip(found["dataset"], found["scene"], strict=True)
+    ]
     parts = [found]
     for level, of_level in found.groupby(levels, sort=False):
         pairs = list(dict.fromkeys(zip(of_level["dataset"], of_level["scene"], strict=True)))

@@ -156,15 +156,15 @@ class Runs:
         known = set(self.final.index.droplevel(["method", "region"]))
         return [pair for pair in self.plan.pairs if pair in known]
 
-    def took(self, pair: tuple[str, str], variant: str) -> pd.DataFrame:
-        """Seconds and peak memory, MB, of a variant's stages; NaN for those that are switched off."""
-        every = pd.MultiIndex.from_product([[pair[0]], [pair[1]], [variant], self.plan.stages])
-        return self.times.reindex(every).set_axis(self.plan.stages)
-
     @cached_property
     def times(self) -> pd.DataFrame:
         """Seconds and peak memory, MB, of stages that are switched on; rows ``(dataset, scene, variant, stage)``."""
         return self.maps[["seconds", "peak_memory_mb"]].dropna().droplevel(["choice", "protocol", "region"])
+
+    @cached_property
+    def totals(self) -> pd.DataFrame:
+        """Seconds of all stages, and the largest peak memory; rows ``(dataset, scene, variant)``."""
+        return self.times.groupby(level=KEYS[:3]).agg({"seconds": "sum", "peak_memory_mb": "max"})
 
     def reliability(self, variant: str, pairs: Sequence[tuple[str, str]]) -> Reliability:
         """Reliability of a variant's confidence over the pixels of several scenes together."""

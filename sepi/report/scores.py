@@ -92,12 +92,7 @@ def _variant_rows(runs: Runs, pair: tuple[str, str]) -> pd.DataFrame:
         theirs = table().reindex(index=[place], columns=counterparts).iloc[0].to_numpy()
         found[f"{score}_published"] = shown(pd.DataFrame(theirs))[0].to_list()
         found[f"{score}_ratio"] = (found[score] / theirs).astype(object).where(~np.isnan(theirs), "")
-    took = [runs.took(pair, variant) for variant in variants]
-    return found.assign(
-        **{region: scores["mse100", region] for region in _PARTS},
-        seconds=[one["seconds"].sum() for one in took],
-        peak_memory_mb=[one["peak_memory_mb"].max() for one in took],
-    )
+    return found.assign(**{region: scores["mse100", region] for region in _PARTS}, **runs.totals.loc[pair])
 
 
 _EDGES = {
@@ -215,8 +210,7 @@ def runtime_table(runs: Runs) -> Table:
     steps = [*plan.stages, "total"]
     heads = {"variant": Head("variant", Kind.TEXT), **{step: Head(f"{step} / s") for step in steps}}
     heads |= {"ratio": Head("published / this code", Kind.RATIO), "peak_memory_mb": Head("peak memory / MB")}
-    totals = runs.times.groupby(level=KEYS[:3]).agg({"seconds": "sum", "peak_memory_mb": "max"})
-    times = pd.concat([runs.times, totals.assign(stage="total").set_index("stage", append=True)])
+    times = pd.concat([runs.times, runs.totals.assign(stage="total").set_index("stage", append=True)])
     index = [(*pair, variant, step) for pair in plan.pairs for variant in plan.variants for step in steps]
     rows = times.reindex(pd.MultiIndex.from_tuples(index, names=KEYS[:4])).reset_index()
     # published seconds belong to the paper's method only, and to light fields of one size

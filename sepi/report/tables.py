@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from sepi.report.numbers import collect, write_numbers
 from sepi.report.plan import Plan
 from sepi.report.properties import error_bar_table, property_table
 from sepi.report.properties import scene_table as rendered_scene_table
-from sepi.report.runs import Runs, read_json, read_numbers
+from sepi.report.runs import Runs, read_numbers
 from sepi.report.scores import computed_methods_table, edge_table, parts_table, runtime_table, stage_table
 from sepi.report.table import Table, as_csv, as_latex, as_markdown
 
@@ -65,8 +64,7 @@ def write_tables(runs: Runs, folder: Path) -> None:
 @click.option("--charts", "figures", type=PATH, required=True, help="Folder for the charts, if the report has any.")
 def command(results: Path, path: Path, output: Path, folder: Path, figures: Path) -> None:
     """Write all numbers of a report, its tables, and its charts."""
-    told = read_json(path, {"scenes", "variants"}, "the plan of a report", "snakemake")
-    write_numbers(collect(Plan.from_json(results, json.dumps(told))), output)
+    write_numbers(collect(Plan.from_json(results, path.read_text(encoding="utf-8"))), output)
     # as a page reads them
     runs = read_numbers(output)
     write_tables(runs, folder)

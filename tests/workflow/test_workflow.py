@@ -40,7 +40,7 @@ from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import read_attributes, read_stage
 from sepi.io.images import write_png
 from sepi.io.result_folder import read_result
-from sepi.io.scores import Evaluation, read_scores, write_scores
+from sepi.io.scores import Evaluation, read_evaluations, write_scores
 from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field
 from sepi.report.plan import TABLES
@@ -299,7 +299,7 @@ class TestRerun:
             hci_root=None, variants=variants, light_fields={"box": entry}
         )
         # what an earlier file says is nothing to go by
-        before = read_scores(scene / "scores.h5")
+        before = read_evaluations(scene / "scores.h5")
         write_scores(
             scene / "scores.h5", {name: Evaluation({"paper": {"all": {"mse100": 7.0}}}) for name in before}, {}
         )
@@ -311,7 +311,7 @@ class TestRerun:
         assert (attributes["choice"], json.loads(attributes["parameters"])["alpha"]) == ("wls", 1e-5)
         assert list(scene.glob("scores*")) == [scene / "scores.h5"]
         disparity = read_stage(scene / "stages/sepi/half_sepi/lti/wls/optimize.h5").disparity[10:]
-        whole = read_scores(scene / "scores.h5")["sepi/half_sepi/lti/wls"]["paper"]["all"]
+        whole = read_evaluations(scene / "scores.h5")["sepi/half_sepi/lti/wls"].scores["paper"]["all"]
         assert whole["pixels"] == disparity.size
         assert whole["badpix_0.25"] == pytest.approx(100 * (np.abs(disparity - 0.5) > 0.25).mean())
         assert run.plan(*targets) == {}
