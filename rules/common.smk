@@ -205,19 +205,9 @@ def result_files(variants, scenes=REPORTS[""].pairs):
     ]
 
 
-def plan_of(which):
-    """Plan of a file of numbers or scores."""
-    return PLANS[which.removeprefix("_")]
-
-
-def report_of(wildcards):
-    """Plan of the report that the wildcards name."""
-    return REPORTS[wildcards.report.removesuffix("/")]
-
-
-def scored_maps(wildcards):
-    """Stage files whose maps go into a score file."""
-    return plan_of(wildcards.which).scored_files(wildcards.dataset, wildcards.scene)
+def plan_of(wildcards):
+    """Plan of the report that the wildcards name, by the ending of a file or by a folder."""
+    return PLANS[(wildcards.get("which") or wildcards.get("report", "")).strip("_/")]
 
 
 def files_of(stage):

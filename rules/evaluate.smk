@@ -5,7 +5,7 @@ rule evaluate:
     input:
         light_field=SCENE.light_field,
         truth=SCENE.truth,
-        maps=scored_maps,
+        maps=lambda wildcards: plan_of(wildcards).scored_files(wildcards.dataset, wildcards.scene),
     output:
         scores=SCENE.scores("{which}"),
     log:

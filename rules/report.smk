@@ -13,7 +13,7 @@ rule plan:
     localrule: True
     params:
         # functions, so that braces in names are not wildcards
-        text=lambda wildcards: plan_of(wildcards.which).to_json(),
+        text=lambda wildcards: plan_of(wildcards).to_json(),
     message:
         "plan of the report"
     template_engine:
@@ -63,9 +63,9 @@ for plan in PLANS.values():
 # all on a sheet (overview); the method at single pixels (pixels); and the scene for the page.
 rule maps:
     input:
-        lambda wildcards: report_of(wildcards).map_inputs(wildcards.dataset, wildcards.scene),
+        lambda wildcards: plan_of(wildcards).map_inputs(wildcards.dataset, wildcards.scene),
     output:
-        **page_of_scene(),
+        **({"page": "reports/{report}page/{dataset}/{scene}.json"} if SETTINGS.has_page else {}),
         folder=report(
             directory("reports/{report}maps/{dataset}/{scene}"),
             patterns=["{name,overview}.png"],
@@ -85,8 +85,8 @@ rule maps:
     params:
         results=placed(RESULTS),
         plan=plan_of_scene,
-        pixels=pixels_of,
-        page=page_flags,
+        pixels=lambda wildcards: json.dumps(SETTINGS.report.pixels.get(f"{wildcards.dataset}/{wildcards.scene}", [])),
+        page=lambda wildcards, output: ["--page", output.page] if SETTINGS.has_page else [],
         code=lambda wildcards: code_digest("sepi.report.figures", *added("scenes").values()),
     message:
         "{wildcards.dataset}/{wildcards.scene}: images"

@@ -59,31 +59,14 @@ def every_file():
     return [*all_files(), *ablation_files(), *(file for name in REPORTS if name for file in report_files(name))]
 
 
-def page_of_scene():
-    """The page's file for a scene, as an output of the rule that draws its images; empty without a page."""
-    return {"page": "reports/{report}page/{dataset}/{scene}.json"} if SETTINGS.has_page else {}
-
-
-def page_flags(wildcards, output):
-    """The page's file for a scene, as flags of the command that draws its images."""
-    return ["--page", output.page] if SETTINGS.has_page else []
-
-
 def pages_of_scenes(wildcards):
     """Inputs of a page: a file for each scene."""
-    return [
-        f"reports/{wildcards.report}page/{dataset}/{scene}.json" for dataset, scene in report_of(wildcards).pictured
-    ]
+    return [f"reports/{wildcards.report}page/{dataset}/{scene}.json" for dataset, scene in plan_of(wildcards).pictured]
 
 
 def plan_of_scene(wildcards):
     """Plan for one scene, so that a change of other scenes in the configuration does not redraw it."""
-    return replace(report_of(wildcards), scenes={wildcards.dataset: [wildcards.scene]}).to_json()
-
-
-def pixels_of(wildcards):
-    """Pixels of a scene that the configuration asks for, as JSON."""
-    return json.dumps(SETTINGS.report.pixels.get(f"{wildcards.dataset}/{wildcards.scene}", []))
+    return replace(plan_of(wildcards), scenes={wildcards.dataset: [wildcards.scene]}).to_json()
 
 
 def external_inputs(wildcards):
@@ -95,8 +78,3 @@ def external_inputs(wildcards):
 def folder_of_output(wildcards, output):
     """Folder of a job's outputs."""
     return os.path.dirname(output[0])
-
-
-def folder_of_scenes(wildcards, output):
-    """Folder beside a page with a file for each scene."""
-    return os.path.join(os.path.dirname(output[0]), "page")
