@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from sepi.io.files import atomic_path
+from sepi.io.files import write_whole
 from sepi.io.hdf5 import read_with_truth
 from sepi.io.scores import (
     Evaluation,
@@ -132,12 +132,8 @@ def collect(plan: Plan) -> Runs:
 
 def write_numbers(runs: Runs, path: Path) -> None:
     """Write the facts to this JSON file, and the numbers to the CSV file beside it."""
-    for file, text in (
-        (path.with_suffix(".csv"), runs.numbers.to_csv(index=False, na_rep="nan", lineterminator="\n")),
-        (path, json.dumps(runs.facts, indent=1, allow_nan=False, ensure_ascii=False) + "\n"),
-    ):
-        with atomic_path(file) as temporary:
-            temporary.write_text(text, encoding="utf-8", newline="\n")
+    write_whole(path.with_suffix(".csv"), runs.numbers.to_csv(index=False, na_rep="nan", lineterminator="\n"))
+    write_whole(path, json.dumps(runs.facts, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def _timing(plan: Plan, dataset: str, scene: str, variant: str, stage: str) -> dict[str, Any]:

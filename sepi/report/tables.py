@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from sepi.io.files import atomic_path
+from sepi.io.files import write_whole
 from sepi.process.command import PATH, SepiCommand
 from sepi.report import published
 from sepi.report.comparison import ablation_table, region_table, scene_table
@@ -52,8 +52,7 @@ def write_tables(runs: Runs, folder: Path) -> None:
     for name in runs.plan.tables:
         found = table(name, runs)
         for ending, text in (("csv", as_csv(found)), ("md", as_markdown(found)), ("tex", as_latex(found, name))):
-            with atomic_path(folder / f"{name}.{ending}") as temporary:
-                temporary.write_text(text, encoding="utf-8", newline="\n")
+            write_whole(folder / f"{name}.{ending}", text)
 
 
 @click.command(name="python -m sepi.report.tables", cls=SepiCommand)

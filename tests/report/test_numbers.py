@@ -101,7 +101,7 @@ def test_a_stage_that_hands_its_maps_on_has_scores_and_no_time(found: Runs) -> N
         for stage in ("initial", "occlusion")
     )
     pd.testing.assert_frame_equal(handed_on, before)
-    took = found.times["seconds"].loc["hci", "cotton", "no_occlusion"]
+    took = found.times.sort_index().loc[("hci", "cotton", "no_occlusion"), "seconds"]
     assert [*took.reindex(found.plan.stages, fill_value=0)] == [1.5, 0, 1.5, 1.5]
 
 

@@ -15,7 +15,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from matplotlib.colors import Colormap
 
-from sepi.io.files import atomic_path
+from sepi.io.files import write_whole
 from sepi.process.command import SepiCommand
 from sepi.report import charts, published
 from sepi.report.pictures import error_scale, scale_colours
@@ -207,8 +207,7 @@ def command(numbers_path: Path, parts_path: Path | None, output: Path, scenes: P
         [read_scene(scenes / dataset / f"{scene}.json") for dataset, scene in runs.plan.pictured],
         None if parts_path is None else read_numbers(parts_path),
     )
-    with atomic_path(output) as temporary:
-        temporary.write_text(html, encoding="utf-8")
+    write_whole(output, html)
 
 
 if __name__ == "__main__":
