@@ -140,7 +140,7 @@ def _timing(plan: Plan, dataset: str, scene: str, variant: str, stage: str) -> d
     """Time and memory of a stage, its machine and its parameters."""
     path = plan.stage_file(dataset, scene, variant, stage, "time.json")
     keys = {"seconds", "peak_memory_mb", "machine", "parameters"}
-    return read_json(path, keys, "the time of a stage", f"sepi.{stage}")
+    return read_json(path, keys, f"time of a stage (written by python -m sepi.{stage})")
 
 
 def _facts(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:

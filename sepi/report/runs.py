@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from sepi.errors import SepiError
 from sepi.external import NO_FILE
+from sepi.io.files import reading
 from sepi.report import published
 from sepi.report.plan import MAIN_VARIANT, Plan
 from sepi.report.table import Kind
@@ -190,6 +190,9 @@ class Runs:
         return pd.Series(told, self.methods.index, dtype=object)
 
 
+_KIND = "file of a report's numbers (written by python -m sepi.report.tables)"
+
+
 def weighted_means(values: pd.DataFrame, pixels: pd.Series, by: Any) -> pd.DataFrame:
     """Means over the pixels of several maps, with their number in the column ``pixels``; NaN over none."""
     sums = values.mul(pixels, axis=0)[pixels > 0].groupby(by, sort=False).agg(lambda column: column.sum(skipna=False))
@@ -205,32 +208,23 @@ def read_numbers(path: Path) -> Runs:
     SepiError
         If a file is missing or has other contents.
     """
-    facts = read_json(path, {"plan", "scenes"}, "the numbers of a report", "sepi.report.numbers")
-    table = path.with_suffix(".csv")
-    try:
+    facts, table = read_json(path, {"plan", "scenes"}, _KIND), path.with_suffix(".csv")
+    with reading(table, _KIND):
         kinds = dict.fromkeys([*KEYS, "score"], str) | {"value": float}
         numbers = pd.read_csv(table, usecols=[*kinds], dtype=kinds, keep_default_na=False, na_values={"value": ["nan"]})
-    except OSError as error:
-        raise SepiError(f"{table}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
-        raise SepiError(f"{table}: not the numbers of a report, which python -m sepi.report.tables writes") from error
     return Runs(facts, numbers)
 
 
-def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, Any]:
-    """The JSON object in a file of ``module``; messages call it ``what``.
+def read_json(path: Path, keys: set[str], kind: str) -> dict[str, Any]:
+    """The JSON object in a file of this kind.
 
     Raises
     ------
     SepiError
         If the file is missing or lacks one of the keys.
     """
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, RecursionError) as error:
-        raise SepiError(f"{path}: not JSON ({error}); expected what python -m {module} writes") from error
-    if not isinstance(found, dict) or not keys <= found.keys():
-        raise SepiError(f"{path}: not {what}, which python -m {module} writes")
+    with reading(path, kind):
+        found = dict(json.loads(path.read_text(encoding="utf-8")))
+        if not keys <= found.keys():
+            raise ValueError(f"without {', '.join(sorted(keys - found.keys()))}")
     return found

@@ -188,7 +188,8 @@ def read_scene(path: Path) -> dict[str, Any]:
     SepiError
         If the file is missing or has other contents.
     """
-    return read_json(path, {"dataset", "scene", "panels", "arrays"}, "a scene of a report", "sepi.report.figures")
+    kind = "scene of a report (written by python -m sepi.report.figures)"
+    return read_json(path, {"dataset", "scene", "panels", "arrays"}, kind)
 
 
 _FILE = click.Path(path_type=Path)
