@@ -46,7 +46,7 @@ rule all:
 # The files that `all` makes of every scene. Scenes are independent here, so `--batch scenes=1/10` plans a tenth of them
 rule scenes:
     input:
-        [SCENE_COMPLETE.format(dataset=dataset, scene=scene) for dataset, scene in SETTINGS.scenes],
+        [SCENE_COMPLETE.format(dataset=dataset, scene=scene) for dataset, scene in PLAN.pairs],
     message:
         "all scenes are made"
 

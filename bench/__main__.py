@@ -17,7 +17,7 @@ from bench.noisy import DIGITS
 from bench.scene import Scene
 from sepi.error_bars.cues import FLOORS
 from sepi.errors import SepiError
-from sepi.io.files import atomic_path
+from sepi.io.files import write_whole
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
 from sepi.process.command import SepiGroup
 from sepi.process.machine import this_machine
@@ -80,8 +80,7 @@ def run(scene: str, repeats: int, threads: int | None, groups: tuple[str, ...], 
         found, failed = _all_measured([case for name in chosen for case in GROUPS[name](files)], repeats, threads)
     result = Result(this_machine(), settings, tuple(found))
     for name, text in (("bench.json", result.as_json()), ("bench.md", tables.page(result))):
-        with atomic_path(output / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        write_whole(output / name, text)
     plot.write(result, output / "bench.png")
     click.echo(f"written to {output}/: bench.json bench.md bench.png")
     if failed:

@@ -54,7 +54,7 @@ def fitted(samples: Sequence[Sample], form: Calibration, only: Collection[str] =
 
     Of cues ``only``, the powers alone are fitted, from 0 up: where these have their least values, nothing changes.
     """
-    names = [list(part) for part in form.parts]
+    names = [list(part) for part in form]
     columns = [np.concatenate([_columns(one, part) for one in samples]) for part in names]
     middle, spread = _scaling(columns, names, only)
     designs = [(column - m) / s for column, m, s in zip(columns, middle, spread, strict=True)]
@@ -70,7 +70,7 @@ def fitted(samples: Sequence[Sample], form: Calibration, only: Collection[str] =
     ]
     bounds: list[tuple[float | None, float | None]] = [(None, None)] * sum(map(len, names))
     if only:
-        start = [np.array(list(part.values())) * s for part, s in zip(form.parts, spread, strict=True)]
+        start = [np.array(list(part.values())) * s for part, s in zip(form, spread, strict=True)]
         for values, m, s, part in zip(start, middle, spread, names, strict=True):
             values[0] += values[1:] @ (m / s)[1:]
             values[[label in only for label in part]] = 0

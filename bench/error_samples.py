@@ -15,7 +15,7 @@ import numpy.typing as npt
 from bench.noisy import few_views, with_noise
 from bench.streets import street
 from bench.sweep import scene_for_choosing
-from sepi.error_bars.bars import ErrorBars, error_bars
+from sepi.error_bars.bars import error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
 from sepi.extensions.rendered.exposure import read_scene
 from sepi.io.hdf5 import has_dataset
@@ -112,7 +112,7 @@ def sample(light_field: LightField, name: str, variant: str, step: float = 0.0, 
 def _computed(light_field: LightField, variant: str, factor: float) -> tuple[Any, dict[str, Any]]:
     told: dict[str, Any] = {}
 
-    def listened(disparity: Any, cues: Any, known: Any, calibration: Calibration) -> ErrorBars:
+    def listened(disparity: Any, cues: Any, known: Any, calibration: Calibration) -> dict[str, Any]:
         told.update(cues, disparity=disparity)
         return error_bars(disparity, cues, known, calibration)
 

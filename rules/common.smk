@@ -141,11 +141,34 @@ wildcard_constraints:
     report="|".join(name and f"{name}/" for name in REPORTS),
 
 
-def stage_output(stage, ending):
-    """Pattern of a stage's output for every choice, except the one that hands maps on and has no job."""
+def stage_input(stage):
+    """Inputs of a stage's rule: light field, the file of the last stage that ran before, and files of the choice."""
+    before = list(STAGES)[: list(STAGES).index(stage)]
+
+    def previous(wildcards):
+        labels = {name: wildcards[name] for name in before}
+        return scene_files(wildcards.dataset, wildcards.scene).stage(labels, before[-1])
+
+    return {"light_field": SCENE.light_field, "files": files_of(stage), **({"previous": previous} if before else {})}
+
+
+def stage_output(stage):
+    """Outputs of a stage's rule, for every choice except the one that hands maps on and has no job."""
     known = {name: "|".join(map(re.escape, found)) for name, found in SETTINGS.parameters.items()}
     known[stage] = "|".join(re.escape(label) for label in SETTINGS.parameters[stage] if label != HANDED_ON)
-    return SCENE.stage({name: f"{{{name},{labels}}}" for name, labels in known.items()}, stage, ending)
+    patterns = {name: f"{{{name},{labels}}}" for name, labels in known.items()}
+    return {"maps": SCENE.stage(patterns, stage), "timing": SCENE.stage(patterns, stage, "time.json")}
+
+
+def stage_params(stage):
+    """Parameters of a stage's rule, as functions of wildcards: a change of one of them runs the job again."""
+    known = {label: SETTINGS.parameters_json(stage, label) for label in SETTINGS.parameters[stage]}
+    return {
+        "choice": lambda wildcards: choice_of(wildcards[stage]),
+        "parameters": lambda wildcards: known[wildcards[stage]],
+        "dates": dates_of(files_of(stage)),
+        "code": lambda wildcards: code_digest(*stage_modules(stage, STAGES[stage][choice_of(wildcards[stage])])),
+    }
 
 
 def stage_log(folder, stage, ending):
@@ -166,17 +189,6 @@ STAGE_FLAGS = (
 )
 
 
-def file_before(stage):
-    """Function of wildcards: the stage file that a stage reads, of the last stage that ran before it."""
-    before = list(STAGES)[: list(STAGES).index(stage)]
-
-    def file(wildcards):
-        labels = {name: wildcards[name] for name in before}
-        return scene_files(wildcards.dataset, wildcards.scene).stage(labels, before[-1])
-
-    return file
-
-
 def final_file(wildcards):
     """Stage file with the final maps of a variant."""
     require_known("variant", [wildcards.variant], SETTINGS.variants)
@@ -193,35 +205,9 @@ def result_files(variants, scenes=REPORTS[""].pairs):
     ]
 
 
-def plan_of(which):
-    """Plan of a file of numbers or scores."""
-    return PLANS[which.removeprefix("_")]
-
-
-def report_of(wildcards):
-    """Plan of the report that the wildcards name."""
-    return REPORTS[wildcards.report.removesuffix("/")]
-
-
-def scored_maps(wildcards):
-    """Stage files whose maps go into a score file."""
-    return plan_of(wildcards.which).scored_files(wildcards.dataset, wildcards.scene)
-
-
-def choice_for(stage):
-    """Function of wildcards: the choice of a stage."""
-    return lambda wildcards: choice_of(wildcards[stage])
-
-
-def parameters_of(stage):
-    """Function of wildcards: the parameters of a stage's choice as JSON; a change of them runs the job again."""
-    known = {label: SETTINGS.parameters_json(stage, label) for label in SETTINGS.parameters[stage]}
-    return lambda wildcards: known[wildcards[stage]]
-
-
-def code_of(stage):
-    """Function of wildcards: the digest of the code that a stage's choice runs."""
-    return lambda wildcards: code_digest(*stage_modules(stage, STAGES[stage][choice_of(wildcards[stage])]))
+def plan_of(wildcards):
+    """Plan of the report that the wildcards name, by the ending of a file or by a folder."""
+    return PLANS[(wildcards.get("which") or wildcards.get("report", "")).strip("_/")]
 
 
 def files_of(stage):

@@ -5,7 +5,7 @@ rule evaluate:
     input:
         light_field=SCENE.light_field,
         truth=SCENE.truth,
-        maps=scored_maps,
+        maps=lambda wildcards: plan_of(wildcards).scored_files(wildcards.dataset, wildcards.scene),
     output:
         scores=SCENE.scores("{which}"),
     log:
@@ -14,7 +14,6 @@ rule evaluate:
         "benchmarks/{dataset}/{scene}/scores{which}.tsv"
     group:
         GROUP
-    threads: 1
     resources:
         mem_mb=lambda wildcards, input, attempt: memory_for(4, 200 + 50 * len(input.maps))(wildcards, attempt),
         runtime=lambda wildcards, input, attempt: minutes_for(0.05, 0.15 * len(input.maps))(wildcards, attempt),

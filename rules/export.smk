@@ -14,7 +14,6 @@ rule export:
         "benchmarks/{dataset}/{scene}/{variant}/export.tsv"
     group:
         GROUP
-    threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=300),
         runtime=minutes_for(0.05),

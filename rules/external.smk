@@ -15,7 +15,6 @@ rule external:
         "benchmarks/{dataset}/{scene}/external.tsv"
     group:
         GROUP
-    threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=200 + 10 * len(SETTINGS.external)),
         runtime=minutes_for(0.05),

@@ -1,11 +1,9 @@
 # Initial depth (paper, section IV-A, Eq. 1-5): for each pixel the candidate at which the views agree best.
 rule initial:
     input:
-        light_field=SCENE.light_field,
-        files=files_of("initial"),
+        **stage_input("initial"),
     output:
-        maps=stage_output("initial", "h5"),
-        timing=stage_output("initial", "time.json"),
+        **stage_output("initial"),
     log:
         stage_log("logs", "initial", "log"),
     benchmark:
@@ -16,10 +14,7 @@ rule initial:
     resources:
         **stage_resources("initial"),
     params:
-        choice=choice_for("initial"),
-        parameters=parameters_of("initial"),
-        dates=dates_of(files_of("initial")),
-        code=code_of("initial"),
+        **stage_params("initial"),
     message:
         stage_message("initial", "initial depth")
     shell:

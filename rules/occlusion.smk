@@ -1,11 +1,9 @@
 # Occluded regions (paper, section IV-B): depth from the views that see a pixel; choice `none` has no job.
 rule occlusion:
     input:
-        light_field=SCENE.light_field,
-        previous=file_before("occlusion"),
+        **stage_input("occlusion"),
     output:
-        maps=stage_output("occlusion", "h5"),
-        timing=stage_output("occlusion", "time.json"),
+        **stage_output("occlusion"),
     log:
         stage_log("logs", "occlusion", "log"),
     benchmark:
@@ -16,9 +14,7 @@ rule occlusion:
     resources:
         **stage_resources("occlusion"),
     params:
-        choice=choice_for("occlusion"),
-        parameters=parameters_of("occlusion"),
-        code=code_of("occlusion"),
+        **stage_params("occlusion"),
     message:
         stage_message("occlusion", "occlusion")
     shell:

@@ -1,11 +1,9 @@
 # Global optimisation (paper, section IV-D, Eq. 8-12) over the whole map; choice `none` has no job.
 rule optimize:
     input:
-        light_field=SCENE.light_field,
-        previous=file_before("optimize"),
+        **stage_input("optimize"),
     output:
-        maps=stage_output("optimize", "h5"),
-        timing=stage_output("optimize", "time.json"),
+        **stage_output("optimize"),
     log:
         stage_log("logs", "optimize", "log"),
     benchmark:
@@ -16,9 +14,7 @@ rule optimize:
     resources:
         **stage_resources("optimize"),
     params:
-        choice=choice_for("optimize"),
-        parameters=parameters_of("optimize"),
-        code=code_of("optimize"),
+        **stage_params("optimize"),
     message:
         stage_message("optimize", "global optimisation")
     shell:

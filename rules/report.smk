@@ -13,7 +13,7 @@ rule plan:
     localrule: True
     params:
         # functions, so that braces in names are not wildcards
-        text=lambda wildcards: plan_of(wildcards.which).to_json(),
+        text=lambda wildcards: plan_of(wildcards).to_json(),
     message:
         "plan of the report"
     template_engine:
@@ -22,40 +22,40 @@ rule plan:
 
 # All numbers of a report in one table with facts about the scenes beside it, and what is made of them alone: tables,
 # and charts in print quality. The parts of variant best have files of their own, since `all` does not run those variants.
-for which, (_, plan) in NUMBERS.items():
+for plan in PLANS.values():
+    scenes_of_plan = [SETTINGS.scene(*pair) for pair in plan.pairs]
 
     rule:
         name:
-            f"numbers{which}"
+            f"numbers{plan.ending}"
         input:
-            plan=f"reports/page/plan{which}.json",
-            measured=measured_files(which),
+            plan=f"reports/page/plan{plan.ending}.json",
+            measured=lambda wildcards, plan=plan: plan.number_inputs(),
             published=sorted(PUBLISHED.glob("*.csv")),
         output:
-            report(table_files(which, ["csv"]), caption="captions/tables.rst", category="Tables"),
-            table_files(which, ["md", "tex"]),
+            report(table_files(plan, ["csv"]), caption="captions/tables.rst", category="Tables"),
+            table_files(plan, ["md", "tex"]),
             charts=[file for name in plan.charts for file in as_chart(name)],
-            numbers=multiext(f"reports/report{which}", ".json", ".csv"),
+            numbers=number_files(plan),
         log:
-            f"logs/report{which}.log",
+            f"logs/report{plan.ending}.log",
         benchmark:
-            f"benchmarks/report{which}.tsv"
-        threads: 1
+            f"benchmarks/report{plan.ending}.tsv"
         resources:
             # light fields are read one by one
-            mem_mb=600 + max((scene.samples for scene in scenes_of(which)), default=0) * 8 // 2**20,
-            runtime=5 + sum(scene.minutes(0.1) for scene in scenes_of(which)) // 5,
+            mem_mb=600 + max((scene.samples for scene in scenes_of_plan), default=0) * 8 // 2**20,
+            runtime=5 + sum(scene.minutes(0.1) for scene in scenes_of_plan) // 5,
         params:
             results=placed(RESULTS),
             tables=folder_of_output,
-            charts=flags_of_charts,
+            charts=placed(CHARTS),
             code=code_digest("sepi.report.tables"),
         message:
             "numbers, tables and charts of the report"
         shell:
             command(
                 "sepi.report.tables --results {params.results:q} --plan {input.plan:q} --output {output.numbers[0]:q} "
-                "--tables {params.tables:q} {params.charts:q} 2> {log:q}"
+                "--tables {params.tables:q} --charts {params.charts:q} 2> {log:q}"
             )
 
 
@@ -63,9 +63,9 @@ for which, (_, plan) in NUMBERS.items():
 # all on a sheet (overview); the method at single pixels (pixels); and the scene for the page.
 rule maps:
     input:
-        lambda wildcards: report_of(wildcards).map_inputs(wildcards.dataset, wildcards.scene),
+        lambda wildcards: plan_of(wildcards).map_inputs(wildcards.dataset, wildcards.scene),
     output:
-        **page_of_scene(),
+        **({"page": "reports/{report}page/{dataset}/{scene}.json"} if SETTINGS.has_page else {}),
         folder=report(
             directory("reports/{report}maps/{dataset}/{scene}"),
             patterns=["{name,overview}.png"],
@@ -79,15 +79,14 @@ rule maps:
         "benchmarks/{dataset}/{scene}/{report}maps.tsv"
     group:
         GROUP
-    threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=1000),
         runtime=minutes_for(0.05, 15),
     params:
         results=placed(RESULTS),
         plan=plan_of_scene,
-        pixels=pixels_of,
-        page=page_flags,
+        pixels=lambda wildcards: json.dumps(SETTINGS.report.pixels.get(f"{wildcards.dataset}/{wildcards.scene}", [])),
+        page=lambda wildcards, output: ["--page", output.page] if SETTINGS.has_page else [],
         code=lambda wildcards: code_digest("sepi.report.figures", *added("scenes").values()),
     message:
         "{wildcards.dataset}/{wildcards.scene}: images"
@@ -108,7 +107,6 @@ rule scene:
         touch(SCENE_COMPLETE),
     group:
         GROUP
-    threads: 1
     resources:
         mem_mb=100,
         runtime=1,

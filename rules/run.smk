@@ -20,7 +20,7 @@ def is_new(file):
 def print_warnings():
     """Show the warnings that reading light fields, ground truth and external maps gave in this run, from the logs."""
     shown, without_map = set(), {}
-    for dataset, scene in (*SETTINGS.scenes, *SETTINGS.scenes_apart):
+    for dataset, scene in SETTINGS.scenes:
         for kind in ("ingest", "truth", "external"):
             log = Path(placed(f"logs/{dataset}/{scene}/{kind}.log"))
             for line in log.read_text().splitlines() if is_new(log) else ():
@@ -65,7 +65,7 @@ def run_ended_well():
     remove_leftovers()
     print_warnings()
     if SETTINGS.report.page is None and not SETTINGS.has_page:
-        print(f"sepi: no page of {len(SETTINGS.scenes)} scenes; report.page: true asks for one", flush=True)
+        print(f"sepi: no page of {len(PLAN.pairs)} scenes; report.page: true asks for one", flush=True)
     if REPORTS[""].missing:
         print(f"sepi: the tables are without {', '.join(REPORTS[''].missing)}, not computed yet", flush=True)
     print_written()

@@ -5,14 +5,21 @@ from sepi.report.plan import COMPARISON, PUBLISHED
 PARTS_OF_BEST = multiext("reports/report_parts", ".json", ".csv") if SETTINGS.report.parts_of_best else []
 # folder of the charts
 CHARTS = "reports/figures"
-# ending of a file of numbers to the folder of its tables, and its plan
-NUMBERS = {plan.ending: (f"reports/{'' if name == PARTS else name}".rstrip("/"), plan) for name, plan in PLANS.items()}
 
 
-def table_files(which, endings=("csv", "md", "tex")):
-    """Tables of a file of numbers, each as CSV, Markdown and LaTeX."""
-    folder, plan = NUMBERS[which]
-    return [f"{folder}/{table}.{ending}" for table in plan.tables for ending in endings]
+def folder_of(plan):
+    """Folder of a report's page and tables."""
+    return f"reports/{'' if plan.report == PARTS else plan.report}".rstrip("/")
+
+
+def table_files(plan, endings=("csv", "md", "tex")):
+    """Tables of a report, each as CSV, Markdown and LaTeX."""
+    return [f"{folder_of(plan)}/{table}.{ending}" for table in plan.tables for ending in endings]
+
+
+def number_files(plan):
+    """Files of a report's numbers."""
+    return multiext(f"reports/report{plan.ending}", ".json", ".csv")
 
 
 def figure_files(names):
@@ -26,18 +33,13 @@ def as_chart(name):
     return report(multiext(f"{CHARTS}/{name}", ".png", ".pdf"), caption=caption, category="Charts")
 
 
-def flags_of_charts(wildcards, output):
-    """Folder of the charts of a report that has some, as flags of the command that draws them."""
-    return ["--charts", os.path.dirname(output.charts[0])] if output.charts else []
-
-
 def report_files(name=""):
     """Files of a report: page if there is one, numbers, tables, and images of every scene."""
     plan = REPORTS[name]
-    folder, _ = NUMBERS[plan.ending]
+    folder = folder_of(plan)
     page = [f"{folder}/index.html"] if SETTINGS.has_page else []
     pictures = [f"{folder}/maps/{dataset}/{scene}" for dataset, scene in plan.pictured]
-    return [*page, *multiext(f"reports/report{plan.ending}", ".json", ".csv"), *table_files(plan.ending), *pictures]
+    return [*page, *number_files(plan), *table_files(plan), *pictures]
 
 
 def all_files():
@@ -48,8 +50,8 @@ def all_files():
 
 def ablation_files():
     """Files of the paper's table 4, and of the ablation of ``best``."""
-    paper = [file for file in table_files("") if Path(file).stem == "table4_ablation"]
-    return [*paper, *table_files(f"_{PARTS}"), *figure_files(["ablation", *PLANS[PARTS].charts])]
+    paper = [file for file in table_files(PLANS[""]) if Path(file).stem == "table4_ablation"]
+    return [*paper, *table_files(PLANS[PARTS]), *figure_files(["ablation", *PLANS[PARTS].charts])]
 
 
 def every_file():
@@ -57,41 +59,14 @@ def every_file():
     return [*all_files(), *ablation_files(), *(file for name in REPORTS if name for file in report_files(name))]
 
 
-def measured_files(which):
-    """Function of wildcards: inputs of a file of numbers."""
-    return lambda wildcards: plan_of(which).number_inputs()
-
-
-def scenes_of(which):
-    """Scenes of a file of numbers."""
-    return [SETTINGS.scene(*pair) for pair in plan_of(which).pairs]
-
-
-def page_of_scene():
-    """The page's file for a scene, as an output of the rule that draws its images; empty without a page."""
-    return {"page": "reports/{report}page/{dataset}/{scene}.json"} if SETTINGS.has_page else {}
-
-
-def page_flags(wildcards, output):
-    """The page's file for a scene, as flags of the command that draws its images."""
-    return ["--page", output.page] if SETTINGS.has_page else []
-
-
 def pages_of_scenes(wildcards):
     """Inputs of a page: a file for each scene."""
-    return [
-        f"reports/{wildcards.report}page/{dataset}/{scene}.json" for dataset, scene in report_of(wildcards).pictured
-    ]
+    return [f"reports/{wildcards.report}page/{dataset}/{scene}.json" for dataset, scene in plan_of(wildcards).pictured]
 
 
 def plan_of_scene(wildcards):
     """Plan for one scene, so that a change of other scenes in the configuration does not redraw it."""
-    return replace(report_of(wildcards), scenes={wildcards.dataset: [wildcards.scene]}).to_json()
-
-
-def pixels_of(wildcards):
-    """Pixels of a scene that the configuration asks for, as JSON."""
-    return json.dumps(SETTINGS.report.pixels.get(f"{wildcards.dataset}/{wildcards.scene}", []))
+    return replace(plan_of(wildcards), scenes={wildcards.dataset: [wildcards.scene]}).to_json()
 
 
 def external_inputs(wildcards):
@@ -103,8 +78,3 @@ def external_inputs(wildcards):
 def folder_of_output(wildcards, output):
     """Folder of a job's outputs."""
     return os.path.dirname(output[0])
-
-
-def folder_of_scenes(wildcards, output):
-    """Folder beside a page with a file for each scene."""
-    return os.path.join(os.path.dirname(output[0]), "page")

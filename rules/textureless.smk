@@ -1,11 +1,9 @@
 # Textureless regions (paper, section IV-C, Eq. 6-7): filled from their reliable edges; choice `none` has no job.
 rule textureless:
     input:
-        light_field=SCENE.light_field,
-        previous=file_before("textureless"),
+        **stage_input("textureless"),
     output:
-        maps=stage_output("textureless", "h5"),
-        timing=stage_output("textureless", "time.json"),
+        **stage_output("textureless"),
     log:
         stage_log("logs", "textureless", "log"),
     benchmark:
@@ -16,9 +14,7 @@ rule textureless:
     resources:
         **stage_resources("textureless"),
     params:
-        choice=choice_for("textureless"),
-        parameters=parameters_of("textureless"),
-        code=code_of("textureless"),
+        **stage_params("textureless"),
     message:
         stage_message("textureless", "textureless regions")
     shell:

@@ -12,7 +12,6 @@ rule truth:
         "benchmarks/{dataset}/{scene}/truth.tsv"
     group:
         GROUP
-    threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=8, bytes_per_pixel=300),
         runtime=minutes_for(0.05),

@@ -124,7 +124,7 @@ def evaluations_of(
         error = np.subtract(disparity, truth, out=nowhere, where=both)
         evaluations[name] = replace(common, scores=scores, error=error)
         if bars is not None and bars.close is not None:
-            right = reliability(bars.confidence[known], disparity[known] - truth[known], bars.close)
+            right = reliability(bars.maps.confidence[known], disparity[known] - truth[known], bars.close)
             evaluations[name] = replace(evaluations[name], reliability=np.array(right))
     return evaluations
 

@@ -256,8 +256,7 @@ def _with_bars(
     if variance is not None:
         cues["deviation"] = np.sqrt(variance)
     cues |= cues_of_texture(reference_sharpness(light_field, noise), cues["agreement"], cues["deviation"])
-    bars = error_bars(disparity, cues, known, calibration)
-    return before.updated(disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high)
+    return before.updated(disparity, **error_bars(disparity, cues, known, calibration))
 
 
 def _threshold(disparity: FloatMap, parameters: SecondOrderParameters, first: bool) -> float:

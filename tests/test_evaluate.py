@@ -199,7 +199,9 @@ def test_command_scores_error_bars_as_users_get_them(tmp_path: Path) -> None:
     pixels, said, found = final.reliability
     assert (pixels[0], pixels[7]) == (unknown.sum(), (~unknown).sum())
     assert (said[0], said[7], found[0], found[7]) == (0, 0.75, 0, 0)
-    np.testing.assert_array_equal(read_evaluations(path, with_maps=False)["sepi/none"].reliability, final.reliability)
+    alone = read_evaluations(path, ["sepi/none"], with_maps=False)["sepi/none"]
+    np.testing.assert_array_equal(alone.reliability, final.reliability)
+    assert (alone.scores, alone.error, alone.regions) == (final.scores, None, {})
 
 
 def test_command_says_that_there_is_no_truth(tmp_path: Path) -> None:

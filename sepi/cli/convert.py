@@ -128,13 +128,10 @@ def _maps(path: Path, view: tuple[int, int] | None, geometry: Geometry | None) -
 def points(
     result_path: Path,
     output: Path | None,
-    min_confidence: float,
-    max_depth: float | None,
-    max_sigma: float | None,
-    step: int,
     keep_unknown: bool,
     view: tuple[int, int] | None,
     geometry: Geometry | None,
+    **chosen: Any,
 ) -> None:
     """Write the coloured point cloud of RESULT as a PLY file.
 
@@ -152,7 +149,7 @@ def points(
     from sepi.io.result_folder import read_result
 
     result = read_result(result_path, view)
-    if max_sigma is not None and result.sigma is None:
+    if chosen["max_sigma"] is not None and result.sigma is None:
         raise SepiError(f"{result_path}: --max-sigma: the result has no error bars, like those of compared methods")
     cloud = point_cloud(
         result.picture,
@@ -160,13 +157,10 @@ def points(
         result.confidence,
         camera=camera_of(result_path, view, result, geometry),
         from_centre=result.from_centre,
-        min_confidence=min_confidence,
-        max_depth=max_depth,
-        step=step,
         unknown=None if keep_unknown else result.unknown,
         rig=None if geometry is not None else result.rig,
         sigma=result.sigma,
-        max_sigma=max_sigma,
+        **chosen,
     )
     if not len(cloud.positions):
         tried = "lower --min-confidence, raise --max-depth or --max-sigma, give --keep-unknown"

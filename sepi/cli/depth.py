@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -154,15 +153,12 @@ def _candidates(made_by: MadeBy | None) -> str:
 
 def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[str, dict[str, Any]]:
     """Stage to field to value from ``STAGE.CHOICE.NAME=VALUE`` of the command line."""
-    from sepi.validation import require_known, value_of
+    from sepi.validation import require_known, settings_of
 
     parameters: dict[str, dict[str, Any]] = {}
-    for setting in settings:
-        match = re.fullmatch(r"(\w+)\.(\w+)\.(\w+)=(.*)", setting)
-        if match is None:
-            raise SepiError(f"--set {setting}: expected STAGE.CHOICE.NAME=VALUE, such as optimize.wls.alpha=1e-5")
-        stage, choice, field, text = match.groups()
+    for key, value in settings_of(settings, "optimize.wls.alpha=1e-5", "STAGE.CHOICE.NAME=VALUE").items():
+        stage, choice, field = key.split(".")
         used = [f"{stage}.{choice}" for stage, choice in variant.choices.items()]
-        require_known(f"--set {setting}: stages of variant {name}", [f"{stage}.{choice}"], used)
-        parameters.setdefault(stage, {})[field] = value_of(text)
+        require_known(f"--set {key}: stages of variant {name}", [f"{stage}.{choice}"], used)
+        parameters.setdefault(stage, {})[field] = value
     return parameters

@@ -8,7 +8,6 @@ probabilities are products of powers of the cues (:mod:`sepi.error_bars.cues`), 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,26 +24,7 @@ _LOGARITHMS = (-9.0, 9.0)
 """Limits of the logarithms of scales, in pixels per view step, and odds."""
 
 
-class ErrorBars(NamedTuple):
-    """Error bars of each pixel; shapes (H, W), float32.
-
-    Attributes
-    ----------
-    sigma : ndarray
-        Standard deviation, pixels per view step, as :mod:`sepi.error_bars.mixture` defines it.
-    low, high : ndarray
-        Interval that holds the disparity with a probability of 90 %, pixels per view step.
-    confidence : ndarray
-        Probability that the error is at most :data:`sepi.stage.CLOSE`.
-    """
-
-    sigma: FloatMap
-    low: FloatMap
-    high: FloatMap
-    confidence: FloatMap
-
-
-def error_bars(disparity: FloatMap, cues: Cues, known: DisparityRange, calibration: Calibration) -> ErrorBars:
+def error_bars(disparity: FloatMap, cues: Cues, known: DisparityRange, calibration: Calibration) -> dict[str, FloatMap]:
     """Error bars of a disparity map.
 
     Parameters
@@ -59,14 +39,17 @@ def error_bars(disparity: FloatMap, cues: Cues, known: DisparityRange, calibrati
 
     Returns
     -------
-    ErrorBars
+    dict of str to ndarray, shape (H, W), float32
+        ``sigma``: standard deviation, pixels per view step, as :mod:`sepi.error_bars.mixture` defines it; ``low`` and
+        ``high``: interval that holds the disparity with a probability of 90 %, pixels per view step; ``confidence``:
+        probability that the error is at most :data:`sepi.stage.CLOSE`.
     """
     mixture = mixture_of(cues, calibration)
     found = described(mixture, TAIL, CLOSE)
     lowest, highest = np.float32(known.minimum), np.float32(known.maximum)
     low = np.minimum(np.maximum(disparity - found.below, lowest), disparity)
     high = np.maximum(np.minimum(disparity + found.above, highest), disparity)
-    return ErrorBars(found.sigma, low, high, found.probability)
+    return {"sigma": found.sigma, "low": low, "high": high, "confidence": found.probability}
 
 
 def mixture_of(cues: Cues, calibration: Calibration) -> Mixture:
@@ -83,7 +66,7 @@ def mixture_of(cues: Cues, calibration: Calibration) -> Mixture:
     """
     logarithms = {
         name: np.log(np.maximum(cues[name], np.float32(FLOORS[name])))
-        for name in sorted({name for part in calibration.parts for name in part} - {CONSTANT})
+        for name in sorted({name for part in calibration for name in part} - {CONSTANT})
     }
 
     def exponential(powers: Mapping[str, float]) -> FloatMap:

@@ -7,13 +7,12 @@ fit, and the results on scenes left out.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 CONSTANT = "constant"
 
 
-@dataclass(frozen=True)
-class Calibration:
+class Calibration(NamedTuple):
     """Exponents of the cues (:mod:`sepi.error_bars.cues`) in the error distribution (:mod:`sepi.error_bars.mixture`).
 
     Attributes
@@ -28,11 +27,6 @@ class Calibration:
     outlier_scale: Mapping[str, float]
     outlier: Mapping[str, float]
     rim: Mapping[str, float]
-
-    @property
-    def parts(self) -> tuple[Mapping[str, float], ...]:
-        """The four mappings."""
-        return self.scale, self.outlier_scale, self.outlier, self.rim
 
 
 SECOND_ORDER = Calibration(

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from sepi.camera import Part
 from sepi.errors import SepiError
-from sepi.io.files import atomic_path, reading
+from sepi.io.files import reading, write_whole
 from sepi.io.hdf5 import has_dataset, open_hdf5, read_dataset
 from sepi.io.images import picture_header, png_texts, read_picture
 from sepi.io.readers.array_files import numpy_arrays
@@ -97,8 +97,7 @@ def write_pfm(path: str | Path, values: FloatMap) -> None:
     path = require_path("PFM to write", path)
     require_map(str(path), values)
     height, width = values.shape
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(f"Pf\n{width} {height}\n-1\n".encode() + values[::-1].astype("<f4").tobytes())
+    write_whole(path, f"Pf\n{width} {height}\n-1\n".encode() + values[::-1].astype("<f4").tobytes())
 
 
 _HDF5 = (".h5", ".hdf5")

@@ -94,6 +94,12 @@ def atomic_path(path: Path) -> Iterator[Path]:
         temporary.replace(path)
 
 
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file, whole or not at all, as :func:`atomic_path` does; text as UTF-8."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
 @contextmanager
 def atomic_folder(path: Path, *, replace: bool = False, add: bool = False) -> Iterator[Path]:
     """Give a temporary folder to fill; rename it on success, remove it on any failure.

@@ -21,7 +21,7 @@ from sepi.camera.rig import Rig
 from sepi.errors import SepiError
 from sepi.io import hdf5, map_pictures
 from sepi.io.disparity_maps import write_pfm
-from sepi.io.files import atomic_folder, atomic_path, remove_files
+from sepi.io.files import atomic_folder, atomic_path, remove_files, write_whole
 from sepi.io.images import write_png
 from sepi.io.point_cloud import point_cloud, write_ply
 from sepi.io.provenance import DIGEST, RESULT, result_attributes
@@ -334,8 +334,7 @@ def _write_numbers(
     if depth is not None:
         write_pfm(folder / DEPTH, depth)
     if seconds is not None:
-        with atomic_path(folder / RUNTIME) as temporary:
-            temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
+        write_whole(folder / RUNTIME, f"{seconds:.3f}\n")
     write_pfm(folder / "disparity.pfm", maps.disparity)
     with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
         np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)

@@ -219,7 +219,7 @@ def write_timing(path: Path, started: float, threads: int, **more: Any) -> None:
     """Write JSON with the seconds since ``started`` (``time.perf_counter``), peak memory, machine, and ``more``."""
     import json
 
-    from sepi.io.files import atomic_path
+    from sepi.io.files import write_whole
     from sepi.process.machine import this_machine
 
     timing = {
@@ -229,8 +229,7 @@ def write_timing(path: Path, started: float, threads: int, **more: Any) -> None:
         "machine": this_machine(),
         **more,
     }
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(timing) + "\n", encoding="utf-8")
+    write_whole(path, json.dumps(timing) + "\n")
 
 
 def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:

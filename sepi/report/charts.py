@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -69,79 +68,53 @@ _OURS, _PUBLISHED = "#4a7fae", "#b9bfc5"
 _STAGES = ("#3b5b92", "#2a8c8c", "#7ab648", "#d9b430", "#b25d2c", "#7d4f9e")
 
 
-@dataclass(frozen=True)
-class Bar:
-    """MSE x100 of a variant (None if not available), with a note if ours is over fewer scenes than the group's."""
-
-    variant: str
-    ours: float | None
-    published: float | None = None
-    note: str = ""
-
-
-@dataclass(frozen=True)
-class BarGroup:
-    """Bars with one scale.
+class BarGroup(NamedTuple):
+    """Bars of MSE x100 with one scale.
 
     Attributes
     ----------
     dataset, region : str
         Dataset and region of the figures.
-    scenes, available : int
-        Number of scenes in our averages, and number available; not all have each region.
-    rows : list of Bar
+    scenes : int
+        Number of scenes in our averages.
+    over : str
+        Text on these scenes; empty if there is one or none.
+    figures : DataFrame
+        Rows variants; ``ours`` and ``published``, NaN if not available, and a ``note`` if ours is over fewer scenes
+        than the group's.
     """
 
     dataset: str
     region: str
     scenes: int
-    available: int
-    rows: list[Bar]
-
-    @property
-    def over(self) -> str:
-        """Text on the scenes in our averages; empty if there is one scene or none."""
-        if self.scenes in (0, self.available):
-            return f"{self.scenes} scenes" if self.scenes > 1 else ""
-        return f"{self.scenes} of {self.available} scenes"
-
-    @property
-    def figures(self) -> list[float]:
-        """All figures that are available."""
-        return [figure for row in self.rows for figure in (row.ours, row.published) if figure is not None]
-
-    @property
-    def largest(self) -> float:
-        """The largest figure; 1 if all are zero."""
-        return max(self.figures) or 1.0
+    over: str
+    figures: pd.DataFrame
 
 
 def ablation_bars(runs: Runs) -> list[BarGroup]:
     """Average MSE x100 of each listed variant beside the published one, a group per dataset and region."""
     groups = []
     variants = list(runs.plan.variants)
-    for dataset in datasets_of(runs.plan):
-        means, counts = mean_by_region(runs, dataset, variants)
-        in_paper = published.table4().loc[dataset] if dataset in published.DATASETS else published.table4().iloc[:0]
-        theirs = in_paper.reindex(variants)
-        for region in REGIONS:
-            most = int(counts.loc[region].max())
-            rows = [
-                Bar(v, known(mean), known(theirs.at[v, region]), count_note([int(counts.at[region, v])], most))
-                for v, mean in means.loc[region].items()
-            ]
-            title = "whole map" if region == WHOLE_MAP else region
-            groups.append(BarGroup(dataset, title, most, len(runs.scored(dataset)), rows))
-    return [group for group in groups if group.figures]
+    for dataset, region in itertools.product(datasets_of(runs.plan), REGIONS):
+        means, counts = (found.loc[region] for found in mean_by_region(runs, dataset, variants))
+        theirs = published.table4()[region].reindex([(dataset, variant) for variant in variants]).to_numpy()
+        most, available = int(counts.max()), len(runs.scored(dataset))
+        notes = [count_note([int(count)], most) for count in counts]
+        over = f"{most} scenes" if most == available else f"{most} of {available} scenes"
+        title = "whole map" if region == WHOLE_MAP else region
+        figures = pd.DataFrame({"ours": means, "published": theirs, "note": notes}, variants)
+        groups.append(BarGroup(dataset, title, most, over if most and available > 1 else "", figures))
+    return [group for group in groups if group.figures[["ours", "published"]].notna().any(axis=None)]
 
 
 def part_bars(parts: Runs) -> list[BarGroup]:
     """MSE x100 of the variants in the ablation of ``best``, a group per scene."""
-    found = {pair: parts.of("mse100", pair[0]).loc[pair[1]] for pair in parts.scored_pairs}
-    return [
-        BarGroup("/".join(pair), "whole map", 1, 1, [Bar(v, known(errors[own_key(v)])) for v in parts.plan.variants])
-        for pair, errors in found.items()
-    ]
+    variants, groups = list(parts.plan.variants), []
+    for dataset, scene in parts.scored_pairs:
+        errors = parts.of("mse100", dataset).loc[scene, [*map(own_key, variants)]].to_numpy()
+        figures = pd.DataFrame({"ours": errors, "published": np.nan, "note": ""}, variants)
+        groups.append(BarGroup(f"{dataset}/{scene}", "whole map", 1, "", figures))
+    return groups
 
 
 def stage_times(runs: Runs) -> pd.DataFrame:
@@ -152,13 +125,10 @@ def stage_times(runs: Runs) -> pd.DataFrame:
     DataFrame
         Rows ``(scene, variant)``, columns ``(score, stage)``.
     """
-    every = itertools.product(runs.plan.pairs, runs.plan.compared)
-    times = {("/".join(pair), variant): runs.took(pair, variant).fillna(0.0).unstack() for pair, variant in every}
-    return pd.DataFrame(times).T
-
-
-def known(figure: float) -> float | None:
-    return None if math.isnan(figure) else float(figure)
+    rows = [(*pair, variant) for pair in runs.plan.pairs for variant in runs.plan.compared]
+    columns = pd.MultiIndex.from_product([runs.times.columns, runs.plan.stages])
+    found = runs.times.unstack("stage").reindex(index=rows, columns=columns).fillna(0.0)
+    return found.set_axis(pd.MultiIndex.from_tuples([("/".join(pair), variant) for *pair, variant in rows]))
 
 
 def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
@@ -168,19 +138,19 @@ def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
         return
     columns = min(3, len(groups))
     lines = -(-len(groups) // columns)
-    height = 0.9 + 0.32 * max(len(group.rows) for group in groups)
+    height = 0.9 + 0.32 * max(len(group.figures) for group in groups)
     figure = new_figure(4.2 * columns, height * lines)
     axes = figure.subplots(lines, columns, squeeze=False).ravel()
     for axis in axes[len(groups) :]:
         axis.set_axis_off()
     for axis, group in zip(axes, groups, strict=False):
-        positions = np.arange(len(group.rows))
+        positions = np.arange(len(group.figures))
         for shift, key, colour in ((-0.2, "ours", _OURS), (0.2, "published", _PUBLISHED)):
-            values = np.array([getattr(row, key) for row in group.rows], np.float64)
+            values = group.figures[key].to_numpy()
             if not np.isnan(values).all():
                 bars = axis.barh(positions + shift, values, 0.38, color=colour)
                 axis.bar_label(bars, ["" if np.isnan(value) else f"{value:.2f}" for value in values], fontsize=6)
-        names = [f"{row.variant} ({row.note})" if row.note else row.variant for row in group.rows]
+        names = [f"{variant} ({note})" if note else variant for variant, note in group.figures["note"].items()]
         axis.set_yticks(positions, names, fontsize=7)
         axis.invert_yaxis()
         axis.margins(x=0.15)

@@ -94,36 +94,32 @@ def _dataset_section(
     of_scenes = theirs.drop(index=published.AVERAGE, errors="ignore")
     figures = of_scenes.reindex([*every]).join(here).reindex(columns=known.index)
     kinds = [SCENE] * len(figures)
-    counts: dict[str, tuple[dict[str, int], int]] = {}
+    # of external methods, then of averages
+    unknown = (100 * runs.of("non_finite", dataset) / runs.of("pixels", dataset)).set_axis(names)
+    unknown = unknown[unknown.columns.intersection(known.index[external])]
+    notes = [unknown.map(lambda share: f"{share:.0f} % unknown" if share > 0 else "")]
+
+    def add(label: str, kind: str, averages: pd.Series, counts: pd.Series, most: int) -> None:
+        figures.loc[label] = averages
+        notes.append(pd.DataFrame([[count_note([count], most) for count in counts]], [label], known.index))
+        kinds.append(kind)
+
     if names:
         available = figures.loc[names]
-        label = average_label(len(names))
-        figures.loc[label] = available.mean().where(ours | available.notna().all())
-        counts[label] = available.count().where(ours, 0).to_dict(), len(names)
-        kinds.append(AVERAGE)
+        averages = available.mean().where(ours | available.notna().all())
+        add(average_label(len(names)), AVERAGE, averages, available.count().where(ours, 0), len(names))
     if dataset in published.DATASETS:
-        label = printed_label(dataset)
-        figures.loc[label] = theirs.loc[published.AVERAGE].reindex(known.index)
-        counts[label] = published.averaged(paper, dataset), len(published.scenes(dataset))
-        kinds.append(PRINTED_AVERAGE)
+        counts = pd.Series(published.averaged(paper, dataset)).reindex(known.index, fill_value=0)
+        averages = theirs.loc[published.AVERAGE].reindex(known.index)
+        add(printed_label(dataset), PRINTED_AVERAGE, averages, counts, len(published.scenes(dataset)))
     ratios = known.loc[known["kind"] == Kind.RATIO, "name"]
     divided = figures.reindex(columns=map(published.counterpart, ratios))
     figures[ratios.index] = figures[[own_key(name) for name in ratios]].to_numpy() / divided.to_numpy()
-    notes = pd.DataFrame("", figures.index, figures.columns)
-    for label, (found, most) in counts.items():
-        notes.loc[label] = [count_note([found.get(key, 0)], most) for key in known.index]
     told = {name: runs.problems(dataset, [scene]) for name, scene in zip(names, scenes, strict=True)}
     problems = shown(pd.DataFrame(told).T.reindex_like(figures))
-    unknown = (100 * runs.of("non_finite", dataset) / runs.of("pixels", dataset)).set_axis(names)
-    for key in unknown.columns.intersection(known.index[external]):
-        notes.loc[names, key] = [f"{share:.0f} % unknown" if share > 0 else "" for share in unknown[key]]
     texts = _texts(figures, known["kind"], 2).where(problems == "", problems)
-    there = known[
-        [
-            runs.has_column(dataset, name) if kind == Kind.EXTERNAL else kind == Kind.OURS or any(texts[key])
-            for key, name, kind in known[["name", "kind"]].itertuples()
-        ]
-    ]
+    is_shown = known.index.isin(runs.external_of(dataset).index) | ours | (~external & (texts != "").any())
+    there = known[is_shown]
     heads = {"scene": Head("scene", Kind.TEXT)}
     heads |= {str(key): Head(row["head"], row["kind"]) for key, row in there.iterrows()}
     marks = ranks(texts[there.index[there["learning"] == "none"]].T).T
@@ -131,7 +127,7 @@ def _dataset_section(
     rows = _texts(figures, known["kind"], 4).where(problems == "", problems).reset_index(names="scene")
     rows.insert(0, "dataset", dataset)
     rows.insert(2, "row", kinds)
-    return rows, section(dataset_title(dataset), heads, texts, marks, notes, kinds)
+    return rows, section(dataset_title(dataset), heads, texts, marks, pd.concat(notes), kinds)
 
 
 def _texts(figures: pd.DataFrame, kinds: pd.Series, decimals: int) -> pd.DataFrame:

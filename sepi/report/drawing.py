@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from sepi.io.files import atomic_path
+from sepi.io.files import write_whole
 from sepi.lightfield import FloatMap
 from sepi.report.pictures import Picture
 from sepi.scoring.error_bars import STEPS, oracle, sparsification
@@ -53,8 +53,7 @@ def save(figure: Figure, folder: Path, name: str, endings: Sequence[str] = BOTH)
         # in memory first: on a full disk, matplotlib would fail again when it closes the file
         content = BytesIO()
         figure.savefig(content, format=ending, **_OPTIONS[ending])
-        with atomic_path(folder / f"{name}.{ending}") as temporary:
-            temporary.write_bytes(content.getvalue())
+        write_whole(folder / f"{name}.{ending}", content.getvalue())
 
 
 # inches: width of a panel, gap round its picture, room for its title and for that of the sheet, for a third line of it

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from sepi.io.files import atomic_path
+from sepi.io.files import write_whole
 from sepi.io.hdf5 import read_with_truth
 from sepi.io.scores import Evaluation, Scores, read_evaluations, without_nan
 from sepi.report.plan import PARTS, Plan
@@ -64,6 +64,9 @@ def _quarters(evaluations: Iterable[Evaluation]) -> Iterator[tuple[str, float]]:
         known, place = np.concatenate(parts), counts[region] // 4
         yield region, 100 * float(np.partition(known, place)[place]) if place < known.size else float("nan")
 
+
+# of each tenth of a confidence
+_SAID = "pixels", "said", "found"
 
 _Number = tuple[str, str, str, str, str, str, str, str, float]
 """A row of :attr:`sepi.report.runs.Runs.numbers`."""
@@ -122,19 +125,15 @@ def collect(plan: Plan) -> Runs:
 
 def write_numbers(runs: Runs, path: Path) -> None:
     """Write the facts to this JSON file, and the numbers to the CSV file beside it."""
-    for file, text in (
-        (path.with_suffix(".csv"), runs.numbers.to_csv(index=False, na_rep="nan", lineterminator="\n")),
-        (path, json.dumps(runs.facts, indent=1, allow_nan=False, ensure_ascii=False) + "\n"),
-    ):
-        with atomic_path(file) as temporary:
-            temporary.write_text(text, encoding="utf-8", newline="\n")
+    write_whole(path.with_suffix(".csv"), runs.numbers.to_csv(index=False, na_rep="nan", lineterminator="\n"))
+    write_whole(path, json.dumps(runs.facts, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def _timing(plan: Plan, dataset: str, scene: str, variant: str, stage: str) -> dict[str, Any]:
     """Time and memory of a stage, its machine and its parameters."""
     path = plan.stage_file(dataset, scene, variant, stage, "time.json")
     keys = {"seconds", "peak_memory_mb", "machine", "parameters"}
-    return read_json(path, keys, "the time of a stage", f"sepi.{stage}")
+    return read_json(path, keys, f"time of a stage (written by python -m sepi.{stage})")
 
 
 def _facts(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
@@ -180,13 +179,12 @@ def _scores_of_scene(plan: Plan, dataset: str, scene: str) -> Iterator[_Number]:
     """Scores of a scene's maps."""
     path = plan.scores_file(dataset, scene)
     keys = dict.fromkeys(itertools.starmap(plan.stage_key, itertools.product(plan.variants, plan.scored_stages)))
-    scored = read_evaluations(path, keys, with_maps=False)
+    known = read_evaluations(path, keys, with_maps=False)
     for variant, stage in itertools.product(plan.variants, plan.stages):
         about = (dataset, scene, variant, stage, plan.variants[variant][stage])
-        found = scored.get(plan.stage_key(variant, stage), Evaluation())
+        found = known.get(plan.stage_key(variant, stage), Evaluation())
         yield from ((*about, *score) for score in _scores(found.scores))
-        reliability = () if found.reliability is None else found.reliability
-        for name, values in zip(("pixels", "said", "found"), reliability, strict=False):
+        for name, values in () if found.reliability is None else zip(_SAID, found.reliability, strict=True):
             yield from ((*about, TENTHS, str(tenth), name, float(value)) for tenth, value in enumerate(values))
     for method, external in _external(plan, dataset, scene).items():
         about = (dataset, scene, method, EXTERNAL, "")

@@ -168,17 +168,10 @@ def _stage_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
 def _error_panels(results: SceneResults) -> Iterator[Panel]:
     ground_truth = results.light_field.ground_truth
     for variant in results.variants if ground_truth is not None else ():
+        key, title, note = f"{variant}/error", f"{variant}: error", note_of(results.evaluations[variant])
         found = results.final(variant)
-        yield Panel(
-            f"{variant}/error",
-            f"{variant}: error",
-            "Signed errors",
-            "error",
-            found.disparity,
-            minus=ground_truth,
-            confidence=found.confidence if variant in results.detailed else None,
-            note=note_of(results.evaluations[variant]),
-        )
+        sure = found.confidence if variant in results.detailed else None
+        yield Panel(key, title, "Signed errors", "error", found.disparity, ground_truth, confidence=sure, note=note)
 
 
 def _external_panels(results: SceneResults) -> Iterator[Panel]:
@@ -200,16 +193,9 @@ def _change_panels(results: SceneResults) -> Iterator[Panel]:
     for variant in results.variants if ground_truth is not None else ():
         if variant != MAIN_VARIANT:
             better, worse = (variant, MAIN_VARIANT) if variant == BEST_VARIANT else (MAIN_VARIANT, variant)
-            yield Panel(
-                f"{variant}/change",
-                f"{better} beside {worse}",
-                "What each part improves and degrades",
-                "change",
-                results.final(worse).disparity,
-                minus=results.final(better).disparity,
-                ground_truth=ground_truth,
-                note="red: improved, blue: degraded",
-            )
+            group, note = "What each part improves and degrades", "red: improved, blue: degraded"
+            maps = results.final(worse).disparity, results.final(better).disparity, ground_truth
+            yield Panel(f"{variant}/change", f"{better} beside {worse}", group, "change", *maps, note=note)
 
 
 def _detail_panels(results: SceneResults, variant: str) -> Iterator[Panel]:

@@ -50,8 +50,7 @@ def error_scale() -> ListedColormap:
 
 def scale_colours(scale: str | Colormap) -> npt.NDArray[np.uint8]:
     """The 256 colours of a scale, low end first; shape (256, 3), uint8."""
-    colours = colormaps[scale] if isinstance(scale, str) else scale
-    levels: npt.NDArray[np.uint8] = colours(np.linspace(0, 1, 256), bytes=True)
+    levels: npt.NDArray[np.uint8] = colormaps.get_cmap(scale)(np.linspace(0, 1, 256), bytes=True)
     return levels[:, :3]
 
 
@@ -107,8 +106,7 @@ def map_picture(values: FloatMap, limits: tuple[float, float], scale: str | Colo
     low, high = limits
     unit = (values.astype(np.float64) - low) / max(high - low, 1e-9)
     unit[~np.isfinite(unit)] = np.nan
-    chosen = colormaps[scale] if isinstance(scale, str) else scale
-    colours: npt.NDArray[Any] = chosen.with_extremes(bad=_UNKNOWN)(np.clip(unit, 0, 1), bytes=True)
+    colours: npt.NDArray[Any] = colormaps.get_cmap(scale).with_extremes(bad=_UNKNOWN)(np.clip(unit, 0, 1), bytes=True)
     return colours[:, :, :3].astype(np.uint8)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -114,8 +114,7 @@ class Plan:
 
     def to_json(self) -> str:
         """The text that :meth:`from_json` reads; the results' folder is not part of it."""
-        keys = ("scenes", "variants", "external", "report", "choosing", "missing", "bad_thresholds")
-        return json.dumps({key: getattr(self, key) for key in keys})
+        return json.dumps({one.name: getattr(self, one.name) for one in fields(self) if one.name != "results"})
 
     def main(self) -> Plan:
         """The plan of the main report: all variants but the parts of ``best``, compared methods, and one for noise."""

@@ -71,9 +71,7 @@ def _table(
     runs: Runs, title: str, caption: str, titles: Mapping[str, str], figures: pd.DataFrame, by_scene: bool = False
 ) -> Table:
     """The table of figures with rows noise, seed and method, and columns that have these titles."""
-    known = runs.methods[runs.methods["kind"].isin([Kind.OURS, Kind.EXTERNAL])]
-    shows = [kind == Kind.OURS or runs.has_column(DATASET, name) for name, kind in known[["name", "kind"]].to_numpy()]
-    known = known[shows]
+    known = pd.concat([runs.methods[runs.methods["kind"] == Kind.OURS], runs.external_of(DATASET)])
     scenes = {name: rendered_scene(name) for name in runs.plan.scenes[DATASET]}
     heads = {"method": Head("method", Kind.TEXT), **{key: Head(head, Kind.OURS) for key, head in titles.items()}}
     rows, sections = [], []
@@ -148,8 +146,7 @@ def error_bar_table(runs: Runs) -> Table:
     # widths are hundredths of a pixel or less
     texts = shown(rows, missing="n/a").assign(width=shown(rows[["width"]], 4, "n/a"))
     whole = texts[texts["region"] == WHOLE_MAP]
-    together = whole["title"].map({title: place for place, title in enumerate(dict.fromkeys(whole["title"]))})
-    whole = whole.assign(together=together).sort_values("together", kind="stable")
+    whole = whole.sort_values("title", key=lambda titles: pd.factorize(titles)[0], kind="stable")
     return Table(
         "Error bars",
         f"{PROTOCOL_NOTE} Coverage: how often the interval of 90 % holds the ground truth; width: its median in pixels "
@@ -170,10 +167,13 @@ def _rows(runs: Runs, variant: str) -> pd.DataFrame:
     found = runs.final[runs.final.index.get_level_values("method") == own_key(variant)].reset_index()
     found = found.set_index(["dataset", "scene"]).loc[runs.scored_pairs].reset_index()
     found = found[["dataset", "scene", "region", "pixels", *ERROR_BAR_SCORES]]
-    found["level"] = [_together(*pair) for pair in zip(found["dataset"], found["scene"], strict=True)]
     found["title"] = found["dataset"] + "/" + found["scene"]
+    levels = [
+        f"all scenes, noise {rendered_scene(scene).noise}" if dataset == DATASET else "all scenes"
+        for dataset, scene in zip(found["dataset"], found["scene"], strict=True)
+    ]
     parts = [found]
-    for level, of_level in found.groupby("level", sort=False):
+    for level, of_level in found.groupby(levels, sort=False):
         pairs = list(dict.fromkeys(zip(of_level["dataset"], of_level["scene"], strict=True)))
         if len(pairs) > 1:
             pooled = weighted_means(of_level[[*ERROR_BAR_SCORES]], of_level["pixels"], of_level["region"]).reset_index()
@@ -182,11 +182,6 @@ def _rows(runs: Runs, variant: str) -> pd.DataFrame:
             pooled["gap"] = [gap if region == WHOLE_MAP else None for region in pooled["region"]]
             parts.append(pooled.assign(scene=level, title=level))
     return pd.concat(parts, ignore_index=True).assign(variant=variant).astype({"pixels": "Int64"})
-
-
-def _together(dataset: str, scene: str) -> str:
-    """Name of the scenes with which a scene is pooled."""
-    return f"all scenes, noise {rendered_scene(scene).noise}" if dataset == DATASET else "all scenes"
 
 
 def _region_section(texts: pd.DataFrame, variant: str) -> Section:

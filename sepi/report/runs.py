@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from sepi.errors import SepiError
 from sepi.external import NO_FILE
+from sepi.io.files import reading
 from sepi.report import published
 from sepi.report.plan import MAIN_VARIANT, Plan
 from sepi.report.table import Kind
@@ -34,33 +34,6 @@ REGIONS_NOTE = (
 def own_key(variant: str) -> str:
     """Key of a variant among the methods."""
     return "ours" if variant == MAIN_VARIANT else f"ours_{variant}"
-
-
-def compared_methods(plan: Plan) -> pd.DataFrame:
-    """All methods in the order of the tables: ours, their ratios to published figures, published, external.
-
-    Returns
-    -------
-    DataFrame
-        By keys, their names in CSV files: ``name`` of the variant or method; ``head`` on the pages; ``kind``; and
-        ``learning`` as in :func:`sepi.report.published.methods`, empty if unknown or not applicable.
-    """
-    signs = {"none": "", "supervised": "*", "unsupervised": "**"}
-    rows = [(own_key(v), v, f"this code, {v}", Kind.OURS, "none") for v in plan.compared]
-    rows += [(f"ratio{own_key(v)[4:]}", v, f"{v} / published", Kind.RATIO, "") for v in plan.compared]
-    rows += [
-        (str(key), str(key), row["label"] + signs[row["learning"]], Kind.PUBLISHED, row["learning"])
-        for key, row in published.methods().iterrows()
-    ]
-    taken = {"dataset", "scene", "row", "method", "learning", *(key for key, *_ in rows), *map(own_key, plan.variants)}
-    for name in plan.external:
-        key = name
-        # a name that a column has already gets a suffix
-        while key in taken:
-            key += " (external)"
-        taken.add(key)
-        rows.append((key, name, f"{name} (external)", Kind.EXTERNAL, ""))
-    return pd.DataFrame(rows, columns=["key", "name", "head", "kind", "learning"]).set_index("key")
 
 
 def datasets_of(plan: Plan) -> list[str]:
@@ -107,8 +80,44 @@ class Runs:
 
     @cached_property
     def methods(self) -> pd.DataFrame:
-        """Methods of the tables, as :func:`compared_methods`."""
-        return compared_methods(self.plan)
+        """All methods in the order of the tables: ours, their ratios to published figures, published, external.
+
+        Returns
+        -------
+        DataFrame
+            By keys, their names in CSV files: ``name`` of the variant or method; ``head`` on the pages; ``kind``; and
+            ``learning`` as in :func:`sepi.report.published.methods`, empty if unknown or not applicable.
+        """
+        compared, signs = self.plan.compared, {"none": "", "supervised": "*", "unsupervised": "**"}
+        rows = [(own_key(v), v, f"this code, {v}", Kind.OURS, "none") for v in compared]
+        rows += [(f"ratio{own_key(v)[4:]}", v, f"{v} / published", Kind.RATIO, "") for v in compared]
+        rows += [
+            (str(key), str(key), row["label"] + signs[row["learning"]], Kind.PUBLISHED, row["learning"])
+            for key, row in published.methods().iterrows()
+        ]
+        taken = {"dataset", "scene", "row", "method", "learning", *(key for key, *_ in rows)}
+        taken.update(map(own_key, self.plan.variants))
+        for name in self.plan.external:
+            key = name
+            # a name that a column has already gets a suffix
+            while key in taken:
+                key += " (external)"
+            taken.add(key)
+            rows.append((key, name, f"{name} (external)", Kind.EXTERNAL, ""))
+        return pd.DataFrame(rows, columns=["key", "name", "head", "kind", "learning"]).set_index("key")
+
+    def external_of(self, dataset: str) -> pd.DataFrame:
+        """Those of the external :attr:`methods` that tables of a dataset show.
+
+        A method with files for other datasets only is not shown. A method without any file is, to show the problem.
+        """
+        every = self.methods[self.methods["kind"] == Kind.EXTERNAL]
+
+        def is_shown(method: str) -> bool:
+            pairs = [pair for pair in self.plan.pairs if self.problem(pair[0], pair[1:], method) != NO_FILE]
+            return dataset in {one for one, _ in pairs or self.plan.pairs}
+
+        return every[every["name"].map(is_shown).astype(bool)]
 
     @cached_property
     def maps(self) -> pd.DataFrame:
@@ -147,15 +156,15 @@ class Runs:
         known = set(self.final.index.droplevel(["method", "region"]))
         return [pair for pair in self.plan.pairs if pair in known]
 
-    def took(self, pair: tuple[str, str], variant: str) -> pd.DataFrame:
-        """Seconds and peak memory, MB, of a variant's stages; NaN for those that are switched off."""
-        every = pd.MultiIndex.from_product([[pair[0]], [pair[1]], [variant], self.plan.stages])
-        return self.times.reindex(every).set_axis(self.plan.stages)
-
     @cached_property
     def times(self) -> pd.DataFrame:
         """Seconds and peak memory, MB, of stages that are switched on; rows ``(dataset, scene, variant, stage)``."""
         return self.maps[["seconds", "peak_memory_mb"]].dropna().droplevel(["choice", "protocol", "region"])
+
+    @cached_property
+    def totals(self) -> pd.DataFrame:
+        """Seconds of all stages, and the largest peak memory; rows ``(dataset, scene, variant)``."""
+        return self.times.groupby(level=KEYS[:3]).agg({"seconds": "sum", "peak_memory_mb": "max"})
 
     def reliability(self, variant: str, pairs: Sequence[tuple[str, str]]) -> Reliability:
         """Reliability of a variant's confidence over the pixels of several scenes together."""
@@ -180,13 +189,8 @@ class Runs:
         told = [self.problem(dataset, scenes, name) if kind == EXTERNAL else "" for name, kind in found]
         return pd.Series(told, self.methods.index, dtype=object)
 
-    def has_column(self, dataset: str, method: str) -> bool:
-        """Whether an external method has a column on a dataset's page.
 
-        A method with files for other datasets only has none. A method without any file has one, to show the problem.
-        """
-        with_file = {one for one, scene in self.plan.pairs if self.problem(one, [scene], method) != NO_FILE}
-        return dataset in with_file or (not with_file and dataset in self.plan.scenes)
+_KIND = "file of a report's numbers (written by python -m sepi.report.tables)"
 
 
 def weighted_means(values: pd.DataFrame, pixels: pd.Series, by: Any) -> pd.DataFrame:
@@ -204,32 +208,23 @@ def read_numbers(path: Path) -> Runs:
     SepiError
         If a file is missing or has other contents.
     """
-    facts = read_json(path, {"plan", "scenes"}, "the numbers of a report", "sepi.report.numbers")
-    table = path.with_suffix(".csv")
-    try:
+    facts, table = read_json(path, {"plan", "scenes"}, _KIND), path.with_suffix(".csv")
+    with reading(table, _KIND):
         kinds = dict.fromkeys([*KEYS, "score"], str) | {"value": float}
         numbers = pd.read_csv(table, usecols=[*kinds], dtype=kinds, keep_default_na=False, na_values={"value": ["nan"]})
-    except OSError as error:
-        raise SepiError(f"{table}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
-        raise SepiError(f"{table}: not the numbers of a report, which python -m sepi.report.tables writes") from error
     return Runs(facts, numbers)
 
 
-def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, Any]:
-    """The JSON object in a file of ``module``; messages call it ``what``.
+def read_json(path: Path, keys: set[str], kind: str) -> dict[str, Any]:
+    """The JSON object in a file of this kind.
 
     Raises
     ------
     SepiError
         If the file is missing or lacks one of the keys.
     """
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, RecursionError) as error:
-        raise SepiError(f"{path}: not JSON ({error}); expected what python -m {module} writes") from error
-    if not isinstance(found, dict) or not keys <= found.keys():
-        raise SepiError(f"{path}: not {what}, which python -m {module} writes")
+    with reading(path, kind):
+        found = dict(json.loads(path.read_text(encoding="utf-8")))
+        if not keys <= found.keys():
+            raise ValueError(f"without {', '.join(sorted(keys - found.keys()))}")
     return found

@@ -92,12 +92,7 @@ def _variant_rows(runs: Runs, pair: tuple[str, str]) -> pd.DataFrame:
         theirs = table().reindex(index=[place], columns=counterparts).iloc[0].to_numpy()
         found[f"{score}_published"] = shown(pd.DataFrame(theirs))[0].to_list()
         found[f"{score}_ratio"] = (found[score] / theirs).astype(object).where(~np.isnan(theirs), "")
-    took = [runs.took(pair, variant) for variant in variants]
-    return found.assign(
-        **{region: scores["mse100", region] for region in _PARTS},
-        seconds=[one["seconds"].sum() for one in took],
-        peak_memory_mb=[one["peak_memory_mb"].max() for one in took],
-    )
+    return found.assign(**{region: scores["mse100", region] for region in _PARTS}, **runs.totals.loc[pair])
 
 
 _EDGES = {
@@ -116,10 +111,8 @@ _EDGES = {
 
 def edge_table(runs: Runs) -> Table:
     """Scores beside depth discontinuities and away from them, of the compared variants and external methods' maps."""
-    plan, external = runs.plan, runs.methods[runs.methods["kind"] == Kind.EXTERNAL]
-    names = list(external["name"].items())
-    columns = {one: [key for key, name in names if runs.has_column(one, name)] for one in plan.scenes}
-    maps = [(*pair, key) for pair in runs.scored_pairs for key in (*map(own_key, plan.compared), *columns[pair[0]])]
+    ours = list(map(own_key, runs.plan.compared))
+    maps = [(*pair, key) for pair in runs.scored_pairs for key in (*ours, *runs.external_of(pair[0]).index)]
     names = ["dataset", "scene", "method", "region"]
     whole, there = (
         runs.final.reindex(pd.MultiIndex.from_tuples([(*one, region) for one in maps], names=names)).reset_index()
@@ -127,7 +120,7 @@ def edge_table(runs: Runs) -> Table:
     )
     rows = whole[["dataset", "scene", "variant"]].join(edge_budget(whole, there))[whole["pixels"].notna()]
     texts = shown(rows, missing="n/a").assign(scene=rows["dataset"] + "/" + rows["scene"])
-    kinds = list(whole["method"][rows.index].isin(external.index).map({True: Kind.EXTERNAL, False: ""}))
+    stages = whole["stage"][rows.index]
     return Table(
         "Depth discontinuities",
         f"{PROTOCOL_NOTE} There: up to {REACH} pixels beside a depth discontinuity of the ground truth, where "
@@ -136,7 +129,7 @@ def edge_table(runs: Runs) -> Table:
         "background's pixels there, those whose estimate is nearer than the middle between both surfaces; thinning: of "
         "the foreground's, those whose estimate is more distant.",
         rows[["dataset", *_EDGES]],
-        [section("", _EDGES, texts, rows=kinds)],
+        [section("", _EDGES, texts, rows=list(stages.where(stages == EXTERNAL, "")))],
     )
 
 
@@ -196,10 +189,10 @@ def stage_table(runs: Runs) -> Table:
     heads |= {region: Head(f"{SCORES['mse100']}, {region}") for region in _PARTS}
     sections = []
     for (dataset, scene, protocol), found in texts.groupby(["dataset", "scene", "protocol"], sort=False):
-        elsewhere = [name for name in plan.external if not runs.has_column(dataset, name)]
-        found = found[(found["region"] == WHOLE_MAP) & ~((found["choice"] == "") & found["variant"].isin(elsewhere))]
+        here = (found["stage"] != EXTERNAL) | found["variant"].isin(runs.external_of(dataset)["name"])
+        found = found[(found["region"] == WHOLE_MAP) & here]
         heading = f"{dataset}/{scene}, protocol {protocol} (border {PROTOCOLS[protocol]})"
-        sections.append(section(heading, heads, found, rows=list(found["stage"].where(found["choice"] == "", ""))))
+        sections.append(section(heading, heads, found, rows=list(found["stage"].where(found["stage"] == EXTERNAL, ""))))
     return Table(
         "Scores after each stage",
         "Whole map unless a region is named; both protocols. A non-finite estimate counts as bad; how many there are, "
@@ -217,8 +210,7 @@ def runtime_table(runs: Runs) -> Table:
     steps = [*plan.stages, "total"]
     heads = {"variant": Head("variant", Kind.TEXT), **{step: Head(f"{step} / s") for step in steps}}
     heads |= {"ratio": Head("published / this code", Kind.RATIO), "peak_memory_mb": Head("peak memory / MB")}
-    totals = runs.times.groupby(level=KEYS[:3]).agg({"seconds": "sum", "peak_memory_mb": "max"})
-    times = pd.concat([runs.times, totals.assign(stage="total").set_index("stage", append=True)])
+    times = pd.concat([runs.times, runs.totals.assign(stage="total").set_index("stage", append=True)])
     index = [(*pair, variant, step) for pair in plan.pairs for variant in plan.variants for step in steps]
     rows = times.reindex(pd.MultiIndex.from_tuples(index, names=KEYS[:4])).reset_index()
     # published seconds belong to the paper's method only, and to light fields of one size

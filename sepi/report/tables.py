@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import click
 
-from sepi.io.files import atomic_path
+from sepi.io.files import write_whole
 from sepi.process.command import PATH, SepiCommand
 from sepi.report import published
 from sepi.report.comparison import ablation_table, region_table, scene_table
@@ -17,7 +16,7 @@ from sepi.report.numbers import collect, write_numbers
 from sepi.report.plan import Plan
 from sepi.report.properties import error_bar_table, property_table
 from sepi.report.properties import scene_table as rendered_scene_table
-from sepi.report.runs import Runs, read_json, read_numbers
+from sepi.report.runs import Runs, read_numbers
 from sepi.report.scores import computed_methods_table, edge_table, parts_table, runtime_table, stage_table
 from sepi.report.table import Table, as_csv, as_latex, as_markdown
 
@@ -53,8 +52,7 @@ def write_tables(runs: Runs, folder: Path) -> None:
     for name in runs.plan.tables:
         found = table(name, runs)
         for ending, text in (("csv", as_csv(found)), ("md", as_markdown(found)), ("tex", as_latex(found, name))):
-            with atomic_path(folder / f"{name}.{ending}") as temporary:
-                temporary.write_text(text, encoding="utf-8", newline="\n")
+            write_whole(folder / f"{name}.{ending}", text)
 
 
 @click.command(name="python -m sepi.report.tables", cls=SepiCommand)
@@ -62,19 +60,17 @@ def write_tables(runs: Runs, folder: Path) -> None:
 @click.option("--plan", "path", type=PATH, required=True, help="JSON: scenes of datasets, choices of variants.")
 @click.option("--output", type=PATH, required=True, help="JSON file to write, a CSV beside it.")
 @click.option("--tables", "folder", type=PATH, required=True, help="Folder for the tables.")
-@click.option("--charts", "figures", type=PATH, help="Folder for the charts; default: none are drawn.")
-def command(results: Path, path: Path, output: Path, folder: Path, figures: Path | None) -> None:
+@click.option("--charts", "figures", type=PATH, required=True, help="Folder for the charts, if the report has any.")
+def command(results: Path, path: Path, output: Path, folder: Path, figures: Path) -> None:
     """Write all numbers of a report, its tables, and its charts."""
-    told = read_json(path, {"scenes", "variants"}, "the plan of a report", "snakemake")
-    write_numbers(collect(Plan.from_json(results, json.dumps(told))), output)
+    write_numbers(collect(Plan.from_json(results, path.read_text(encoding="utf-8"))), output)
     # as a page reads them
     runs = read_numbers(output)
     write_tables(runs, folder)
-    if figures is not None:
+    for name in runs.plan.charts:
         from sepi.report.charts import CHARTS
 
-        for name in runs.plan.charts:
-            CHARTS[name](figures, name, runs)
+        CHARTS[name](figures, name, runs)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -20,7 +19,7 @@ import numpy.typing as npt
 from sepi.io.scores import Scores
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.scoring.regions import in_frame
-from sepi.stage import CLOSE, REACH, StageMaps
+from sepi.stage import CLOSE, ERROR_BARS, REACH, StageMaps
 from sepi.validation import require_type
 
 STEPS = 100
@@ -111,6 +110,9 @@ ERROR_BAR_SCORES: dict[str, str] = {
 }
 """Score of error bars to its name in tables; only for maps with error bars."""
 
+# maps whose values are scored
+_SCORED = ("disparity", "confidence", *ERROR_BARS)
+
 BINS = 10
 """Number of equal bins of the stated probability, 0..1."""
 
@@ -147,46 +149,39 @@ class Reliability(NamedTuple):
         return 100 * float(gaps.max()) if gaps.size else float("nan")
 
 
-@dataclass(frozen=True)
-class ErrorBars:
+class ErrorBars(NamedTuple):
     """Error bars of a disparity map, and the quantities needed to score them.
 
     Attributes
     ----------
-    sigma, low, high, confidence : ndarray, shape (H, W), float32
-        Maps as in :class:`sepi.StageMaps`.
+    maps : StageMaps
+        With ``sigma``, ``low``, ``high`` and a confidence.
     close : float or None
         Error bound of the confidence in pixels per view step; None if the views' distance is unknown.
     truth_step : float
         Rounding step of the ground truth in pixels per view step; 0 if it is not rounded.
     """
 
-    sigma: FloatMap
-    low: FloatMap
-    high: FloatMap
-    confidence: FloatMap
+    maps: StageMaps
     close: float | None = None
     truth_step: float = 0.0
 
     @classmethod
     def of(cls, maps: StageMaps, reach: float | None = None, truth_step: float = 0.0) -> Self | None:
         """Error bars of final maps, or None without any; ``reach`` is the light field's."""
-        if maps.sigma is None or maps.low is None or maps.high is None:
+        if any(name not in maps.extra for name in ERROR_BARS):
             return None
-        close = CLOSE * REACH / reach if reach else None
-        return cls(maps.sigma, maps.low, maps.high, maps.confidence, close, truth_step)
+        return cls(maps, CLOSE * REACH / reach if reach else None, truth_step)
 
     def in_frame(self, offset: tuple[int, int], shape: tuple[int, int]) -> Self:
         """Error bars of a crop, placed in the whole image as by :func:`sepi.scoring.regions.in_frame`."""
-        maps = (self.sigma, self.low, self.high, self.confidence)
-        sigma, low, high, confidence = (in_frame(values, offset, shape)[0] for values in maps)
-        return replace(self, sigma=sigma, low=low, high=high, confidence=confidence)
+        maps = {name: in_frame(self.maps.all()[name], offset, shape)[0] for name in _SCORED}
+        return self._replace(maps=self.maps.updated(**maps))
 
     def scores(self, estimate: FloatMap, ground_truth: FloatMap, chosen: BoolMap) -> Scores:
         """The :data:`ERROR_BAR_SCORES` over the chosen pixels (H, W) with finite ground truth."""
-        picked = (values[chosen] for values in (estimate, ground_truth, self.sigma, self.low, self.high))
-        disparity, truth, sigma, low, high = picked
-        confidence = self.confidence[chosen]
+        sigma, low, high = (self.maps.extra[name][chosen] for name in ERROR_BARS)
+        disparity, truth, confidence = (values[chosen] for values in (estimate, ground_truth, self.maps.confidence))
         error = np.abs(disparity.astype(np.float64) - truth)
         # without a finite estimate there is no interval
         low = np.where(np.isfinite(disparity), low, np.float32(np.nan))

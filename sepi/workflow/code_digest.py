@@ -37,7 +37,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sepi.errors import SepiError
-from sepi.io.files import atomic_path
+from sepi.io.files import write_whole
 
 if TYPE_CHECKING:
     from sepi.stage import Choice
@@ -237,5 +237,5 @@ def keep(folder: Path) -> None:
     files = {file for file, _, _ in _read.values()}
     kept = {key: code for key, code in _before.items() if code[0] not in files and Path(code[0]).is_file()} | _read
     if folder.is_dir() and kept != _before:
-        with suppress(OSError, SepiError), atomic_path(folder / _KEPT) as temporary:
-            temporary.write_text(json.dumps(kept), encoding="utf-8")
+        with suppress(OSError, SepiError):
+            write_whole(folder / _KEPT, json.dumps(kept))

@@ -169,20 +169,15 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
     datasets: dict[str, Dataset] = {name: getattr(config, name) for name in DATASETS}
     found = {name: dataset.found(f"config.{name}", entries) for name, dataset in datasets.items()}
     scenes = _scenes(config, [scene for name in found if not datasets[name].apart for scene in found[name]])
-    apart = {f"{name}/{scene.name}": scene for name in found if datasets[name].apart for scene in found[name]}
+    scenes |= {f"{name}/{scene.name}": scene for name in found if datasets[name].apart for scene in found[name]}
     ranges = config.disparity_range
-    require_known("config.disparity_range", ranges, scenes | apart)
+    require_known("config.disparity_range", ranges, scenes)
     for name, (minimum, maximum) in ranges.items():
         DisparityRange(minimum, maximum, f"config.disparity_range of {name}")
-    _require_inside(config.report.pixels, scenes | apart)
+    _require_inside(config.report.pixels, scenes)
     variants = {name: _variant(name, entries) for name in entries}
-
-    def with_ranges(found: Mapping[str, Scene]) -> dict[tuple[str, str], Scene]:
-        return {(one.dataset, one.name): replace(one, disparity_range=ranges.get(name)) for name, one in found.items()}
-
     return Settings(
-        with_ranges(scenes),
-        with_ranges(apart),
+        {(one.dataset, one.name): replace(one, disparity_range=ranges.get(name)) for name, one in scenes.items()},
         variants,
         stage_settings(config.stages, variants),
         {name: _external(name, entry, variants) for name, entry in config.external.items()},

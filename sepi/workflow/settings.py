@@ -99,9 +99,8 @@ class Settings:
     Attributes
     ----------
     scenes : mapping of (dataset, scene) to Scene
-        Every scene of ``all``, ``ablation`` and ``comparison``, in the tables' order.
-    scenes_apart : mapping of (dataset, scene) to Scene
-        Scenes of datasets that stand apart.
+        Every scene of ``all``, ``ablation`` and ``comparison``, in the tables' order, then those of datasets that stand
+        apart.
     variants : mapping of str to Variant
         The built-in variants, then the user's own.
     parameters : mapping of stage to label to Parameters
@@ -117,7 +116,6 @@ class Settings:
     """
 
     scenes: Mapping[tuple[str, str], Scene]
-    scenes_apart: Mapping[tuple[str, str], Scene]
     variants: Mapping[str, Variant]
     parameters: Mapping[str, Mapping[str, Parameters]]
     external: Mapping[str, ExternalSource]
@@ -128,7 +126,7 @@ class Settings:
     @property
     def datasets(self) -> list[str]:
         """Names of the datasets that have scenes, except those that stand apart."""
-        return list(dict.fromkeys(dataset for dataset, _ in self.scenes))
+        return list(dict.fromkeys(dataset for dataset, _ in self.scenes if dataset not in self.apart))
 
     @property
     def own_variants(self) -> list[str]:
@@ -137,7 +135,7 @@ class Settings:
 
     def scenes_of(self, dataset: str) -> list[str]:
         """Names of a dataset's scenes."""
-        return [name for other, name in (*self.scenes, *self.scenes_apart) if other == dataset]
+        return [name for other, name in self.scenes if other == dataset]
 
     def scene(self, dataset: str, name: str) -> Scene:
         """A scene by name.
@@ -148,12 +146,10 @@ class Settings:
             If it does not exist; the message suggests the nearest name.
         """
         # called by thousands of jobs: names are listed only on an error
-        for known in (self.scenes, self.scenes_apart):
-            if (dataset, name) in known:
-                return known[dataset, name]
-        require_known("dataset", [dataset], dict.fromkeys([*self.datasets, *(one for one, _ in self.scenes_apart)]))
-        require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
-        raise AssertionError(f"{dataset}/{name} is among the known ones")
+        if (dataset, name) not in self.scenes:
+            require_known("dataset", [dataset], dict.fromkeys(one for one, _ in self.scenes))
+            require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
+        return self.scenes[dataset, name]
 
     def require_target(self, path: str) -> None:
         """Check the names in a requested path, if it is a file of the results or an image of a scene.
@@ -180,7 +176,8 @@ class Settings:
         """Whether the report's page is made."""
         if not added("scenes"):
             return False
-        return len(self.scenes) <= MOST_ON_PAGE if self.report.page is None else self.report.page
+        number = sum(dataset not in self.apart for dataset, _ in self.scenes)
+        return number <= MOST_ON_PAGE if self.report.page is None else self.report.page
 
     def parameters_json(self, stage: str, label: str) -> str:
         """Parameters of a stage's choice as JSON with sorted keys."""

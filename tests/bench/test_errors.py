@@ -1,7 +1,5 @@
 """The numbers of the error bars make the errors likeliest, and say of other scenes what they say of these."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -16,7 +14,7 @@ TRUE = Calibration(
     outlier={CONSTANT: -3.0, "confidence": -1.0},
     rim={CONSTANT: -3.0},
 )
-FORM = Calibration(*(dict.fromkeys(part, 0.0) for part in TRUE.parts))
+FORM = Calibration(*(dict.fromkeys(part, 0.0) for part in TRUE))
 
 
 def drawn(name: str, seed: int, pixels: int = 20_000) -> Sample:
@@ -40,7 +38,7 @@ def drawn(name: str, seed: int, pixels: int = 20_000) -> Sample:
 
 
 def assert_close(found: Calibration, tolerance: float) -> None:
-    for part, true in zip(found.parts, TRUE.parts, strict=True):
+    for part, true in zip(found, TRUE, strict=True):
         assert part == pytest.approx(true, abs=tolerance)
 
 
@@ -61,7 +59,7 @@ def test_a_fit_finds_the_numbers_that_errors_were_drawn_with() -> None:
 def test_a_cue_is_added_without_moving_what_it_rests_on() -> None:
     """Of few views alone: full light fields keep their bars to the last digit that is written."""
     constant = 1.0 + TRUE.scale["few_views"] * np.log(FLOORS["few_views"])
-    before = replace(TRUE, scale=TRUE.scale | {CONSTANT: constant, "few_views": 0.0})
+    before = TRUE._replace(scale=TRUE.scale | {CONSTANT: constant, "few_views": 0.0})
     found = fitted([drawn("one", 0)], before, ["few_views"])
     assert_close(found, 0.05)
     assert {**found.scale, CONSTANT: 1.0, "few_views": 0.7} == TRUE.scale

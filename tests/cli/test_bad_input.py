@@ -182,7 +182,7 @@ def test_values_that_lie_too_deep_in_each_other_are_one_line(tmp_path: Path) -> 
     """Python's parser of JSON gives up with a traceback of its own."""
     deep = "[" * 100_000
     (tmp_path / "numbers.json").write_text(deep)
-    assert "not JSON" in reading_error(tmp_path / "numbers.json", read_numbers)
+    assert "not a file of a report's numbers" in reading_error(tmp_path / "numbers.json", read_numbers)
     setting = f"initial.sepi.num_disparities={deep}"
     called = CliRunner().invoke(main, ["depth", str(tmp_path), "--variant", "paper", "--set", setting])
     assert "num_disparities: input should be a valid integer" in error_of(called)

@@ -17,6 +17,7 @@ def test_an_unsure_pixel_lies_in_the_range_and_its_interval_holds_it(calibration
     cues = {name: np.full_like(disparity, value) for name in FLOORS}
     cues |= {"above": np.full_like(disparity, 3), "below": np.full_like(disparity, 2)}
     bars = error_bars(disparity, cues, DisparityRange(-1, 1, "given"), calibration)
-    assert np.isfinite(bars).all()
-    assert ((bars.low >= -1) & (bars.low <= disparity) & (disparity <= bars.high) & (bars.high <= 1)).all()
-    assert ((bars.confidence >= 0) & (bars.confidence <= 1)).all()
+    assert np.isfinite(list(bars.values())).all()
+    low, high, confidence = bars["low"], bars["high"], bars["confidence"]
+    assert ((low >= -1) & (low <= disparity) & (disparity <= high) & (high <= 1)).all()
+    assert ((confidence >= 0) & (confidence <= 1)).all()

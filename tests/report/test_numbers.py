@@ -101,8 +101,8 @@ def test_a_stage_that_hands_its_maps_on_has_scores_and_no_time(found: Runs) -> N
         for stage in ("initial", "occlusion")
     )
     pd.testing.assert_frame_equal(handed_on, before)
-    took = found.took(("hci", "cotton"), "no_occlusion")["seconds"]
-    assert [*took.fillna(0)] == [1.5, 0, 1.5, 1.5]
+    took = found.times.sort_index().loc[("hci", "cotton", "no_occlusion"), "seconds"]
+    assert [*took.reindex(found.plan.stages, fill_value=0)] == [1.5, 0, 1.5, 1.5]
 
 
 def test_a_score_over_no_pixels_comes_back(found: Runs) -> None:

@@ -34,10 +34,10 @@ HEADS = ",".join([*KEYS, "score", "value"])
     ("name", "content", "message"),
     [
         ("a.json", None, "cannot be read"),
-        ("a.json", '{"plan": {}}', "not the numbers of a report"),
+        ("a.json", '{"plan": {}}', "not a file of a report's numbers"),
         ("a.csv", None, "cannot be read"),
-        ("a.csv", "\xff", "not the numbers of a report"),
-        ("a.csv", f"{HEADS}\n1,2,3,4,5,6,7,8,words\n", "not the numbers of a report"),
+        ("a.csv", "\xff", "not a file of a report's numbers"),
+        ("a.csv", f"{HEADS}\n1,2,3,4,5,6,7,8,words\n", "not a file of a report's numbers"),
     ],
 )
 def test_wrong_numbers_are_one_line(name: str, content: str | None, message: str, found: Runs, tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from sepi.camera.rig import WORLD, Rig
-from sepi.io.files import atomic_folder, atomic_path
+from sepi.io.files import atomic_folder, atomic_path, write_whole
 from sepi.io.images import write_png
 from sepi.io.point_cloud import PointCloud, write_ply
 from sepi.lightfield import FloatMap
@@ -123,8 +123,7 @@ def _with_pictures(
 def _write_maps(path: Path, maps: FloatMap) -> None:
     """Write maps (C, H, W) in COLMAP's binary format."""
     channels, height, width = maps.shape
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(f"{width}&{height}&{channels}&".encode("ascii") + maps.astype("<f4").tobytes())
+    write_whole(path, f"{width}&{height}&{channels}&".encode("ascii") + maps.astype("<f4").tobytes())
 
 
 def _cameras(posed: PosedViews) -> Iterator[str]:
@@ -197,8 +196,7 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
             cloud = PointCloud(rig.to_world(posed.points).astype(np.float32), posed.colours, metric=True)
             axes = _AXES, f"{posed.units}; origin: camera of the reference view"
             write_ply(temporary / _CLOUD, cloud, axes if posed.rig is None else (WORLD, posed.units))
-        with atomic_path(temporary / "transforms.json") as path:
-            path.write_text(json.dumps(_transforms(posed, rig), indent=1) + "\n", encoding="ascii")
+        write_whole(temporary / "transforms.json", json.dumps(_transforms(posed, rig), indent=1) + "\n")
 
 
 def _write_millimetres(path: Path, metres: FloatMap) -> None:

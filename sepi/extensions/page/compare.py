@@ -18,7 +18,7 @@ from sepi.errors import SepiError
 from sepi.extensions.page.page import SCRIPTS, colour_scales, embedded_scenes, environment
 from sepi.extensions.page.viewer import viewer_json
 from sepi.io.all_views import read_disparity_at, read_error_bars_at
-from sepi.io.files import atomic_path
+from sepi.io.files import write_whole
 from sepi.io.scores import AllScores
 from sepi.lightfield import FloatMap, LightField
 from sepi.process.command import SepiCommand
@@ -195,8 +195,7 @@ def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, own: Trut
     bars = read_error_bars_at(a, view), read_error_bars_at(b, view)
     step = 0.0 if own is None else own.step
     found = Comparison(_names(a, b), maps, values, light_field, bars, step)
-    with atomic_path(output) as temporary:
-        temporary.write_text(comparison_page(found), encoding="utf-8")
+    write_whole(output, comparison_page(found))
     for name, scores in found.scores.items():
         click.echo(f"{name}\n{score_table(scores, truth_step=step)}\n")
     click.echo(f"written: {output}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,10 +15,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from matplotlib.colors import Colormap
 
-from sepi.io.files import atomic_path
+from sepi.io.files import write_whole
 from sepi.process.command import SepiCommand
 from sepi.report import charts, published
-from sepi.report.charts import known
 from sepi.report.pictures import error_scale, scale_colours
 from sepi.report.runs import Runs, count_note, own_key, read_json, read_numbers
 from sepi.report.tables import table
@@ -89,6 +89,11 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
             title = f"{dataset}, average of {len(others)}" if len(others) > 1 else f"{dataset}/{others[0]}"
             rows.append({"scene": title, "published": [None, None], **ours(dataset, others)})
     return rows
+
+
+def known(figure: float) -> float | None:
+    """The figure, None for NaN."""
+    return None if math.isnan(figure) else float(figure)
 
 
 def missing_scenes(runs: Runs) -> dict[str, list[str]]:
@@ -183,7 +188,8 @@ def read_scene(path: Path) -> dict[str, Any]:
     SepiError
         If the file is missing or has other contents.
     """
-    return read_json(path, {"dataset", "scene", "panels", "arrays"}, "a scene of a report", "sepi.report.figures")
+    kind = "scene of a report (written by python -m sepi.report.figures)"
+    return read_json(path, {"dataset", "scene", "panels", "arrays"}, kind)
 
 
 _FILE = click.Path(path_type=Path)
@@ -202,8 +208,7 @@ def command(numbers_path: Path, parts_path: Path | None, output: Path, scenes: P
         [read_scene(scenes / dataset / f"{scene}.json") for dataset, scene in runs.plan.pictured],
         None if parts_path is None else read_numbers(parts_path),
     )
-    with atomic_path(output) as temporary:
-        temporary.write_text(html, encoding="utf-8")
+    write_whole(output, html)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ TEMPLATES = sorted(Path(find_spec("sepi.extensions.page").origin).with_name("tem
 # Page of a report: all numbers, tables and scenes in one file
 rule page:
     input:
-        numbers=lambda wildcards: multiext(f"reports/report{report_of(wildcards).ending}", ".json", ".csv"),
+        numbers=lambda wildcards: number_files(plan_of(wildcards)),
         published=sorted(PUBLISHED.glob("*.csv")),
         parts=lambda wildcards: [] if wildcards.report else PARTS_OF_BEST,
         scenes=pages_of_scenes,
@@ -17,12 +17,11 @@ rule page:
     benchmark:
         "benchmarks/{report}page.tsv"
     localrule: True
-    threads: 1
     resources:
         mem_mb=1000,
     params:
         parts=lambda wildcards, input: ["--parts", input.parts[0]] if input.parts else [],
-        scenes=folder_of_scenes,
+        scenes=lambda wildcards, output: f"{folder_of_output(wildcards, output)}/page",
         code=code_digest("sepi.extensions.page.page"),
     message:
         "page of the report"

@@ -14,7 +14,7 @@ from sepi.extensions.page.probe import Probe, probe, to_json
 from sepi.extensions.page.probe_figure import write_probes
 from sepi.extensions.page.viewer import viewer_json
 from sepi.inspection.coded_views import comparable
-from sepi.io.files import atomic_path
+from sepi.io.files import write_whole
 from sepi.io.provenance import history_of
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.report.panels import Panel, SceneResults, first_final
@@ -81,9 +81,8 @@ def write_scene(
     if probes:
         write_probes(folder / "pixels", probes, reference_picture(results.light_field))
     if page is not None:
-        with atomic_path(page) as temporary:
-            text = json.dumps(page_json(results, panels, dataset, scene, probes), separators=(",", ":"))
-            temporary.write_text(text, encoding="utf-8")
+        told = page_json(results, panels, dataset, scene, probes)
+        write_whole(page, json.dumps(told, separators=(",", ":")))
 
 
 def page_json(

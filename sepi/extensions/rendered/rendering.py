@@ -23,7 +23,7 @@ from sepi.extensions.rendered.sampling import pictured, planned, with_shared_lig
 from sepi.extensions.rendered.shapes import Points
 from sepi.extensions.rendered.tracing import Tracer
 from sepi.extensions.rendered.world import FloatArray, Rig, Share, World, rig_of
-from sepi.io.files import atomic_path
+from sepi.io.files import atomic_path, write_whole
 from sepi.io.provenance import package_version
 from sepi.process.threads import threads_used, use_threads
 from sepi.stage import no_progress
@@ -93,8 +93,7 @@ def render_world(
     record, note = json.dumps({**made_by(name, options), "world": digest}, sort_keys=True), parts / "made_by.json"
     if not (note.is_file() and note.read_text(encoding="utf-8") == record):
         shutil.rmtree(parts, ignore_errors=True)
-        with atomic_path(note) as temporary:
-            temporary.write_text(record, encoding="utf-8")
+        write_whole(note, record)
     files = [parts / f"view_{number:03d}.npz" for number in range(count)]
     # those that are not there, or cut off
     missing = [number for number, file in enumerate(files) if not is_zipfile(file)]

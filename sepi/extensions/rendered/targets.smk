@@ -17,7 +17,7 @@ def without_renderer(wildcards):
 
 def rendered_files():
     """All files of the report on rendered scenes."""
-    if not SETTINGS.scenes_apart:
+    if not SETTINGS.scenes_of(DATASET):
         sys.exit("sepi: config.rendered.scenes: names no scene; leave the key out for all scenes")
     return report_files(DATASET)
 

@@ -19,7 +19,7 @@ from pydantic import Field
 from sepi.errors import SepiError
 from sepi.io.codecs import write_tiff
 from sepi.io.disparity_maps import read_pfm, write_pfm
-from sepi.io.files import atomic_folder, atomic_path, naming, reading, remove_files
+from sepi.io.files import atomic_folder, naming, reading, remove_files, write_whole
 from sepi.io.hdf5 import Properties, has_dataset, is_own, read_light_field, write_light_field
 from sepi.io.images import SUFFIXES, read_picture, write_png
 from sepi.io.readers.arrays import rearrange
@@ -211,8 +211,7 @@ def _write_folder(folder: Path, light_field: LightField) -> set[str]:
         f"  {json.dumps(key)}: {json.dumps(value)}"
         for key, value in known.model_dump(mode="json", exclude=_APART).items()
     ]
-    with atomic_path(folder / MANIFEST) as temporary:
-        temporary.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="ascii")
+    write_whole(folder / MANIFEST, "{\n" + ",\n".join(lines) + "\n}\n")
     return {path.name for path in folder.iterdir()}
 
 

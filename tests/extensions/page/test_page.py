@@ -206,16 +206,14 @@ def test_ablation_bars(runs: Runs, example: Example) -> None:
     groups = {(group.dataset, group.region): group for group in charts.ablation_bars(runs)}
     assert {region for _, region in groups} == {"whole map", *REGIONS[1:]}
     whole = groups["hci", "whole map"]
-    bars = {bar.variant: bar for bar in whole.rows}
     assert (whole.scenes, whole.over) == (1, "")
-    assert bars["paper"].published == published.table4().at[("hci", "paper"), "all"] == 4.34
-    assert bars["best"].published is None
-    assert bars["paper"].ours == score_of(example, COTTON, "paper")
-    assert whole.largest == max(score_of(example, COTTON, "paper"), score_of(example, COTTON, "best"), 4.34)
-    builtin = {bar.variant: bar for bar in groups["builtin", "occluded"].rows}
-    assert builtin["paper"].ours == score_of(example, DOTS, "paper", "occluded")
+    assert whole.figures.at["paper", "published"] == published.table4().at[("hci", "paper"), "all"] == 4.34
+    assert np.isnan(whole.figures.at["best", "published"])
+    assert whole.figures.at["paper", "ours"] == score_of(example, COTTON, "paper")
+    occluded = groups["builtin", "occluded"].figures
+    assert occluded.at["paper", "ours"] == score_of(example, DOTS, "paper", "occluded")
     assert groups["hci_2013", "whole map"].scenes == 0
-    assert all(bar.ours is None for bar in groups["hci_2013", "whole map"].rows)
+    assert groups["hci_2013", "whole map"].figures["ours"].isna().all()
     assert not [key for key in groups if key[0] == PICTURE[0]], "a dataset without truth has no bars"
 
 

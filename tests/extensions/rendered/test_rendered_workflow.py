@@ -29,10 +29,10 @@ def test_scenes_are_named_by_noise_and_seed() -> None:
     """YAML reads a bare ``off`` as false; without noise every seed would give the same light field."""
     settings = load_settings({"rendered": TWO, "disparity_range": {"rendered/room_low_2": [-1, 2]}})
     names = ["sticks", "room", "sticks_low", "sticks_low_2", "room_low", "room_low_2"]
-    assert [name for _, name in settings.scenes_apart] == names
+    assert settings.scenes_of("rendered") == names
     assert settings.scene("rendered", "room_low_2").disparity_range == (-1, 2)
     assert settings.scene("rendered", "room_low_2").samples == 9 * 64**2
-    assert len(load_settings({}).scenes_apart) == 3 * len(RENDERED)
+    assert len(load_settings({}).scenes_of("rendered")) == 3 * len(RENDERED)
     for name in (RenderedScene("a_b"), RenderedScene("low", "high"), RenderedScene("c", "low", 12)):
         assert rendered_scene(name.name) == name
 
