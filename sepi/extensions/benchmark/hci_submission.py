@@ -10,8 +10,6 @@ References
        estimation on 4D light fields", ACCV 2016. doi:10.1007/978-3-319-54187-7_2
 """
 
-from __future__ import annotations
-
 import math
 import stat
 import struct

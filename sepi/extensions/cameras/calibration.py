@@ -6,8 +6,6 @@ Lenses stay as in the files, or at usual values, until all pictures are placed. 
 lens is kept if the points lie clearly closer.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

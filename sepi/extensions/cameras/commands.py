@@ -1,7 +1,5 @@
 """The commands ``sepi calibrate`` and ``sepi poses``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

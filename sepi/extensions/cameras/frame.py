@@ -8,8 +8,6 @@ A camera at ``dz`` in front of the reference camera, with the focal length ``f (
 sees. This factor is 1 at the depth ``Z0`` in the middle of the scene, and close to 1 near it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 

@@ -1,13 +1,11 @@
 """Calibrated cameras from files, their pictures and lenses, and checks that they suit a light field."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -86,7 +84,7 @@ class CameraModel:
         """Viewing directions of the cameras, (N, 3)."""
         return np.array([shot.rotation[2] for shot in self.shots])
 
-    def without(self, names: tuple[str, ...]) -> CameraModel:
+    def without(self, names: tuple[str, ...]) -> Self:
         """The model without these pictures, named with or without folders."""
         left_out = {n for name in names for n in self.named(name)}
         return self.of([n for n in range(len(self.shots)) if n not in left_out])
@@ -99,7 +97,7 @@ class CameraModel:
             raise SepiError(f"{self.path}: no picture '{name}' (found: {some}, ...)")
         return found
 
-    def of(self, kept: list[int]) -> CameraModel:
+    def of(self, kept: list[int]) -> Self:
         """The model with only these cameras."""
         return replace(self, pictures=tuple(self.pictures[n] for n in kept))
 

@@ -6,8 +6,6 @@ result is an estimate, since the focal length may be a guess. So it refuses only
 :mod:`sepi.extensions.cameras.rectification` accepts.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor

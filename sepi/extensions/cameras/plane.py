@@ -1,7 +1,5 @@
 """The plane through the cameras: their common axes, and their positions in view steps and on a grid."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

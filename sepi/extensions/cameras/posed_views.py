@@ -16,8 +16,6 @@ If the camera is unknown, focal length and focus distance are free: all choices 
 differ by a projective map. :func:`nominal_camera` makes one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

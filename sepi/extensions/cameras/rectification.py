@@ -4,8 +4,6 @@ The steps: the plane through the cameras and a grid for them (``plane``), the pi
 views themselves (``frame``).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

@@ -14,8 +14,6 @@ References
    doi:10.1109/ICCV.2013.13
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 import cv2

@@ -45,8 +45,6 @@ References
 .. [2] He, Sun: Fast guided filter. arXiv:1505.00996, 2015.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import numpy.typing as npt

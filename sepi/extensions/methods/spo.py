@@ -41,8 +41,6 @@ References
    Computer Vision and Image Understanding 145, 2016. doi:10.1016/j.cviu.2015.12.007
 """
 
-from __future__ import annotations
-
 import numpy as np
 from pydantic import Field
 

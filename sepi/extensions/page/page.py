@@ -1,7 +1,5 @@
 """The page ``reports/index.html``, one file that opens from disk and loads nothing else."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re

@@ -3,8 +3,6 @@
 This is for display only; ground truth is used to find the largest error.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import cv2

@@ -1,7 +1,5 @@
 """A scene for the page, and figures of single pixels beside its pictures."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

@@ -9,8 +9,6 @@ A pixel shows the surface that the ray through its middle meets first. Masks tel
 and which other views see them.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Rendering of a path-traced scene, view by view; a later run continues an interrupted one."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

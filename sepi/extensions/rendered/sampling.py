@@ -7,8 +7,6 @@ views. So a few paths in each view are enough. Pixels with several surfaces keep
 specular surfaces (gloss, mirrors and glass), which look different from view to view, need all.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple

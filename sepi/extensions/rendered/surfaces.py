@@ -1,7 +1,5 @@
 """All triangles of a world in one list, from which the surface at a ray's end follows exactly."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ have disparity zero, as in the HCI 4D benchmark. With the focal length ``f`` in 
 ``d = b f (1 / Z - 1 / F)``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal, NamedTuple
 

@@ -12,8 +12,6 @@ References
 .. [1] Merrell et al.: Real-Time Visibility-Based Fusion of Depth Maps. ICCV 2007. doi:10.1109/ICCV.2007.4408984
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import NoneType
