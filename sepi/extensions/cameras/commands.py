@@ -14,14 +14,12 @@ from sepi.cli.input_options import (
     reading_flags,
 )
 from sepi.errors import SepiError
-from sepi.process.command import SepiCommand, progress_bar
-
-_PATH = click.Path(path_type=Path)
+from sepi.process.command import PATH, SepiCommand, progress_bar
 
 
 @click.command(cls=SepiCommand)
-@click.argument("folder", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="Folder to make; default: NAME-cameras for a FOLDER called NAME.")
+@click.argument("folder", type=PATH)
+@click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-cameras for a FOLDER called NAME.")
 @click.option(
     "--lens",
     default="SIMPLE_RADIAL",
@@ -74,8 +72,8 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
 
 
 @click.command(cls=SepiCommand)
-@click.argument("light_field_path", metavar="INPUT", type=_PATH)
-@click.argument("result_path", metavar="RESULT", type=_PATH)
+@click.argument("light_field_path", metavar="INPUT", type=PATH)
+@click.argument("result_path", metavar="RESULT", type=PATH)
 @click.option(
     "--to",
     "kind",
@@ -84,7 +82,7 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
     show_default=True,
     help="Program to write for.",
 )
-@click.option("-o", "--output", type=_PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
+@click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
 @click.option(
     "--min-confidence",
     type=float,
@@ -120,13 +118,13 @@ def poses(
       sepi poses cotton cotton-depth --to nerfstudio -o cotton-nerf
     """
     from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
-    from sepi.extensions.cameras.posed_views import posed_views
+    from sepi.extensions.cameras.posed_views import PosedViews
     from sepi.io.all_views import read_result_at, surfaces_of
 
     light_field = read_light_field_of(light_field_path, result_path, reading, bare=False)
     result = read_result_at(result_path, reading.options.view)
     folder = output or default_folder(light_field_path, kind)
-    posed = posed_views(
+    posed = PosedViews(
         light_field,
         result.disparity,
         result.confidence,

@@ -39,12 +39,12 @@ def read(path: Path, options: ReadOptions, inverse_depths: tuple[float, float] |
     inverse_depths : (float, float), optional
         Inverse depths of the farthest and the nearest surface; default: from the model's points.
     """
-    from sepi.extensions.cameras.rectification import light_field_of, rectification_of
+    from sepi.extensions.cameras.rectification import Rectification, light_field_of
 
     if options.order != AS_GIVEN or options.central is not None or options.row_spacing is not None:
         raise SepiError(f"{path}: --order, --central and --row-spacing do not apply: the cameras say where views stand")
     model = read_model(path, options.images, options.part).without(options.exclude)
-    light_field = light_field_of(rectification_of(model, options.reference, inverse_depths))
+    light_field = light_field_of(Rectification(model, options.reference, inverse_depths))
     return replace(light_field, name=name_of(path).name, source=str(path))
 
 
@@ -219,4 +219,5 @@ def read_model(path: Path, images: str | None = None, crop_of: Part | None = Non
     pictures = Pictures(found, None if images is None else Path(images).expanduser(), crop_of)
     read = files.read_transforms if found.suffix.lower() == ".json" else files.read_table
     model = (files.read_colmap if found.is_dir() else read)(found, pictures)
-    return replace(model, notes=pictures.notes)
+    model.notes = pictures.notes
+    return model

@@ -13,7 +13,7 @@ from markupsafe import Markup, escape
 from matplotlib.colors import Colormap
 
 from sepi.io.files import atomic_path
-from sepi.process.command import SepiCommand
+from sepi.process.command import PATH, SepiCommand
 from sepi.report import charts, published
 from sepi.report.charts import known
 from sepi.report.pictures import error_scale, scale_colours
@@ -184,14 +184,11 @@ def read_scene(path: Path) -> dict[str, Any]:
     return read_json(path, {"dataset", "scene", "panels", "arrays"}, "a scene of a report", "sepi.report.figures")
 
 
-_FILE = click.Path(path_type=Path)
-
-
 @click.command(name="python -m sepi.extensions.page.page", cls=SepiCommand)
-@click.option("--numbers", "numbers_path", type=_FILE, required=True, help="Numbers of the report (JSON).")
-@click.option("--parts", "parts_path", type=_FILE, help="Numbers of the best variant's parts (JSON).")
-@click.option("--output", type=_FILE, required=True, help="Page to write.")
-@click.option("--scenes", type=_FILE, required=True, help="Folder of DATASET/SCENE.json, from sepi.report.figures.")
+@click.option("--numbers", "numbers_path", type=PATH, required=True, help="Numbers of the report (JSON).")
+@click.option("--parts", "parts_path", type=PATH, help="Numbers of the best variant's parts (JSON).")
+@click.option("--output", type=PATH, required=True, help="Page to write.")
+@click.option("--scenes", type=PATH, required=True, help="Folder of DATASET/SCENE.json, from sepi.report.figures.")
 def command(numbers_path: Path, parts_path: Path | None, output: Path, scenes: Path) -> None:
     """Write the page of a report, with the scenes of its numbers."""
     runs = read_numbers(numbers_path)
