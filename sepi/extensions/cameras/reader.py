@@ -1,23 +1,18 @@
 """Views of calibrated cameras, from a COLMAP model, a ``transforms.json``, or a table; rectified to a light field."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sepi.camera import Part
 from sepi.errors import SepiError
+from sepi.extensions.cameras.model import CameraModel, Pictures
 from sepi.io.files import name_of
 from sepi.io.readers.formats import Format
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
 from sepi.lightfield import DisparityRange, LightField
-
-if TYPE_CHECKING:
-    from sepi.camera import Part
-    from sepi.extensions.cameras.model import CameraModel
 
 # distance of cameras from their plane, in view steps, beyond which rectification needs the depth of the scene
 _FLAT = 1e-3
@@ -208,7 +203,6 @@ def read_model(path: Path, images: str | None = None, crop_of: Part | None = Non
     """
     # called for every path, so readers are imported when needed
     from sepi.extensions.cameras import files
-    from sepi.extensions.cameras.model import Pictures
 
     found = cameras_in(path)
     if found is None:
