@@ -175,14 +175,8 @@ def calibrate(
         notes = Rectification(read_model(output)).notes
     except SepiError as error:
         unusable = str(error)
-    return Calibration(
-        output,
-        tuple(name for name in names if name in placed),
-        tuple(name for name in names if name not in placed),
-        float(model.compute_mean_reprojection_error()),
-        notes,
-        unusable,
-    )
+    found, left_out = (tuple(name for name in names if (name in placed) is wanted) for wanted in (True, False))
+    return Calibration(output, found, left_out, float(model.compute_mean_reprojection_error()), notes, unusable)
 
 
 def pictures_in(folder: Path) -> list[Path]:
