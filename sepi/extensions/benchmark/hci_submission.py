@@ -10,8 +10,6 @@ References
        estimation on 4D light fields", ACCV 2016. doi:10.1007/978-3-319-54187-7_2
 """
 
-from __future__ import annotations
-
 import math
 import stat
 import struct
@@ -32,7 +30,7 @@ from sepi.io.disparity_maps import read_pfm
 from sepi.io.files import atomic_path
 from sepi.io.result_files import RUNTIME
 from sepi.io.result_folder import read_result
-from sepi.process.command import SepiCommand
+from sepi.process.command import PATH, SepiCommand
 from sepi.validation import require_known, require_path, require_type
 
 SCENES = (
@@ -299,13 +297,12 @@ def _shown(name: str) -> str:
     return name if name.isprintable() else ascii(name)
 
 
-_PATH = click.Path(path_type=Path)
 _PARTIAL = click.option("--partial", is_flag=True, help="Accept fewer than the benchmark's 12 scenes.")
 
 
 @click.command(cls=SepiCommand)
-@click.argument("results", metavar="RESULT...", nargs=-1, required=True, type=_PATH)
-@click.option("-o", "--output", type=_PATH, default=Path("submission.zip"), show_default=True, help="Zip to write.")
+@click.argument("results", metavar="RESULT...", nargs=-1, required=True, type=PATH)
+@click.option("-o", "--output", type=PATH, default=Path("submission.zip"), show_default=True, help="Zip to write.")
 @click.option(
     "--runtime", "runtimes", multiple=True, metavar="SCENE=SECONDS", help="Run time, unless in runtime.txt; repeatable."
 )
@@ -341,7 +338,7 @@ def submission(results: tuple[Path, ...], output: Path, runtimes: tuple[str, ...
 
 
 @click.command("check-submission", cls=SepiCommand)
-@click.argument("path", metavar="ZIP|FOLDER", type=_PATH)
+@click.argument("path", metavar="ZIP|FOLDER", type=PATH)
 @_PARTIAL
 @click.pass_context
 def check_submission(context: click.Context, path: Path, partial: bool) -> None:

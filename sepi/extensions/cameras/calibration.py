@@ -6,12 +6,10 @@ Lenses stay as in the files, or at usual values, until all pictures are placed. 
 lens is kept if the points lie clearly closer.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -24,7 +22,7 @@ from sepi.extensions.cameras.files import LENS_MODELS, require_pycolmap
 from sepi.extensions.cameras.model import PROJECT
 from sepi.extensions.cameras.motion import SEED, Finding, colmap, match, require_motion, tolerance, write_features
 from sepi.extensions.cameras.reader import read_model
-from sepi.extensions.cameras.rectification import rectification_of
+from sepi.extensions.cameras.rectification import Rectification
 from sepi.io.files import atomic_folder
 from sepi.io.images import SUFFIXES
 from sepi.process.threads import available_cores
@@ -174,17 +172,11 @@ def calibrate(
     notes: tuple[str, ...] = ()
     unusable = None
     try:
-        notes = rectification_of(read_model(output)).notes
+        notes = Rectification(read_model(output)).notes
     except SepiError as error:
         unusable = str(error)
-    return Calibration(
-        output,
-        tuple(name for name in names if name in placed),
-        tuple(name for name in names if name not in placed),
-        float(model.compute_mean_reprojection_error()),
-        notes,
-        unusable,
-    )
+    found, left_out = (tuple(name for name in names if (name in placed) is wanted) for wanted in (True, False))
+    return Calibration(output, found, left_out, float(model.compute_mean_reprojection_error()), notes, unusable)
 
 
 def pictures_in(folder: Path) -> list[Path]:
@@ -218,25 +210,6 @@ def pairs_of(names: Sequence[str]) -> list[tuple[str, str]]:
 
 def _placed(pycolmap: Any, folder: Path, database: Path, camera: Any, count: int, progress: Progress) -> Any:
     """The model with most pictures, with the lenses of the database."""
-    models: list[Any] = []
-    for attempt, angle in enumerate(_FIRST_ANGLES):
-        models += _mapped(pycolmap, folder, database, camera, angle, count, progress)
-        best = max(models, key=lambda model: model.num_reg_images(), default=None)
-        if best is not None and best.num_reg_images() >= _ENOUGH * count:
-            return best
-        progress(_MATCHED + (1 - _MATCHED) * attempt / len(_FIRST_ANGLES))
-    if best is None:
-        raise SepiError(
-            f"{folder}: no two pictures tell the positions of their cameras: the camera moved too little or along its "
-            "viewing direction, or the pictures share too little; expected a sweep sideways past a scene with texture"
-        )
-    return best
-
-
-def _mapped(
-    pycolmap: Any, folder: Path, database: Path, camera: Any, angle: float, count: int, progress: Progress
-) -> list[Any]:
-    """Models whose first two pictures see points at a least angle in degrees."""
     size = tolerance(camera)
     least = min(_MOST_ANGLE, float(np.degrees(_POINT_ANGLE * size / camera.mean_focal_length())))
     options = pycolmap.IncrementalPipelineOptions()
@@ -249,24 +222,33 @@ def _mapped(
     mapper.random_seed = triangulation.random_seed = SEED
     mapper.num_threads = 1
     mapper.abs_pose_refine_focal_length = mapper.abs_pose_refine_extra_params = False
-    mapper.init_min_tri_angle = mapper.ba_local_min_tri_angle = angle
     mapper.init_min_num_inliers, mapper.abs_pose_min_num_inliers = _FIRST_MATCHES, _PLACED_MATCHES
     mapper.init_max_error = size
     mapper.abs_pose_max_error = 2 * size
     mapper.filter_max_reproj_error = triangulation.merge_max_reproj_error = 2 * size
     triangulation.complete_max_reproj_error = 2 * size
     mapper.filter_min_tri_angle = triangulation.min_angle = least
-    done = 2
-
-    def one_more() -> None:
-        nonlocal done
-        done += 1
-        progress(_MATCHED + (1 - _MATCHED) * min(1.0, done / count))
-
     made = database.parent / "models"
-    made.mkdir(exist_ok=True)
-    found = pycolmap.incremental_mapping(str(database), str(folder), str(made), options, next_image_callback=one_more)
-    return list(found.values())
+    made.mkdir()
+    models: list[Any] = []
+    for angle in _FIRST_ANGLES:
+        mapper.init_min_tri_angle = mapper.ba_local_min_tri_angle = angle
+        placed = iter(range(3, count + 1))
+
+        def one_more(placed: Iterator[int] = placed) -> None:
+            progress(_MATCHED + (1 - _MATCHED) * next(placed, count) / count)
+
+        found = pycolmap.incremental_mapping(*map(str, (database, folder, made)), options, next_image_callback=one_more)
+        models += found.values()
+        best = max(models, key=lambda model: model.num_reg_images(), default=None)
+        if best is not None and best.num_reg_images() >= _ENOUGH * count:
+            return best
+    if best is None:
+        raise SepiError(
+            f"{folder}: no two pictures tell the positions of their cameras: the camera moved too little or along its "
+            "viewing direction, or the pictures share too little; expected a sweep sideways past a scene with texture"
+        )
+    return best
 
 
 def _with_free_lens(pycolmap: Any, model: Any) -> Any:

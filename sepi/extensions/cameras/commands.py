@@ -1,7 +1,5 @@
 """The commands ``sepi calibrate`` and ``sepi poses``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click
@@ -16,14 +14,12 @@ from sepi.cli.input_options import (
     reading_flags,
 )
 from sepi.errors import SepiError
-from sepi.process.command import SepiCommand, progress_bar
-
-_PATH = click.Path(path_type=Path)
+from sepi.process.command import PATH, SepiCommand, progress_bar
 
 
 @click.command(cls=SepiCommand)
-@click.argument("folder", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="Folder to make; default: NAME-cameras for a FOLDER called NAME.")
+@click.argument("folder", type=PATH)
+@click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-cameras for a FOLDER called NAME.")
 @click.option(
     "--lens",
     default="SIMPLE_RADIAL",
@@ -76,8 +72,8 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
 
 
 @click.command(cls=SepiCommand)
-@click.argument("light_field_path", metavar="INPUT", type=_PATH)
-@click.argument("result_path", metavar="RESULT", type=_PATH)
+@click.argument("light_field_path", metavar="INPUT", type=PATH)
+@click.argument("result_path", metavar="RESULT", type=PATH)
 @click.option(
     "--to",
     "kind",
@@ -86,7 +82,7 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
     show_default=True,
     help="Program to write for.",
 )
-@click.option("-o", "--output", type=_PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
+@click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
 @click.option(
     "--min-confidence",
     type=float,
@@ -122,14 +118,14 @@ def poses(
       sepi poses cotton cotton-depth --to nerfstudio -o cotton-nerf
     """
     from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
-    from sepi.extensions.cameras.posed_views import posed_views
+    from sepi.extensions.cameras.posed_views import PosedViews
     from sepi.io.all_views import surfaces_of
     from sepi.io.result_folder import read_result
 
     light_field = read_light_field_of(light_field_path, result_path, reading, bare=False)
     result = read_result(result_path, reading.options.view)
     folder = output or default_folder(light_field_path, kind)
-    posed = posed_views(
+    posed = PosedViews(
         light_field,
         result.disparity,
         result.confidence,

@@ -40,27 +40,23 @@ References
        `h` beside them; it ignores this depth.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from sepi.camera.rig import WORLD, Rig
+from sepi.extensions.cameras.posed_views import PosedViews
 from sepi.io.files import atomic_folder, atomic_path, write_whole
 from sepi.io.images import write_png
 from sepi.io.point_cloud import PointCloud, write_ply
 from sepi.lightfield import FloatMap
 from sepi.stage import Progress, no_progress
-
-if TYPE_CHECKING:
-    from sepi.extensions.cameras.posed_views import PosedViews
 
 Flags = npt.NDArray[np.bool_]
 """Which of the views sees which of the points, (N, P)."""
@@ -78,7 +74,6 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
     folder : str or Path
         Must not exist, or be empty.
     posed : PosedViews
-        From :func:`sepi.extensions.cameras.posed_views.posed_views`.
     progress : callable
         Receives the fraction done.
 
@@ -176,7 +171,6 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
     folder : str or Path
         Must not exist, or be empty.
     posed : PosedViews
-        From :func:`sepi.extensions.cameras.posed_views.posed_views`.
     progress : callable
         Receives the fraction done.
 

@@ -8,8 +8,6 @@
   ``shared`` in a YAML file.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import math

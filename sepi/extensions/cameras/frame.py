@@ -8,8 +8,6 @@ A camera at ``dz`` in front of the reference camera, with the focal length ``f (
 sees. This factor is 1 at the depth ``Z0`` in the middle of the scene, and close to 1 near it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -76,10 +74,8 @@ class Seeing:
         self.zoom = 1 - plane.places[:, 2] * sum(inverse_depths or (0.0, 0.0)) / 2
         self.focal = float(np.median([sum(shot.lens.focal) / 2 for shot in model.shots]))
         self.principal = model.shots[plane.reference].lens.principal
-        middles = [
-            self.from_picture(n, np.array([[(shot.lens.width - 1) / 2, (shot.lens.height - 1) / 2]]))[0]
-            for n, shot in enumerate(model.shots)
-        ]
+        sizes = np.array([(shot.lens.width, shot.lens.height) for shot in model.shots])
+        middles = [self.from_picture(n, middle[None])[0] for n, middle in enumerate((sizes - 1) / 2)]
         at = plane.baselines[:, ::-1]
         apart = at - at.mean(axis=0)
         self.offset = -float((apart * np.array(middles)).sum() / (apart**2).sum())
@@ -152,11 +148,8 @@ def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
         height, width = (int(end - begin) + 1 for begin, end in (box[:2], box[2:]))
         within = lattice[((lattice >= (box[2], box[0])) & (lattice <= (box[3], box[1]))).all(axis=1)]
         kept = [n for n in range(number) if n == own or seeing.has(n, within).mean() >= _LEAST_SHOWN]
-        if (
-            len(kept) > 1
-            and min(height / reference.lens.height, width / reference.lens.width) >= _LEAST_PART
-            and min(height, width) >= MIN_SIZE
-        ):
+        share = min(height / reference.lens.height, width / reference.lens.width)
+        if len(kept) > 1 and share >= _LEAST_PART and min(height, width) >= MIN_SIZE:
             return Frame((seeing.principal[0] - box[2], seeing.principal[1] - box[0]), (height, width)), kept
     raise SepiError(
         f"{seeing.model.path}: the cameras share hardly anything of the picture of {reference.name}; they look in too "

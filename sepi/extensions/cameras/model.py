@@ -1,11 +1,8 @@
 """Calibrated cameras from files, their pictures and lenses, and checks that they suit a light field."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,6 +19,8 @@ UNITS_OF_MODEL = "units of the model"
 _SAME_PLACE = 1e-6
 # largest angle between viewing directions of two cameras, degrees
 _MOST_TURNED = 60.0
+# least angle between motion and viewing direction, degrees
+_LEAST_ANGLE = 45.0
 # least share of the model's points in front of the cameras
 _BEFORE = 0.5
 
@@ -42,51 +41,46 @@ class Picture(NamedTuple):
     mask: Path | None = None
 
 
-@dataclass(frozen=True)
 class CameraModel:
     """Calibrated cameras, and their pictures.
 
-    Attributes
+    Parameters
     ----------
     path : Path
         File or folder of the model, for messages.
     pictures : tuple of Picture
-    points : ndarray, shape (N, 3), float64
+    points : ndarray, shape (N, 3), float64, optional
         Points of the scene in the world; most files have none.
     units : str
         Unit of the world.
+
+    Attributes
+    ----------
+    path, pictures, points, units
+        As given.
     notes : tuple of str
         Assumptions that were made.
+    files : tuple of Path
+        All pictures and their masks.
+    shots : tuple of Shot
+        The cameras.
+    centres, axes : ndarray, shape (N, 3), float64
+        Their positions, and their viewing directions.
     """
 
-    path: Path
-    pictures: tuple[Picture, ...]
-    points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    units: str = UNITS_OF_MODEL
-    notes: tuple[str, ...] = ()
+    def __init__(
+        self, path: Path, pictures: tuple[Picture, ...], points: Floats | None = None, units: str = UNITS_OF_MODEL
+    ) -> None:
+        self.path, self.pictures, self.units = path, pictures, units
+        self.notes: tuple[str, ...] = ()
+        self.points = np.zeros((0, 3)) if points is None else points
+        masks = (picture.mask for picture in pictures if picture.mask is not None)
+        self.files = (*(picture.file for picture in pictures), *masks)
+        self.shots = tuple(picture.shot for picture in pictures)
+        self.centres = np.array([shot.centre for shot in self.shots])
+        self.axes = np.array([shot.rotation[2] for shot in self.shots])
 
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """All pictures and their masks."""
-        masks = (picture.mask for picture in self.pictures)
-        return (*(picture.file for picture in self.pictures), *(mask for mask in masks if mask is not None))
-
-    @cached_property
-    def shots(self) -> tuple[Shot, ...]:
-        """The cameras."""
-        return tuple(picture.shot for picture in self.pictures)
-
-    @property
-    def centres(self) -> Floats:
-        """Positions of the cameras, (N, 3)."""
-        return np.array([shot.centre for shot in self.shots])
-
-    @property
-    def axes(self) -> Floats:
-        """Viewing directions of the cameras, (N, 3)."""
-        return np.array([shot.rotation[2] for shot in self.shots])
-
-    def without(self, names: tuple[str, ...]) -> CameraModel:
+    def without(self, names: tuple[str, ...]) -> "CameraModel":
         """The model without these pictures, named with or without folders."""
         left_out = {n for name in names for n in self.named(name)}
         return self.of([n for n in range(len(self.shots)) if n not in left_out])
@@ -99,9 +93,11 @@ class CameraModel:
             raise SepiError(f"{self.path}: no picture '{name}' (found: {some}, ...)")
         return found
 
-    def of(self, kept: list[int]) -> CameraModel:
+    def of(self, kept: list[int]) -> "CameraModel":
         """The model with only these cameras."""
-        return replace(self, pictures=tuple(self.pictures[n] for n in kept))
+        model = CameraModel(self.path, tuple(self.pictures[n] for n in kept), self.points, self.units)
+        model.notes = self.notes
+        return model
 
     def require_sound(self) -> None:
         """Raise for cameras whose poses do not suit a light field.
@@ -124,16 +120,30 @@ class CameraModel:
             )
         turned = np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)))
         one, other = divmod(int(turned.argmax()), len(turned))
-        if turned[one, other] > _MOST_TURNED:
-            raise SepiError(
-                f"{self.path}: {names[one]} and {names[other]} look {turned[one, other]:.0f} degrees apart; expected "
-                f"similar viewing directions, at most {_MOST_TURNED:.0f} degrees apart"
-            )
+        require_alike(self.path, names[one], names[other], turned[one, other])
         if len(self.points) and np.mean((self.points - centres.mean(axis=0)) @ axes.mean(axis=0) > 0) < _BEFORE:
             raise SepiError(
                 f"{self.path}: the scene's points lie behind the cameras; expected poses of cameras that look along "
                 "their z axis, with y down (OpenCV), not against it with y up (OpenGL)"
             )
+
+
+def require_alike(where: Path, one: str, other: str, angle: float) -> None:
+    """Raise if two cameras' viewing directions are by this many degrees too far apart."""
+    if angle > _MOST_TURNED:
+        raise SepiError(
+            f"{where}: {one} and {other} look {angle:.0f} degrees apart; expected similar viewing directions, at most "
+            f"{_MOST_TURNED:.0f} degrees apart"
+        )
+
+
+def require_sideways(where: Path, angle: float, least: float = _LEAST_ANGLE) -> None:
+    """Raise if the cameras move at less than so many degrees to their viewing direction."""
+    if angle < least:
+        raise SepiError(
+            f"{where}: the cameras move along their viewing direction (at {angle:.0f} degrees to it); expected them to "
+            f"move sideways, at {_LEAST_ANGLE:.0f} to 90 degrees"
+        )
 
 
 # where COLMAP says it, and names of folders that it and others use

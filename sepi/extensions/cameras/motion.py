@@ -6,13 +6,10 @@ result is an estimate, since the focal length may be a guess. So it refuses only
 :mod:`sepi.extensions.cameras.rectification` accepts.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,6 +19,7 @@ import numpy as np
 
 from sepi.camera.rig import Floats
 from sepi.errors import SepiError, printable
+from sepi.extensions.cameras.model import require_alike, require_sideways
 from sepi.io.files import reading
 from sepi.io.images import read_picture
 from sepi.lightfield import FloatMap, as_unit_float
@@ -36,8 +34,7 @@ _MATCH_ERROR, _SIDE = 1.0, 1000
 _AT_ONCE = 64
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """Options of the search for features.
 
     Attributes
@@ -173,29 +170,14 @@ _FEATURES, _MATCHES = 40, 20
 # quantile of the matches (some are false) that measures parallax; least parallax, in pixels of the reduced pictures,
 # and that from which its direction is reliable
 _MOST, _NARROW, _FIRM = 0.85, 0.8, 1.5
-# angles in degrees: least between motion and viewing direction; largest between two viewing directions
-_AHEAD, _TURNED = 30.0, 60.0
+# least angle between motion and viewing direction, degrees, by an estimate
+_AHEAD = 30.0
 
 
-class Step(NamedTuple):
-    """Motion of the camera between two pictures.
-
-    Attributes
-    ----------
-    names : (str, str)
-    parallax : float
-        Parallax between near and far points, pixels.
-    ahead : float
-        Degrees from the first camera's viewing direction, or its opposite, to the second camera's position; NaN if
-        unknown.
-    turned : float
-        Degrees between the viewing directions.
-    """
-
-    names: tuple[str, str]
-    parallax: float
-    ahead: float
-    turned: float
+Step = tuple[tuple[str, str], float, float, float]
+"""Motion of the camera between two pictures: their names; the parallax between near and far points in pixels; degrees
+from the first camera's viewing direction, or its opposite, to the second camera's position, NaN if unknown; degrees
+between the viewing directions."""
 
 
 def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], finding: Finding) -> None:
@@ -212,7 +194,7 @@ def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], findin
     names = [path.name for path in looked_at]
     with tempfile.TemporaryDirectory() as place, colmap(folder):
         database = Path(place) / "look.db"
-        camera, counts = write_features(pycolmap, database, looked_at, replace(finding, side=_LOOK), no_progress)
+        camera, counts = write_features(pycolmap, database, looked_at, finding._replace(side=_LOOK), no_progress)
         poor = [name for name, count in zip(names, counts, strict=True) if count < _FEATURES]
         if 2 * len(poor) > len(counts):
             raise SepiError(
@@ -230,25 +212,19 @@ def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], findin
             f"{folder}: no two of {_listed(names)} match; expected pictures of one static scene, each from a position "
             "a little beside the last"
         )
-    widest = max(steps, key=lambda step: step.parallax)
-    if widest.parallax < _NARROW * unit:
+    pairs = [names for names, *_ in steps]
+    parallax, ahead, turned = np.array([measured for _, *measured in steps]).T
+    widest, farthest = int(parallax.argmax()), int(turned.argmax())
+    if parallax[widest] < _NARROW * unit:
         raise SepiError(
-            f"{folder}: from {widest.names[0]} to {widest.names[1]} the parallax is {widest.parallax:.1f} pixels: the "
+            f"{folder}: from {' to '.join(pairs[widest])} the parallax is {parallax[widest]:.1f} pixels: the "
             "camera turned but hardly moved, or the scene is flat; expected a camera that moves sideways, with a "
             f"parallax of at least {4 * _NARROW * unit:.0f} pixels between near and far points"
         )
-    turned = max(steps, key=lambda step: step.turned)
-    if turned.turned > _TURNED:
-        raise SepiError(
-            f"{folder}: {turned.names[0]} and {turned.names[1]} look about {turned.turned:.0f} degrees apart; expected "
-            f"similar viewing directions in all pictures, at most {_TURNED:.0f} degrees apart"
-        )
-    firm = [step.ahead for step in steps if not np.isnan(step.ahead) and step.parallax >= _FIRM * unit]
-    if firm and np.median(firm) < _AHEAD:
-        raise SepiError(
-            f"{folder}: the camera moves along its viewing direction (at about {np.median(firm):.0f} degrees to it); "
-            "expected it to move sideways, at 45 to 90 degrees"
-        )
+    require_alike(folder, *pairs[farthest], turned[farthest])
+    firm = ahead[(parallax >= _FIRM * unit) & ~np.isnan(ahead)]
+    if len(firm):
+        require_sideways(folder, float(np.median(firm)), _AHEAD)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -258,7 +234,7 @@ def _listed(names: Sequence[str]) -> str:
 def _steps(pycolmap: Any, file: Any, size: float) -> list[Step]:
     ransac = {"random_seed": SEED, "max_error": size}
     options = pycolmap.TwoViewGeometryOptions(compute_relative_pose=True, ransac=ransac)
-    steps = []
+    steps: list[Step] = []
     for one, other in combinations(sorted(file.read_all_images(), key=lambda image: image.image_id), 2):
         here, there = (np.asarray(file.read_keypoints(image.image_id)[:, :2], np.float64) for image in (one, other))
         pairs = np.asarray(file.read_matches(one.image_id, other.image_id), np.uint32).reshape(-1, 2)
@@ -274,7 +250,7 @@ def _steps(pycolmap: Any, file: Any, size: float) -> list[Step]:
         ahead = min(1.0, abs(place[2]) / length) if (length := np.linalg.norm(place)) else np.nan
         parallax = _parallax(here[pairs[:, 0]], there[pairs[:, 1]], size)
         angles = np.degrees(np.arccos([ahead, np.clip(rotation[2, 2], -1, 1)])).tolist()
-        steps.append(Step((one.name, other.name), parallax, *angles))
+        steps.append(((one.name, other.name), parallax, *angles))
     return steps
 
 

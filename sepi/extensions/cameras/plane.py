@@ -1,25 +1,24 @@
 """The plane through the cameras: their common axes, and their positions in view steps and on a grid."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from sepi.camera.rig import Floats
 from sepi.errors import SepiError
-from sepi.extensions.cameras.model import CameraModel
+from sepi.extensions.cameras.model import CameraModel, require_sideways
 
 # extent of the cameras' positions across a row, relative to that along it, from which the plane's slope is known
 _ROW = 0.02
-# least angle between motion and viewing direction, degrees
-_LEAST_ANGLE = 45.0
 
 
-@dataclass(frozen=True)
 class Plane:
-    """Positions of the cameras in the axes of the rectified views.
+    """The plane through the cameras by least squares, and their positions in the axes of the rectified views.
+
+    Parameters
+    ----------
+    model : CameraModel
+    reference : int or None
+        Number of the reference camera; None: the most central one.
 
     Attributes
     ----------
@@ -30,57 +29,40 @@ class Plane:
     reference : int
     step : float
         Median distance from a camera to the next, in the plane.
-    """
-
-    rotation: Floats
-    places: Floats
-    reference: int
-    step: float
-
-    @property
-    def baselines(self) -> Floats:
-        """``(down, across)`` of each camera from the reference camera, in view steps; (N, 2)."""
-        return self.places[:, 1::-1] / self.step
-
-
-def plane_through(model: CameraModel, reference: int | None) -> Plane:
-    """The plane through the cameras by least squares; the most central camera is the reference unless one is given.
+    baselines : ndarray, shape (N, 2), float64
+        ``(down, across)`` of each camera from the reference camera, in view steps.
 
     Raises
     ------
     SepiError
         If the cameras move along their viewing direction instead of sideways.
     """
-    centres = model.centres
-    middle = centres.mean(axis=0)
-    looking = _unit(model.axes.mean(axis=0))
-    off = centres - middle
-    ahead = off @ looking
-    beside = off - ahead[:, None] * looking
-    # the plane's slope, damped, since cameras in a row do not determine it across the row
-    damping = len(off) * (_ROW * np.linalg.norm(np.ptp(off, axis=0))) ** 2
-    slope = np.linalg.solve(beside.T @ beside + damping * np.eye(3), beside.T @ ahead)
-    # medians, since a single camera off the plane is left out later
-    angle = np.degrees(np.arctan2(np.median(np.linalg.norm(beside, axis=1)), np.median(np.abs(ahead))))
-    if angle < _LEAST_ANGLE:
-        raise SepiError(
-            f"{model.path}: the cameras move along their viewing direction (at {angle:.0f} degrees to it); expected "
-            f"them to move sideways, at {_LEAST_ANGLE:.0f} to 90 degrees"
-        )
-    z = _unit(looking - slope)
-    right = np.mean([shot.rotation[0] for shot in model.shots], axis=0)
-    x = _unit(right - z * (right @ z))
-    rotation = np.stack([x, np.cross(z, x), z])
-    flat = (centres - middle) @ rotation.T
-    if reference is None:
-        centre = (flat[:, :2].max(axis=0) + flat[:, :2].min(axis=0)) / 2
-        # the first of equally central ones, up to rounding
-        distance = np.linalg.norm(flat[:, :2] - centre, axis=1)
-        reference = int(np.flatnonzero(distance <= distance.min() + 1e-6 * float(np.ptp(flat[:, :2])))[0])
-    step = _median_step(flat[:, :2])
-    if step <= 0:
-        raise SepiError(f"{model.path}: the cameras stand one behind the other; expected them side by side")
-    return Plane(rotation, flat - flat[reference], reference, step)
+
+    def __init__(self, model: CameraModel, reference: int | None) -> None:
+        off = model.centres - model.centres.mean(axis=0)
+        looking = _unit(model.axes.mean(axis=0))
+        ahead = off @ looking
+        beside = off - ahead[:, None] * looking
+        # the plane's slope, damped, since cameras in a row do not determine it across the row
+        damping = len(off) * (_ROW * np.linalg.norm(np.ptp(off, axis=0))) ** 2
+        slope = np.linalg.solve(beside.T @ beside + damping * np.eye(3), beside.T @ ahead)
+        # medians, since a single camera off the plane is left out later
+        angle = np.degrees(np.arctan2(np.median(np.linalg.norm(beside, axis=1)), np.median(np.abs(ahead))))
+        require_sideways(model.path, angle)
+        z = _unit(looking - slope)
+        right = np.mean([shot.rotation[0] for shot in model.shots], axis=0)
+        x = _unit(right - z * (right @ z))
+        self.rotation = np.stack([x, np.cross(z, x), z])
+        flat = off @ self.rotation.T
+        if reference is None:
+            centre = (flat[:, :2].max(axis=0) + flat[:, :2].min(axis=0)) / 2
+            # the first of equally central ones, up to rounding
+            distance = np.linalg.norm(flat[:, :2] - centre, axis=1)
+            reference = int(np.flatnonzero(distance <= distance.min() + 1e-6 * float(np.ptp(flat[:, :2])))[0])
+        self.reference, self.places, self.step = reference, flat - flat[reference], _median_step(flat[:, :2])
+        if self.step <= 0:
+            raise SepiError(f"{model.path}: the cameras stand one behind the other; expected them side by side")
+        self.baselines = self.places[:, 1::-1] / self.step
 
 
 def _median_step(places: Floats) -> float:

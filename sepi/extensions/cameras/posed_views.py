@@ -16,17 +16,13 @@ If the camera is unknown, focal length and focus distance are free: all choices 
 differ by a projective map. :func:`nominal_camera` makes one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera
-from sepi.camera.rig import Rig
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 from sepi.matching.carried_map import carried_map, carried_values
@@ -78,13 +74,36 @@ MAX_POINTS = 10000
 _APART = 1.0
 
 
-@dataclass(frozen=True)
 class PosedViews:
     """A light field as single pictures with pinhole cameras, row by row, and the known geometry of the scene.
 
-    Attributes
+    Parameters
     ----------
     light_field : LightField
+    disparity : ndarray, shape (H, W), float32
+        Disparity of its reference view, pixels per view step.
+    confidence : ndarray, shape (H, W), float32, optional
+        0..1; default: 1.
+    unknown : ndarray, shape (H, W), bool, optional
+        Pixels without depth.
+    camera : Camera, optional
+        Default: the light field's own, or a nominal one.
+    min_confidence : float, optional
+        Least confidence of points. Default: points at the surer half of all pixels with a depth, by ``sigma`` if given,
+        else by the confidence.
+    max_points : int
+        Most points, on every n-th row and column.
+    surfaces : callable, optional
+        Disparity of the other views; default: the map, warped to them.
+    sigma : ndarray, shape (H, W), float32, optional
+        Standard deviation of the disparity, pixels per view step.
+    sigmas : callable, optional
+        Standard deviation of the other views; needed with ``surfaces`` for the error of their depth.
+
+    Attributes
+    ----------
+    light_field, surfaces, sigma, sigmas
+        As given.
     camera : Camera
         The given camera, the light field's own, or a nominal one.
     metric : bool
@@ -93,66 +112,63 @@ class PosedViews:
         Of the reference view, pixels per view step; NaN where unknown.
     chosen : ndarray, shape (H, W), bool
         Pixels of the reference view that have a point.
-    surfaces : callable or None
-        Disparity of the other views; None: the reference view's, warped to them.
     rig : Rig or None
         Poses in the world of the calibrated cameras; None: poses in the reference view's axes.
-    sigma : ndarray, shape (H, W), float32, or None
-        Standard deviation of the reference view's disparity, pixels per view step; None without error bars.
-    sigmas : callable or None
-        Standard deviation of the other views, if ``surfaces`` gives their disparity.
+    units : str
+        Units of positions and depth, in a few words.
+    positions : list of (int, int)
+        Grid position ``(t, s)`` of each view that is present.
+    names : tuple of str
+        Name of each view by its row and column, such as ``view_04_04``.
+    reference : int
+        Number of the reference view.
+    baselines : ndarray, shape (N, 2), float64
+        ``(down, across)`` of each view from the reference view, in view steps.
+    centres : ndarray, shape (N, 3), float64
+        Position of each camera from the reference view's: x right, y down, z forward.
+    principal_points : ndarray, shape (N, 2), float64
+        Principal points ``(x, y)`` in pixels, the middle of the top left pixel being (0, 0).
+    sure : bool
+        Whether all views have a :meth:`depth_sigma`.
     """
 
-    light_field: LightField
-    camera: Camera
-    metric: bool
-    disparity: FloatMap
-    chosen: BoolMap
-    surfaces: Surfaces | None = None
-    rig: Rig | None = None
-    sigma: FloatMap | None = None
-    sigmas: Surfaces | None = None
-
-    @cached_property
-    def positions(self) -> list[tuple[int, int]]:
-        """Grid position ``(t, s)`` of each view that is present."""
-        return [(t, s) for t, s in np.argwhere(self.light_field.present).tolist()]
-
-    @cached_property
-    def reference(self) -> int:
-        """Number of the reference view."""
-        return self.positions.index(self.light_field.reference_position)
-
-    @cached_property
-    def baselines(self) -> Points:
-        """``(down, across)`` of each view from the reference view, in view steps, (N, 2)."""
-        return self.light_field.baselines[self.light_field.present]
-
-    @cached_property
-    def centres(self) -> Points:
-        """Position of each camera from the reference view's, (N, 3): x right, y down, z forward."""
+    def __init__(
+        self,
+        light_field: LightField,
+        disparity: FloatMap,
+        confidence: FloatMap | None = None,
+        *,
+        unknown: BoolMap | None = None,
+        camera: Camera | None = None,
+        min_confidence: float | None = None,
+        max_points: int = MAX_POINTS,
+        surfaces: Surfaces | None = None,
+        sigma: FloatMap | None = None,
+        sigmas: Surfaces | None = None,
+    ) -> None:
+        if min_confidence is not None and not 0 <= min_confidence <= 1:
+            raise SepiError(f"{light_field.name}: expected a least confidence within 0..1, got {min_confidence:g}")
+        known = np.isfinite(disparity) & (True if unknown is None else ~unknown)
+        own = camera or light_field.camera
+        self.light_field, self.surfaces, self.sigma, self.sigmas = light_field, surfaces, sigma, sigmas
+        self.sure = sigma is not None and (surfaces is None or sigmas is not None)
+        self.camera, self.metric = own or nominal_camera(disparity, known), own is not None
+        self.rig = light_field.reference_rig if camera is None else None
+        told = "metres" if self.metric else "nominal units, not to scale, since the camera is unknown"
+        self.units = told if self.rig is None else self.rig.units
+        self.positions = [(t, s) for t, s in np.argwhere(light_field.present).tolist()]
+        digits = max(2, *(len(str(size - 1)) for size in light_field.grid))
+        self.names = tuple(f"view_{t:0{digits}d}_{s:0{digits}d}" for t, s in self.positions)
+        self.reference = self.positions.index(light_field.reference_position)
+        self.baselines, (height, width) = light_field.baselines[light_field.present], light_field.shape
         baseline = self.camera.scale / self.camera.focal_px
-        return np.column_stack([self.baselines[:, ::-1] * baseline, np.zeros(len(self.baselines))])
-
-    @cached_property
-    def principal_points(self) -> Points:
-        """Principal points ``(x, y)`` in pixels, the middle of the top left pixel being (0, 0); (N, 2)."""
-        (height, width), camera = self.light_field.shape, self.camera
-        sheared = (self.baselines + self.light_field.from_centre)[:, ::-1] * camera.offset
-        return np.array([width - 1, height - 1]) / 2 + (camera.right, camera.down) + sheared
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each view by its row and column, such as ``view_04_04``."""
-        digits = max(2, *(len(str(size - 1)) for size in self.light_field.grid))
-        return tuple(f"view_{t:0{digits}d}_{s:0{digits}d}" for t, s in self.positions)
-
-    @property
-    def units(self) -> str:
-        """Units of positions and depth, in a few words."""
-        if self.rig is not None:
-            return self.rig.units
-        return "metres" if self.metric else "nominal units, not to scale, since the camera is unknown"
+        self.centres = np.column_stack([self.baselines[:, ::-1] * baseline, np.zeros(len(self.baselines))])
+        sheared = (self.baselines + light_field.from_centre)[:, ::-1] * self.camera.offset
+        middle = np.array([width - 1, height - 1]) / 2 + (self.camera.right, self.camera.down)
+        self.principal_points: Points = middle + sheared
+        known &= np.isfinite(self.camera.depth(disparity))
+        self.disparity = np.where(known, disparity, np.float32(np.nan))
+        self.chosen = _thinned(_surer(known, confidence, min_confidence, sigma), max_points)
 
     @cached_property
     def points(self) -> Points:
@@ -174,10 +190,8 @@ class PosedViews:
 
     def picture(self, view: int) -> Colours:
         """A view as RGB of 8 bits, which all programs read; shape (H, W, 3)."""
-        pixels = self.light_field.rgb_views[self.positions[view]]
-        if pixels.dtype == np.uint8:
-            return np.asarray(pixels, np.uint8)
-        return np.rint(255 * np.clip(as_unit_float(pixels), 0, 1)).astype(np.uint8)
+        unit = np.clip(as_unit_float(self.light_field.rgb_views[self.positions[view]]), 0, 1)
+        return np.rint(255 * unit).astype(np.uint8)
 
     def carried(self, view: int) -> FloatMap:
         """Disparity of a view, (H, W) float32; NaN at unknown and missing pixels."""
@@ -189,11 +203,6 @@ class PosedViews:
         """Depth of a view, (H, W) float32, from its :meth:`carried` disparity; 0 where unknown."""
         depth = self.camera.depth(carried)
         return np.where(np.isfinite(depth) & ~np.isnan(carried), depth, np.float32(0))
-
-    @property
-    def sure(self) -> bool:
-        """Whether all views have a :meth:`depth_sigma`."""
-        return self.sigma is not None and (self.surfaces is None or self.sigmas is not None)
 
     def depth_sigma(self, view: int, carried: FloatMap) -> FloatMap:
         """Standard deviation of the depth of a view, (H, W) float32, given its :meth:`carried` disparity; 0 without
@@ -253,65 +262,6 @@ class PosedViews:
         # comparison with NaN is false, so unknown pixels see no points
         nearer = (carried[rows, columns] - disparity) * float(np.abs(baseline).max())
         return np.asarray(inside & (nearer <= _APART), bool)
-
-
-def posed_views(
-    light_field: LightField,
-    disparity: FloatMap,
-    confidence: FloatMap | None = None,
-    *,
-    unknown: BoolMap | None = None,
-    camera: Camera | None = None,
-    min_confidence: float | None = None,
-    max_points: int = MAX_POINTS,
-    surfaces: Surfaces | None = None,
-    sigma: FloatMap | None = None,
-    sigmas: Surfaces | None = None,
-) -> PosedViews:
-    """The posed views of a light field with the disparity map of its reference view.
-
-    Parameters
-    ----------
-    light_field : LightField
-    disparity : ndarray, shape (H, W), float32
-        Disparity of its reference view, pixels per view step.
-    confidence : ndarray, shape (H, W), float32, optional
-        0..1; default: 1.
-    unknown : ndarray, shape (H, W), bool, optional
-        Pixels without depth.
-    camera : Camera, optional
-        Default: the light field's own, or a nominal one.
-    min_confidence : float, optional
-        Least confidence of points. Default: points at the surer half of all pixels with a depth, by ``sigma`` if given,
-        else by the confidence.
-    max_points : int
-        Most points, on every n-th row and column.
-    surfaces : callable, optional
-        Disparity of the other views; default: the map, warped to them.
-    sigma : ndarray, shape (H, W), float32, optional
-        Standard deviation of the disparity, pixels per view step.
-    sigmas : callable, optional
-        Standard deviation of the other views; needed with ``surfaces`` for the error of their depth.
-    """
-    if min_confidence is not None and not 0 <= min_confidence <= 1:
-        raise SepiError(f"{light_field.name}: expected a least confidence within 0..1, got {min_confidence:g}")
-    known = np.isfinite(disparity)
-    if unknown is not None:
-        known &= ~unknown
-    own = camera or light_field.camera
-    used = own or nominal_camera(disparity, known)
-    known &= np.isfinite(used.depth(disparity))
-    return PosedViews(
-        light_field=light_field,
-        camera=used,
-        metric=own is not None,
-        disparity=np.where(known, disparity, np.float32(np.nan)),
-        chosen=_thinned(_surer(known, confidence, min_confidence, sigma), max_points),
-        surfaces=surfaces,
-        rig=light_field.reference_rig if camera is None else None,
-        sigma=sigma,
-        sigmas=sigmas,
-    )
 
 
 def _slopes(disparity: FloatMap, axis: int) -> npt.NDArray[np.float64]:

@@ -1,23 +1,18 @@
 """Views of calibrated cameras, from a COLMAP model, a ``transforms.json``, or a table; rectified to a light field."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sepi.camera import Part
 from sepi.errors import SepiError
+from sepi.extensions.cameras.model import CameraModel, Pictures
 from sepi.io.files import name_of
 from sepi.io.readers.formats import Format
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
 from sepi.lightfield import DisparityRange, LightField
-
-if TYPE_CHECKING:
-    from sepi.camera import Part
-    from sepi.extensions.cameras.model import CameraModel
 
 # distance of cameras from their plane, in view steps, beyond which rectification needs the depth of the scene
 _FLAT = 1e-3
@@ -39,12 +34,12 @@ def read(path: Path, options: ReadOptions, inverse_depths: tuple[float, float] |
     inverse_depths : (float, float), optional
         Inverse depths of the farthest and the nearest surface; default: from the model's points.
     """
-    from sepi.extensions.cameras.rectification import light_field_of, rectification_of
+    from sepi.extensions.cameras.rectification import Rectification, light_field_of
 
     if options.order != AS_GIVEN or options.central is not None or options.row_spacing is not None:
         raise SepiError(f"{path}: --order, --central and --row-spacing do not apply: the cameras say where views stand")
     model = read_model(path, options.images, options.part).without(options.exclude)
-    light_field = light_field_of(rectification_of(model, options.reference, inverse_depths))
+    light_field = light_field_of(Rectification(model, options.reference, inverse_depths))
     return replace(light_field, name=name_of(path).name, source=str(path))
 
 
@@ -208,7 +203,6 @@ def read_model(path: Path, images: str | None = None, crop_of: Part | None = Non
     """
     # called for every path, so readers are imported when needed
     from sepi.extensions.cameras import files
-    from sepi.extensions.cameras.model import Pictures
 
     found = cameras_in(path)
     if found is None:
@@ -219,4 +213,5 @@ def read_model(path: Path, images: str | None = None, crop_of: Part | None = Non
     pictures = Pictures(found, None if images is None else Path(images).expanduser(), crop_of)
     read = files.read_transforms if found.suffix.lower() == ".json" else files.read_table
     model = (files.read_colmap if found.is_dir() else read)(found, pictures)
-    return replace(model, notes=pictures.notes)
+    model.notes = pictures.notes
+    return model

@@ -4,19 +4,16 @@ The steps: the plane through the cameras and a grid for them (``plane``), the pi
 views themselves (``frame``).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from sepi.camera import Camera
 from sepi.camera.rig import Rig
 from sepi.errors import SepiError
-from sepi.extensions.cameras.frame import Frame, Seeing, completed, frame_of, rectified_view
+from sepi.extensions.cameras.frame import Seeing, completed, frame_of, rectified_view
 from sepi.extensions.cameras.model import CameraModel
-from sepi.extensions.cameras.plane import Plane, grid_of, plane_through
+from sepi.extensions.cameras.plane import Plane, grid_of
 from sepi.io.files import name_of
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.exposure import equally_bright
@@ -31,19 +28,8 @@ _BEYOND, _MARGIN, _LEAST_MARGIN = 0.005, 0.06, 0.1
 _NOTHING = 0.05
 
 
-class Rectification(NamedTuple):
-    """Result of rectifying the cameras, before any picture is read."""
-
-    seeing: Seeing
-    frame: Frame
-    inverse_depths: tuple[float, float] | None
-    notes: tuple[str, ...]
-
-
-def rectification_of(
-    model: CameraModel, reference: str | None = None, inverse_depths: tuple[float, float] | None = None
-) -> Rectification:
-    """Find plane, orientation, pinhole and frame of calibrated cameras.
+class Rectification:
+    """Plane, orientation, pinhole and frame of calibrated cameras, before any picture is read.
 
     Parameters
     ----------
@@ -53,47 +39,57 @@ def rectification_of(
     inverse_depths : (float, float), optional
         Inverse depth of the farthest and the nearest surface from the reference camera; default: by the model's points.
 
+    Attributes
+    ----------
+    seeing : Seeing
+    frame : Frame
+    notes : tuple of str
+
     Raises
     ------
     SepiError
         If the cameras do not suit a light field.
     """
-    model.require_sound()
-    notes = list(model.notes)
-    while True:
-        chosen = None if reference is None else model.named(reference)[0]
-        plane = plane_through(model, chosen)
-        known = inverse_depths or _of_points(model, plane)
-        seeing = Seeing(model, plane, known)
-        # the error of a camera off the plane depends on the frame, and the frame on the remaining cameras
-        frame, kept = frame_of(seeing)
-        errors = seeing.errors(frame)
-        worst = int(errors.argmax())
-        if len(kept) < len(model.shots):
-            left = [shot.name for n, shot in enumerate(model.shots) if n not in kept]
-            notes.append(f"left out, since they look elsewhere: {', '.join(left)}")
-            reference = model.shots[plane.reference].name
-            model = model.of(kept)
-        elif errors[worst] > _TOO_MUCH:
-            name, ahead = model.shots[worst].name, plane.places[worst, 2] / plane.step
-            if len(model.shots) <= _FEWEST:
-                raise SepiError(
-                    f"{model.path}: the cameras do not stand in a plane: {name} is so far off that the disparity error "
-                    f"is {errors[worst]:.2g} pixels; expected at most {_TOO_MUCH:g}"
-                )
-            where = f"{abs(ahead):.2g} steps {'before' if ahead > 0 else 'behind'} the others"
-            notes.append(f"left out, since it stands {where}: {name} (disparity error {errors[worst]:.2g} pixels)")
-            model = model.of([n for n in range(len(model.shots)) if n != worst])
-        else:
-            break
-        if len(model.shots) < 2:
-            raise SepiError(f"{model.path}: expected at least two cameras, too few are left: {'; '.join(notes)}")
-    places = plane.places[:, 2] - plane.places[:, 2].mean()
-    flat = f"the cameras stand within {float(np.abs(places).max()) / plane.step:.2g} view steps of a plane"
-    if known is not None:
-        off = "; mind this if hundredths of a pixel matter" if errors.max() > _TOLD else ""
-        flat += f", so disparity errors over the scene's depth are at most {errors.max():.2g} pixels{off}"
-    return Rectification(seeing, frame, known, (*notes, flat))
+
+    def __init__(
+        self, model: CameraModel, reference: str | None = None, inverse_depths: tuple[float, float] | None = None
+    ) -> None:
+        model.require_sound()
+        notes = list(model.notes)
+        while True:
+            chosen = None if reference is None else model.named(reference)[0]
+            plane = Plane(model, chosen)
+            known = inverse_depths or _of_points(model, plane)
+            seeing = Seeing(model, plane, known)
+            # the error of a camera off the plane depends on the frame, and the frame on the remaining cameras
+            frame, kept = frame_of(seeing)
+            errors = seeing.errors(frame)
+            worst = int(errors.argmax())
+            if len(kept) < len(model.shots):
+                left = [shot.name for n, shot in enumerate(model.shots) if n not in kept]
+                notes.append(f"left out, since they look elsewhere: {', '.join(left)}")
+                reference = model.shots[plane.reference].name
+                model = model.of(kept)
+            elif errors[worst] > _TOO_MUCH:
+                name, ahead = model.shots[worst].name, plane.places[worst, 2] / plane.step
+                if len(model.shots) <= _FEWEST:
+                    raise SepiError(
+                        f"{model.path}: the cameras do not stand in a plane: {name} is so far off that the disparity "
+                        f"error is {errors[worst]:.2g} pixels; expected at most {_TOO_MUCH:g}"
+                    )
+                where = f"{abs(ahead):.2g} steps {'before' if ahead > 0 else 'behind'} the others"
+                notes.append(f"left out, since it stands {where}: {name} (disparity error {errors[worst]:.2g} pixels)")
+                model = model.of([n for n in range(len(model.shots)) if n != worst])
+            else:
+                break
+            if len(model.shots) < 2:
+                raise SepiError(f"{model.path}: expected at least two cameras, too few are left: {'; '.join(notes)}")
+        places = plane.places[:, 2] - plane.places[:, 2].mean()
+        flat = f"the cameras stand within {float(np.abs(places).max()) / plane.step:.2g} view steps of a plane"
+        if known is not None:
+            off = "; mind this if hundredths of a pixel matter" if errors.max() > _TOLD else ""
+            flat += f", so disparity errors over the scene's depth are at most {errors.max():.2g} pixels{off}"
+        self.seeing, self.frame, self.notes = seeing, frame, (*notes, flat)
 
 
 def _of_points(model: CameraModel, plane: Plane) -> tuple[float, float] | None:
@@ -118,8 +114,8 @@ def _of_points(model: CameraModel, plane: Plane) -> tuple[float, float] | None:
 
 def light_field_of(found: Rectification) -> LightField:
     """The rectified views as a light field of equal brightness, with the pictures read and resampled."""
-    seeing, frame, depths = found.seeing, found.frame, found.inverse_depths
-    model, plane = seeing.model, seeing.plane
+    seeing, frame = found.seeing, found.frame
+    model, plane, depths = seeing.model, seeing.plane, seeing.inverse_depths
     pictures, absent = zip(*(rectified_view(seeing, frame, n) for n in range(len(model.shots))), strict=True)
     channels = max(picture.shape[2] for picture in pictures)
     at = grid_of(plane.baselines)

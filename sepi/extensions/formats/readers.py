@@ -17,8 +17,6 @@ References
 .. [2] S. Wanner, "OpenLF", https://github.com/svenwanner/openlf
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator

@@ -3,8 +3,6 @@
 A method's module defines ``CHOICES``: for each stage, the choices that it adds.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from sepi.registry import Extension

@@ -41,8 +41,6 @@ References
    CVPR 2015. doi:10.1109/CVPR.2015.7298762
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

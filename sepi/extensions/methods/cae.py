@@ -42,8 +42,6 @@ References
 .. [3] Williem, Park: Robust light field depth estimation for noisy scene with occlusion. CVPR 2016.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from pydantic import Field
 

@@ -14,8 +14,6 @@ References
    doi:10.1109/ICCV.2013.13
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 import cv2
@@ -98,9 +96,8 @@ def between_candidates(
     )
     with np.errstate(invalid="ignore"):
         curvature, slope = below - 2 * here + above, below - above
-    inner = (
-        (labels > 0) & (labels < last) & (here <= below) & (here <= above) & (curvature > 0) & np.isfinite(curvature)
-    )
+    inner = (labels > 0) & (labels < last) & (here <= np.minimum(below, above))
+    inner &= (curvature > 0) & np.isfinite(curvature)
     offset = np.where(inner, slope, 0) / (2 * np.where(inner, curvature, 1))
     return np.asarray(disparities[labels] + (disparities[1] - disparities[0]) * offset, np.float32)
 

@@ -16,8 +16,6 @@ References
    minimization methods for Markov random fields. IEEE TPAMI 30(6), 2008. doi:10.1109/TPAMI.2007.70844
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field

@@ -45,8 +45,6 @@ References
 .. [2] He, Sun: Fast guided filter. arXiv:1505.00996, 2015.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -55,6 +53,7 @@ from pydantic import Field
 from sepi.extensions.methods.costs import GREY, GuidedFilter
 from sepi.image.noise import residual_variance
 from sepi.kernels import mishiba as kernels
+from sepi.kernels import sheared_views
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, Parameters, Progress, StageMaps, require_previous
@@ -110,8 +109,7 @@ def mishiba(
     disparities, guide, step = parameters.candidates(light_field), light_field.reference_view, parameters.lattice_step
     lattice, views = np.ascontiguousarray(guide[::step, ::step]), selected_views(light_field)
     offsets = -disparities[:, None, None].astype(np.float64) * light_field.baselines[views]
-    costs = np.empty((len(disparities), *lattice.shape[:2]), np.float32)
-    kernels.pair_costs(details(light_field, views, parameters.feature_sigma), offsets, step, costs)
+    costs = pair_costs(details(light_field, views, parameters.feature_sigma), offsets, step)
     progress(0.4)
     labels, kept = np.zeros(light_field.shape, np.int64), np.zeros((*light_field.shape, 5), np.float32)
     fit = GuidedFilter(lattice, parameters.radius, parameters.epsilon)
@@ -166,6 +164,39 @@ def details(light_field: LightField, views: BoolMap, sigma: float) -> FloatMap:
         grey = as_unit_float(light_field.rgb_views[t, s]) @ GREY
         result[n] = grey - cv2.GaussianBlur(grey, (0, 0), sigma) - np.float32(TIE)
     return result
+
+
+def pair_costs(maps: FloatMap, offsets: npt.NDArray[np.float64], step: int) -> FloatMap:
+    """Number of pairs of views whose bits differ, relative to the largest possible number; 1 without a pair.
+
+    Views in which a pixel lies outside take no part.
+
+    Parameters
+    ----------
+    maps : ndarray, shape (N, H, W), float32
+        A map of each view, whose signs are the bits.
+    offsets : ndarray, shape (K, N, 2), float64
+        Down and across from a reference pixel to its sample, for each candidate, in pixels.
+    step : int
+        Distance of the pixels.
+
+    Returns
+    -------
+    ndarray, shape (K, ceil(H / step), ceil(W / step)), float32
+    """
+    count, height, width = maps.shape
+    # by the number of views that see a pixel, and of ones among them
+    seen, ones = np.ogrid[: count + 1, : count + 1]
+    most = np.maximum((seen // 2) * (seen - seen // 2), 1)
+    shares = np.where(seen < 2, 1, ones * (seen - ones) / most).astype(np.float32)
+    sheared, found = np.empty_like(maps[:, None]), []
+    for of_views in offsets:
+        sheared_views.shear(maps[:, None], of_views, True, sheared)
+        down, across = (np.arange(0, length, step) + of_views[:, [n]] for n, length in enumerate((height, width)))
+        inside = ((down >= 0) & (down <= height - 1))[:, :, None] & ((across >= 0) & (across <= width - 1))[:, None]
+        bits = inside & (sheared[:, 0, ::step, ::step] > 0)
+        found.append(shares[inside.sum(axis=0), bits.sum(axis=0)])
+    return np.stack(found)
 
 
 def refined(disparities: FloatMap, labels: npt.NDArray[np.int64], kept: FloatMap) -> tuple[FloatMap, FloatMap]:

@@ -47,8 +47,6 @@ References
    2022. doi:10.1109/TPAMI.2021.3105523
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

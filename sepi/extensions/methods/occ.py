@@ -51,8 +51,6 @@ References
    38(11), 2016. doi:10.1109/TPAMI.2016.2515615. Its colour clusters for several occluders are not implemented.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import numpy.typing as npt

@@ -43,8 +43,6 @@ References
 .. [2] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
 """
 
-from __future__ import annotations
-
 import math
 
 import cv2

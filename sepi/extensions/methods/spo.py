@@ -41,8 +41,6 @@ References
    Computer Vision and Image Understanding 145, 2016. doi:10.1016/j.cviu.2015.12.007
 """
 
-from __future__ import annotations
-
 import numpy as np
 from pydantic import Field
 
@@ -91,7 +89,7 @@ def spo(light_field: LightField, previous: Previous, parameters: SpoParameters, 
         def of_all(fraction: float, number: int = number) -> None:
             progress((number + fraction) / len(directions))
 
-        distances = side_distances(light_field, views, disparities, parameters, down=down, progress=of_all)
+        distances = side_distances(light_field, views, down, disparities, parameters, of_all)
         weight = peak_weight(distances, parameters.peak)
         distances *= weight
         merged += distances
@@ -116,10 +114,9 @@ def views_of_directions(light_field: LightField) -> list[tuple[BoolMap, bool]]:
 def side_distances(
     light_field: LightField,
     views: BoolMap,
+    down: bool,
     disparities: FloatMap,
     parameters: SpoParameters,
-    *,
-    down: bool,
     progress: Progress,
 ) -> FloatMap:
     """Differences between the sides of each candidate's line in the EPIs of one direction.
@@ -128,11 +125,11 @@ def side_distances(
     ----------
     light_field : LightField
     views : ndarray, shape (T, S), bool
+    down : bool
+        Whether the EPIs are vertical; otherwise they are along image rows.
     disparities : ndarray, shape (K,), float32
         The candidates, pixels per view step.
     parameters : SpoParameters
-    down : bool
-        Whether the EPIs are vertical; otherwise they are along image rows.
     progress : callable
 
     Returns

@@ -1,12 +1,9 @@
 """The command ``sepi compare``: the report's viewer for two disparity maps, with scores if truth is known."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -18,18 +15,16 @@ from sepi.errors import SepiError
 from sepi.extensions.page.page import SCRIPTS, colour_scales, embedded_scenes, environment
 from sepi.extensions.page.viewer import viewer_json
 from sepi.io.all_views import read_disparity_at, read_error_bars_at
+from sepi.io.disparity_maps import TruthFile
 from sepi.io.files import write_whole
 from sepi.io.scores import AllScores
 from sepi.lightfield import FloatMap, LightField
-from sepi.process.command import SepiCommand
+from sepi.process.command import PATH, SepiCommand
 from sepi.report.panels import Panel
 from sepi.report.table import BEST, Head, Kind, Section, section
 from sepi.scoring.error_bars import ERROR_BAR_SCORES, ErrorBars
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, SCORES, region_masks, score_regions
 from sepi.stage import StageMaps
-
-if TYPE_CHECKING:
-    from sepi.io.disparity_maps import TruthFile
 
 # share of the pixels beyond each end of the colour scale, so that a few wrong ones do not widen it
 _BEYOND = 0.005
@@ -161,14 +156,11 @@ def _text(value: float | None) -> str:
     return "n/a" if np.isnan(value) else str(value) if isinstance(value, int) else f"{value:.3f}"
 
 
-_PATH = click.Path(path_type=Path)
-
-
 @click.command(cls=SepiCommand)
-@click.argument("a", metavar="A", type=_PATH)
-@click.argument("b", metavar="B", type=_PATH)
-@click.argument("ground_truth", metavar="[GROUND_TRUTH|SCENE]", type=_PATH, required=False)
-@click.option("-o", "--output", type=_PATH, default=Path("compare.html"), show_default=True, help="Page to write.")
+@click.argument("a", metavar="A", type=PATH)
+@click.argument("b", metavar="B", type=PATH)
+@click.argument("ground_truth", metavar="[GROUND_TRUTH|SCENE]", type=PATH, required=False)
+@click.option("-o", "--output", type=PATH, default=Path("compare.html"), show_default=True, help="Page to write.")
 @truth_flags
 @reading_flags
 def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, own: TruthFile | None, reading: Reading) -> None:

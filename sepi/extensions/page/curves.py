@@ -8,8 +8,6 @@ References
 .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

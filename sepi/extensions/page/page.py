@@ -1,7 +1,5 @@
 """The page ``reports/index.html``, one file that opens from disk and loads nothing else."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math
@@ -16,7 +14,7 @@ from markupsafe import Markup, escape
 from matplotlib.colors import Colormap
 
 from sepi.io.files import write_whole
-from sepi.process.command import SepiCommand
+from sepi.process.command import PATH, SepiCommand
 from sepi.report import charts, published
 from sepi.report.pictures import error_scale, scale_colours
 from sepi.report.runs import Runs, count_note, own_key, read_json, read_numbers
@@ -192,14 +190,11 @@ def read_scene(path: Path) -> dict[str, Any]:
     return read_json(path, {"dataset", "scene", "panels", "arrays"}, kind)
 
 
-_FILE = click.Path(path_type=Path)
-
-
 @click.command(name="python -m sepi.extensions.page.page", cls=SepiCommand)
-@click.option("--numbers", "numbers_path", type=_FILE, required=True, help="Numbers of the report (JSON).")
-@click.option("--parts", "parts_path", type=_FILE, help="Numbers of the best variant's parts (JSON).")
-@click.option("--output", type=_FILE, required=True, help="Page to write.")
-@click.option("--scenes", type=_FILE, required=True, help="Folder of DATASET/SCENE.json, from sepi.report.figures.")
+@click.option("--numbers", "numbers_path", type=PATH, required=True, help="Numbers of the report (JSON).")
+@click.option("--parts", "parts_path", type=PATH, help="Numbers of the best variant's parts (JSON).")
+@click.option("--output", type=PATH, required=True, help="Page to write.")
+@click.option("--scenes", type=PATH, required=True, help="Folder of DATASET/SCENE.json, from sepi.report.figures.")
 def command(numbers_path: Path, parts_path: Path | None, output: Path, scenes: Path) -> None:
     """Write the page of a report, with the scenes of its numbers."""
     runs = read_numbers(numbers_path)

@@ -3,8 +3,6 @@
 This is for display only; ground truth is used to find the largest error.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import cv2
@@ -46,9 +44,7 @@ def kept_subsets(maps: StageMaps) -> npt.NDArray[np.uint8]:
     return maps.extra.get("view_subset", np.zeros(maps.disparity.shape, np.uint8))
 
 
-def interesting_pixels(
-    light_field: LightField, maps: StageMaps, ground_truth: FloatMap | None
-) -> list[InterestingPixel]:
+def interesting_pixels(light_field: LightField, maps: StageMaps) -> list[InterestingPixel]:
     """Pixels that show how the method works and where it fails.
 
     In order, if the scene has them: textured and sure; occluded, one for each half of the views that is kept, the
@@ -57,10 +53,9 @@ def interesting_pixels(
     Parameters
     ----------
     light_field : LightField
+        Its ground truth may be unknown, or not finite.
     maps : StageMaps
         Final maps of a variant, with its masks and ``view_subset`` if it has them.
-    ground_truth : ndarray, shape (H, W), float32, or None
-        True disparity; may hold values that are not finite.
 
     Returns
     -------
@@ -72,7 +67,7 @@ def interesting_pixels(
         ("textured and sure", _sure(texture, maps)),
         *_occluded(texture, maps),
         _textureless(texture, maps),
-        ("largest error", _wrong(maps.disparity, ground_truth)),
+        ("largest error", _wrong(maps.disparity, light_field.ground_truth)),
         ("textured but unsure", _unsure(texture, maps)),
     ]
     free = _inner(light_field.shape)

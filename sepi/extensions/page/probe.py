@@ -5,26 +5,21 @@ References
 .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
 """
 
-from __future__ import annotations
-
 import base64
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import cv2
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.extensions.page.curves import Curves, cost_curves
+from sepi.extensions.page.curves import cost_curves
 from sepi.extensions.page.pixels import InterestingPixel, kept_subsets
-from sepi.lightfield import BoolMap, LightField
+from sepi.lightfield import LightField
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.view_subsets import halves_and_quarters
-from sepi.report.pictures import Picture, as_rgb, contrast_of, picture_uri, stretched
+from sepi.report.pictures import as_rgb, contrast_of, picture_uri, stretched
 from sepi.stage import StageMaps
 
 GREY = 128
@@ -38,11 +33,19 @@ _WEBP = [cv2.IMWRITE_WEBP_QUALITY, 60]
 _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 9]
 
 
-@dataclass(frozen=True)
 class SepiPicture:
-    """Part of a SEPI around a pixel's column, sheared so that the candidate's line is upright in the middle.
+    """The SEPI of a pixel (Eq. 1-2 of [1]_) around its column, sheared so that a candidate's line is upright.
 
-    The right candidate shows upright stripes, a wrong one a saw-tooth with a tooth for each row of views.
+    The line is in the middle. The right candidate shows upright stripes, a wrong one a saw-tooth with a tooth for each
+    row of views.
+
+    Parameters
+    ----------
+    light_field : LightField
+    y, x : int
+        Pixel of the reference view.
+    disparity : float
+        Candidate, pixels per view step; finite.
 
     Attributes
     ----------
@@ -51,17 +54,47 @@ class SepiPicture:
     inside : ndarray, shape (T * S, 2 HALF_WIDTH + 1), bool
         Where the views have samples.
     disparity : float
-        Candidate, pixels per view step.
+        As given.
+
+    Raises
+    ------
+    SepiError
+        If the disparity is not finite.
     """
 
-    pixels: Picture
-    inside: BoolMap
-    disparity: float
+    def __init__(self, light_field: LightField, y: int, x: int, disparity: float) -> None:
+        if not math.isfinite(disparity):
+            raise SepiError(f"{light_field.name}: a SEPI needs a finite disparity, got {disparity:g}")
+        sepi = stitched_epi(light_field, y, disparity)
+        columns = x + np.arange(-HALF_WIDTH, HALF_WIDTH + 1)
+        position = columns + (-disparity * sepi.positions - sepi.offsets)[:, None]
+        width = sepi.rows.shape[1]
+        self.inside = sepi.inside[:, None] & (position >= 0) & (position <= width - 1)
+        # far outside, integers would overflow
+        position = np.clip(position, 0, width - 1)
+        left = np.minimum(np.floor(position).astype(np.int64), width - 2)
+        weight = (position - left).astype(np.float32)[:, :, None]
+        number = np.arange(len(sepi.rows))[:, None]
+        samples = (1 - weight) * sepi.rows[number, left] + weight * sepi.rows[number, left + 1]
+        self.pixels = np.where(self.inside[:, :, None], as_rgb(samples), np.uint8(GREY))
+        self.disparity = float(disparity)
 
 
-@dataclass(frozen=True)
 class Probe:
     """Data of one pixel to show; all disparities in pixels per view step.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    pixel : InterestingPixel
+        Pixel of the reference view.
+    maps : StageMaps
+        Final maps of a variant whose occlusion stage is ``half_sepi`` or ``none``.
+    parameters : SweepParameters
+        Parameters of its initial or occlusion stage.
+    best : StageMaps or None
+        Final maps of the most accurate variant.
 
     Attributes
     ----------
@@ -84,97 +117,13 @@ class Probe:
         Confidence of the final map, 0..1.
     occluded, textureless : bool
         Values of the stages' masks.
-    pictures : mapping of str to SepiPicture
+    pictures : dict of str to SepiPicture
         SEPIs at ``minimum`` (lowest cost over all views, as in the initial stage), ``chosen``, ``wrong`` (highest cost
         over all views) and, if known, ``ground_truth``.
-    """
-
-    pixel: InterestingPixel
-    curves: Curves
-    chosen: float
-    kept_subset: str
-    kept: BoolMap
-    best: float | None
-    interval: tuple[float, float] | None
-    ground_truth: float | None
-    confidence: float
-    occluded: bool
-    textureless: bool
-    pictures: Mapping[str, SepiPicture]
-
-    @cached_property
-    def stretched(self) -> dict[str, Picture]:
-        """The SEPIs with stretched contrast, the same in all."""
-        limits = contrast_of([(picture.pixels, picture.inside) for picture in self.pictures.values()])
-        return {name: stretched(found.pixels, found.inside, limits) for name, found in self.pictures.items()}
-
-    @property
-    def patch(self) -> Picture:
-        """Angular patch: the sample of each view at the chosen disparity, with stretched contrast; shape (T, S, 3)."""
-        return self.stretched["chosen"][:, HALF_WIDTH].reshape(*self.kept.shape, 3)
-
-
-def sepi_picture(light_field: LightField, y: int, x: int, disparity: float) -> SepiPicture:
-    """The SEPI of a pixel (Eq. 1-2 of [1]_) for one candidate.
-
-    Parameters
-    ----------
-    light_field : LightField
-    y, x : int
-        Pixel of the reference view.
-    disparity : float
-        Candidate, pixels per view step; finite.
-
-    Returns
-    -------
-    SepiPicture
-
-    Raises
-    ------
-    SepiError
-        If the disparity is not finite.
-    """
-    if not math.isfinite(disparity):
-        raise SepiError(f"{light_field.name}: a SEPI needs a finite disparity, got {disparity:g}")
-    sepi = stitched_epi(light_field, y, disparity)
-    columns = x + np.arange(-HALF_WIDTH, HALF_WIDTH + 1)
-    position = columns + (-disparity * sepi.positions - sepi.offsets)[:, None]
-    width = sepi.rows.shape[1]
-    inside = sepi.inside[:, None] & (position >= 0) & (position <= width - 1)
-    # far outside, integers would overflow
-    position = np.clip(position, 0, width - 1)
-    left = np.minimum(np.floor(position).astype(np.int64), width - 2)
-    weight = (position - left).astype(np.float32)[:, :, None]
-    number = np.arange(len(sepi.rows))[:, None]
-    samples = (1 - weight) * sepi.rows[number, left] + weight * sepi.rows[number, left + 1]
-    return SepiPicture(np.where(inside[:, :, None], as_rgb(samples), np.uint8(GREY)), inside, float(disparity))
-
-
-def probe(
-    light_field: LightField,
-    pixel: InterestingPixel,
-    maps: StageMaps,
-    parameters: SweepParameters,
-    best: StageMaps | None,
-) -> Probe:
-    """The probe of one pixel.
-
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    pixel : InterestingPixel
-        Pixel of the reference view.
-    maps : StageMaps
-        Final maps of a variant whose occlusion stage is ``half_sepi`` or ``none``.
-    parameters : SweepParameters
-        Parameters of its initial or occlusion stage.
-    best : StageMaps or None
-        Final maps of the most accurate variant.
-
-    Returns
-    -------
-    Probe
+    stretched : dict of str to ndarray, shape (T * S, 2 HALF_WIDTH + 1, 3), uint8
+        The SEPIs with stretched contrast, the same in all.
+    patch : ndarray, shape (T, S, 3), uint8
+        Angular patch: the sample of each view at the chosen disparity, with stretched contrast.
 
     Raises
     ------
@@ -182,39 +131,42 @@ def probe(
         If the pixel lies outside the reference view, the disparity range is unknown, the final disparity is not
         finite there, or the subsets of the views are not those of the half-SEPI.
     """
-    y, x, _ = pixel
-    curves, views = cost_curves(light_field, y, x, parameters), halves_and_quarters(light_field)
-    number = int(kept_subsets(maps)[y, x])
-    if maps.subset_names and maps.subset_names != views.names:
-        raise SepiError(
-            f"{light_field.name}: the subsets of the views are {', '.join(maps.subset_names[:3])}, ...; "
-            f"expected those of half_sepi, {', '.join(views.names[:3])}, ..."
-        )
-    chosen = float(maps.disparity[y, x])
-    ground_truth = None if light_field.ground_truth is None else _finite(light_field.ground_truth[y, x])
-    interval = None
-    if best is not None and best.low is not None and best.high is not None:
-        interval = float(best.low[y, x]), float(best.high[y, x])
-    shown = {
-        "minimum": curves.minimum()[0],
-        "chosen": chosen,
-        "wrong": float(curves.disparities[curves.costs[0].argmax()]),
-        "ground_truth": ground_truth,
-    }
-    return Probe(
-        pixel=pixel,
-        curves=curves,
-        chosen=chosen,
-        kept_subset=views.names[number],
-        kept=views.subsets[number][views.groups] & light_field.present,
-        best=None if best is None else _finite(best.disparity[y, x]),
-        interval=interval,
-        ground_truth=ground_truth,
-        confidence=float(maps.confidence[y, x]),
-        occluded=bool(maps.mask("occluded")[y, x]),
-        textureless=bool(maps.mask("textureless")[y, x]),
-        pictures={name: sepi_picture(light_field, y, x, at) for name, at in shown.items() if at is not None},
-    )
+
+    def __init__(
+        self,
+        light_field: LightField,
+        pixel: InterestingPixel,
+        maps: StageMaps,
+        parameters: SweepParameters,
+        best: StageMaps | None,
+    ) -> None:
+        self.pixel, (y, x, _) = pixel, pixel
+        self.curves, views = cost_curves(light_field, y, x, parameters), halves_and_quarters(light_field)
+        number = int(kept_subsets(maps)[y, x])
+        if maps.subset_names and maps.subset_names != views.names:
+            raise SepiError(
+                f"{light_field.name}: the subsets of the views are {', '.join(maps.subset_names[:3])}, ...; "
+                f"expected those of half_sepi, {', '.join(views.names[:3])}, ..."
+            )
+        self.kept_subset, self.kept = views.names[number], views.subsets[number][views.groups] & light_field.present
+        self.chosen, self.confidence = float(maps.disparity[y, x]), float(maps.confidence[y, x])
+        self.occluded, self.textureless = (bool(maps.mask(name)[y, x]) for name in ("occluded", "textureless"))
+        self.best = None if best is None else _finite(best.disparity[y, x])
+        self.interval: tuple[float, float] | None = None
+        if best is not None and best.low is not None and best.high is not None:
+            self.interval = float(best.low[y, x]), float(best.high[y, x])
+        truth = light_field.ground_truth
+        self.ground_truth = None if truth is None else _finite(truth[y, x])
+        shown = {
+            "minimum": self.curves.minimum()[0],
+            "chosen": self.chosen,
+            "wrong": float(self.curves.disparities[self.curves.costs[0].argmax()]),
+            "ground_truth": self.ground_truth,
+        }
+        self.pictures = {name: SepiPicture(light_field, y, x, at) for name, at in shown.items() if at is not None}
+        limits = contrast_of([(picture.pixels, picture.inside) for picture in self.pictures.values()])
+        self.stretched = {name: stretched(one.pixels, one.inside, limits) for name, one in self.pictures.items()}
+        self.patch = self.stretched["chosen"][:, HALF_WIDTH].reshape(*self.kept.shape, 3)
 
 
 def to_json(found: Probe) -> dict[str, Any]:

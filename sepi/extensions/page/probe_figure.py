@@ -1,7 +1,5 @@
 """Figure of probes: position, SEPIs, angular patch and cost curves (figures 3 and 4 of the paper)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal

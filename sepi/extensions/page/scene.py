@@ -1,7 +1,5 @@
 """A scene for the page, and figures of single pixels beside its pictures."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sepi.extensions.page.pixels import InterestingPixel, interesting_pixels
-from sepi.extensions.page.probe import Probe, probe, to_json
+from sepi.extensions.page.probe import Probe, to_json
 from sepi.extensions.page.probe_figure import write_probes
 from sepi.extensions.page.viewer import viewer_json
 from sepi.inspection.coded_views import comparable
@@ -41,12 +39,12 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
     maps = results.final(MAIN_VARIANT)
     # as in the stages
     light_field = comparable(results.light_field)
-    pixels = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
+    pixels = [*asked, *interesting_pixels(light_field, maps)]
     best = results.final(BEST_VARIANT) if BEST_VARIANT in results.maps else None
     known = history_of(final_file)[0]["parameters"]
     parameters = SweepParameters(**{name: known[name] for name in SweepParameters.model_fields if name in known})
     known_there = (pixel for pixel in pixels if np.isfinite(maps.disparity[pixel.y, pixel.x]))
-    return [probe(light_field, pixel, maps, parameters, best) for pixel in known_there]
+    return [Probe(light_field, pixel, maps, parameters, best) for pixel in known_there]
 
 
 def write_scene(

@@ -6,8 +6,6 @@ text: whole steps, differences to the row above, deflated, in base64. A browser 
 the map's step, so a page shows the map's value exactly rounded to this step.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import math

@@ -1,7 +1,5 @@
 """The command ``sepi scenes`` with ``--rendered``, and the workflow's command that renders a scene into a file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from inspect import cleandoc
 from pathlib import Path

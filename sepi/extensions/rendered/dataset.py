@@ -1,23 +1,19 @@
 """The dataset of rendered scenes: its configuration keys and its scenes."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
 from sepi.extensions.rendered.worlds import RENDERED
+from sepi.report.plan import Plan
 from sepi.validation import require_known
 from sepi.variants import VARIANTS, needing_files
 from sepi.workflow.datasets import Dataset as ADataset
 from sepi.workflow.datasets import Scene
 from sepi.workflow.rendered_scenes import DATASET, NOISE_LEVELS, WITHOUT_NOISE, RenderedScene
 from sepi.workflow.result_paths import RESULTS
-
-if TYPE_CHECKING:
-    from sepi.report.plan import Plan
 
 _MODULE = "sepi.extensions.rendered.exposure"
 

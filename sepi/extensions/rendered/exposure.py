@@ -1,7 +1,5 @@
 """Pictures of a sensor from rendered light: photon and read noise, vignetting, exposure, tone curve, bits."""
 
-from __future__ import annotations
-
 import math
 import zlib
 from pathlib import Path

@@ -3,8 +3,6 @@
 A pattern has 1024 texels a side by default, and repeats without a seam.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

@@ -9,8 +9,6 @@ A pixel shows the surface that the ray through its middle meets first. Masks tel
 and which other views see them.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -90,13 +88,9 @@ def masks_in(bits: Bits) -> dict[str, BoolMap]:
     return {name: np.asarray(bits & _BIT[name], bool) for name in MASKS}
 
 
-_ARRAYS = ("views", "disparity", "normal", "masks", "positions", "turns")
-_AXES = {
-    "views": "t s y x channel",
-    "disparity": "t s y x",
-    "normal": "t s y x (right, down, away)",
-    "masks": "t s y x",
-}
+# the arrays of a file, and the names of their axes
+_ARRAYS = {"views": "t s y x channel", "disparity": "t s y x", "normal": "t s y x (right, down, away)"}
+_ARRAYS |= {"masks": "t s y x", "positions": "", "turns": ""}
 
 
 @dataclass(frozen=True)
@@ -147,12 +141,12 @@ class Render:
 def write_render(path: Path, render: Render) -> None:
     """Write a render, whole or not at all; equal content gives equal bytes."""
     with create_hdf5(path) as file:
-        for name in _ARRAYS:
+        for name, axes in _ARRAYS.items():
             # worth while for masks only
             compression = "gzip" if name == "masks" else None
             file.create_dataset(name, data=getattr(render, name), compression=compression)
-            if name in _AXES:
-                file[name].attrs["axes"] = _AXES[name]
+            if axes:
+                file[name].attrs["axes"] = axes
         file["masks"].attrs["names"] = [fixed_text(name) for name in MASKS]
         file["disparity"].attrs["units"] = "pixels per view step"
         file.attrs["render"] = fixed_text(render.name)

@@ -1,7 +1,5 @@
 """Rendering of a path-traced scene, view by view; a later run continues an interrupted one."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -22,7 +20,7 @@ from sepi.extensions.rendered.render_file import Render, seen_bits, surface_bits
 from sepi.extensions.rendered.sampling import pictured, planned, with_shared_light
 from sepi.extensions.rendered.shapes import Points
 from sepi.extensions.rendered.tracing import Tracer
-from sepi.extensions.rendered.world import FloatArray, Rig, Share, World, rig_of
+from sepi.extensions.rendered.world import FloatArray, Rig, Share, World
 from sepi.io.files import atomic_path, write_whole
 from sepi.io.provenance import package_version
 from sepi.process.threads import threads_used, use_threads
@@ -85,7 +83,7 @@ def render_world(
     SepiError
         If the files cannot be written.
     """
-    rig = rig_of(world, options.size, options.grid, options.baseline)
+    rig = Rig(world, options.size, options.grid, options.baseline)
     count = math.prod(options.grid)
     # the folder of finished views
     parts = path.with_name(f"{path.name}.parts")
@@ -141,9 +139,9 @@ def _looked_at(tracer: Tracer, options: RenderOptions, number: int) -> tuple[Arr
     }
     if not options.shares_light:
         return truth, partial(tracer.picture, at, seed, options.samples)
-    plan = planned(tracer, at, seen, options.samples, seed)
-    truth |= {"albedo": plan.albedo, "things": seen.thing.astype(np.int16), "whole": plan.whole}
-    return truth, partial(pictured, plan)
+    passes, albedo, whole = planned(tracer, at, seen, options.samples, seed)
+    truth |= {"albedo": albedo, "things": seen.thing.astype(np.int16), "whole": whole}
+    return truth, partial(pictured, passes, options.size)
 
 
 def _stand(rig: Rig, options: RenderOptions) -> tuple[Points, Points]:

@@ -7,11 +7,8 @@ views. So a few paths in each view are enough. Pixels with several surfaces keep
 specular surfaces (gloss, mirrors and glass), which look different from view to view, need all.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -37,44 +34,14 @@ _BEND = 0.005
 _DARKEST = 1e-3
 
 
-class Pass(NamedTuple):
-    """Paths of some pixels of a view.
-
-    Attributes
-    ----------
-    pixels : ndarray, shape (N, T, T, 2), int64
-        Rows and columns of the pixels of square tiles.
-    taken, paths : int
-        Number of their earlier paths, and of these.
-    pictures : callable
-        Traces the paths, and returns linear pictures of the tiles, shape (N, T, T, 3).
-    """
-
-    pixels: Pixels
-    taken: int
-    paths: int
-    pictures: Callable[[], FloatArray]
+Pass = tuple[Pixels, int, int, Callable[[], FloatArray]]
+"""Paths of some pixels of a view: their rows and columns in square tiles (N, T, T, 2), the number of their earlier
+paths, that of these, and a function that traces them and returns linear pictures of the tiles, (N, T, T, 3)."""
 
 
-class Plan(NamedTuple):
-    """Plan of a view's samples.
-
-    Attributes
-    ----------
-    passes : list of Pass
-        In order.
-    albedo : ndarray, shape (H, W, 3), float32
-        Linear albedo; 0 where unknown.
-    whole : ndarray, shape (H, W), bool
-        Pixels of known albedo that show one matte, nearly flat surface.
-    """
-
-    passes: list[Pass]
-    albedo: FloatArray
-    whole: BoolMap
-
-
-def planned(tracer: Tracer, position: Position, seen: FirstSurface, samples: int, seed: int) -> Plan:
+def planned(
+    tracer: Tracer, position: Position, seen: FirstSurface, samples: int, seed: int
+) -> tuple[list[Pass], FloatArray, BoolMap]:
     """The plan of a view's samples.
 
     Parameters
@@ -88,6 +55,15 @@ def planned(tracer: Tracer, position: Position, seen: FirstSurface, samples: int
         Largest number of paths of a pixel.
     seed : int
         First seed of the paths; some that follow are used, too.
+
+    Returns
+    -------
+    passes : list of Pass
+        In order.
+    albedo : ndarray, shape (H, W, 3), float32
+        Linear albedo; 0 where unknown.
+    whole : ndarray, shape (H, W), bool
+        Pixels of known albedo that show one matte, nearly flat surface.
     """
     # things narrower than a pixel may lie between the rays through middles
     beside = tracer.surfaces.things(position, _FINE)
@@ -108,15 +84,14 @@ def planned(tracer: Tracer, position: Position, seen: FirstSurface, samples: int
     passes: list[Pass] = []
     for asked, taken, paths in kinds:
         for pixels in _tiles(asked, paths) if paths > 0 else ():
-            pictures = tracer.tiles(position, pixels, paths, seed + 4096 * len(passes))
-            passes.append(Pass(pixels, taken, paths, pictures))
-    return Plan(passes, albedo, whole)
+            passes.append((pixels, taken, paths, tracer.tiles(position, pixels, paths, seed + 4096 * len(passes))))
+    return passes, albedo, whole
 
 
-def pictured(plan: Plan) -> FloatArray:
-    """The picture of a view, linear, 1 is white; shape (H, W, 3), float32."""
-    picture = np.zeros_like(plan.albedo)
-    for pixels, taken, paths, pictures in plan.passes:
+def pictured(passes: list[Pass], size: int) -> FloatArray:
+    """The picture of a view of ``size`` pixels a side, linear, 1 is white; shape (H, W, 3), float32."""
+    picture = np.zeros((size, size, 3), np.float32)
+    for pixels, taken, paths, pictures in passes:
         where = pixels[..., 0], pixels[..., 1]
         picture[where] = (taken * picture[where] + paths * pictures()) / np.float32(taken + paths)
     return picture

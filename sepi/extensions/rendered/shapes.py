@@ -3,8 +3,6 @@
 ``uv`` are approximate metres along the surface, so that a pattern has the same size everywhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What scenes hold (books, furniture, vessels, fruit, houses, wires), and a world seen from any place in it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """All triangles of a world in one list, from which the surface at a ray's end follows exactly."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -97,13 +95,10 @@ class Surfaces:
         hit = faces > 0
         towards = np.sum(normal * directions, axis=-1, keepdims=True) > 0
         uv = uv + np.einsum("...ij,...j", gradient, point)
-        return FirstSurface(
-            face=faces,
-            depth=np.where(hit, depth, np.inf),
-            normal=np.where(hit[..., None], np.where(towards, -normal, normal), 0).astype(np.float32),
-            uv=np.where(hit[..., None], uv, 0).astype(np.float32),
-            thing=self._thing[faces],
-        )
+        depth, thing = np.where(hit, depth, np.inf), self._thing[faces]
+        facing = np.where(towards, -normal, normal)
+        facing, uv = (np.where(hit[..., None], values, 0).astype(np.float32) for values in (facing, uv))
+        return FirstSurface(faces, depth, facing, uv, thing)
 
     def things(self, position: Position, fine: int) -> npt.NDArray[np.int64]:
         """First things on F by F rays of each pixel, -1 for none; shape (H, F, W, F)."""

@@ -4,8 +4,6 @@ Mitsuba's variant ``scalar_rgb`` needs only the wheel. The sampler is seeded by 
 and a box filter keeps pixels separate, so results are the same in each run and for any number of threads.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import math
 from collections.abc import Callable

@@ -6,8 +6,6 @@ have disparity zero, as in the HCI 4D benchmark. With the focal length ``f`` in 
 ``d = b f (1 / Z - 1 / F)``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal, NamedTuple
 
@@ -220,34 +218,40 @@ class Position(NamedTuple):
     turn: Vector = (0.0, 0.0, 0.0)
 
 
-class Rig(NamedTuple):
-    """Cameras of a scene.
+class Rig:
+    """Cameras for which a scene's near and far depths have its disparities, times ``share``.
 
-    Attributes
+    Parameters
     ----------
+    world : World
     size : int
         Height and width of a view in pixels.
     grid : (int, int)
         Rows and columns of views.
+    share : float
+
+    Attributes
+    ----------
+    size, grid
+        As given.
     focal_px : float
         Focal length in pixels.
     baseline : float
         Metres from one view to the next.
     focus : float
         Focus distance, metres.
+    settings : dict of str to float
+        Values for the benchmark's ``parameters.cfg``.
     """
 
-    size: int
-    grid: tuple[int, int]
-    focal_px: float
-    baseline: float
-    focus: float
-
-    @property
-    def settings(self) -> dict[str, float]:
-        """Values for the benchmark's ``parameters.cfg``."""
-        return {
-            "focal_length_mm": self.focal_px / self.size * SENSOR_MM,
+    def __init__(self, world: World, size: int, grid: tuple[int, int], share: float = 1.0) -> None:
+        self.size, self.grid, seen = size, grid, world.cameras
+        self.focal_px = float(size / (2 * np.tan(np.radians(seen.field_of_view) / 2)))
+        step = (seen.at_near - seen.at_far) / (self.focal_px * (1 / seen.near - 1 / seen.far))
+        self.baseline = float(share * step)
+        self.focus = float(1 / (1 / seen.near - seen.at_near / (step * self.focal_px)))
+        self.settings = {
+            "focal_length_mm": self.focal_px / size * SENSOR_MM,
             "baseline_mm": 1000 * self.baseline,
             "focus_distance_m": self.focus,
             "sensor_size_mm": SENSOR_MM,
@@ -261,12 +265,3 @@ class Rig(NamedTuple):
     def disparity(self, depth: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Disparity in pixels per view step of depths along the viewing direction in metres."""
         return self.baseline * self.focal_px * (1 / depth - 1 / self.focus)
-
-
-def rig_of(world: World, size: int, grid: tuple[int, int], baseline: float = 1.0) -> Rig:
-    """The cameras for which a scene's near and far depths have its disparities, times ``baseline``."""
-    seen = world.cameras
-    focal = size / (2 * np.tan(np.radians(seen.field_of_view) / 2))
-    step = (seen.at_near - seen.at_far) / (focal * (1 / seen.near - 1 / seen.far))
-    focus = 1 / (1 / seen.near - seen.at_near / (step * focal))
-    return Rig(size, grid, float(focal), float(baseline * step), float(focus))

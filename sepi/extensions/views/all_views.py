@@ -12,8 +12,6 @@ References
 .. [1] Merrell et al.: Real-Time Visibility-Based Fusion of Depth Maps. ICCV 2007. doi:10.1109/ICCV.2007.4408984
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import NoneType
@@ -28,7 +26,7 @@ from sepi.kernels import all_views as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.matching.carried_map import TOLERANCE, corner_disparities
 from sepi.pipeline import estimate_depth
-from sepi.stage import ERROR_BARS, Progress, StageMaps, no_progress
+from sepi.stage import Progress, StageMaps, no_progress
 from sepi.validation import require_type
 from sepi.variants import Variant
 from sepi.variants.built_in import DEFAULT_VARIANT
@@ -63,35 +61,8 @@ class Sources(NamedTuple):
     baselines: npt.NDArray[np.float64]
 
 
-class ViewMaps(NamedTuple):
-    """The maps of one view.
-
-    Attributes
-    ----------
-    position : tuple of int
-        Row and column of the view in the grid.
-    disparity, confidence : ndarray, shape (H, W), float32
-        Pixels per view step; 0..1.
-    extended : ndarray, shape (H, W), bool
-        Pixels that no source map shows, filled with the background beside them, with confidence 0.
-    sigma : ndarray, shape (H, W), float32, or None
-        Standard deviation of the disparity, pixels per view step; None if the variant has no error bars.
-    low, high : ndarray, shape (H, W), float32, or None
-        Bounds of the interval of 90 %; the whole range at extended pixels.
-    """
-
-    position: tuple[int, int]
-    disparity: FloatMap
-    confidence: FloatMap
-    extended: BoolMap
-    sigma: FloatMap | None = None
-    low: FloatMap | None = None
-    high: FloatMap | None = None
-
-    @property
-    def maps(self) -> dict[str, npt.NDArray[Any]]:
-        """Every map by name."""
-        return {name: values for name, values in self._asdict().items() if isinstance(values, np.ndarray)}
+ViewMaps = dict[str, npt.NDArray[Any]]
+"""Maps (H, W) of one view by name: the fields of :class:`AllViews`, without error bars if the variant has none."""
 
 
 @dataclass(frozen=True)
@@ -105,9 +76,12 @@ class AllViews:
     confidence : ndarray, shape (T, S, H, W), float32
         0..1; 0 in missing views.
     extended : ndarray, shape (T, S, H, W), bool
-        Pixels that no source map shows; see :class:`ViewMaps`.
-    sigma, low, high : ndarray, shape (T, S, H, W), float32, or None
-        Error bars, pixels per view step; NaN in missing views, None if the variant has no error bars.
+        Pixels that no source map shows, filled with the background beside them, with confidence 0.
+    sigma : ndarray, shape (T, S, H, W), float32, or None
+        Standard deviation of the disparity, pixels per view step; NaN in missing views, None if the variant has no
+        error bars.
+    low, high : ndarray, shape (T, S, H, W), float32, or None
+        Bounds of the interval of 90 %, likewise; the whole range at extended pixels.
 
     Examples
     --------
@@ -188,12 +162,12 @@ def estimate_all_views(
     require_type(f"{light_field.name}: maps", maps, (StageMaps, NoneType), "StageMaps")
     shape = (*light_field.grid, *light_field.shape)
     result: dict[str, npt.NDArray[Any]] = {}
-    for view in maps_of_all_views(light_field, maps, variant, parameters, progress, memory, edge_views):
-        for name, values in view.maps.items():
+    for position, view in maps_of_all_views(light_field, maps, variant, parameters, progress, memory, edge_views):
+        for name, values in view.items():
             if name not in result:
                 missing = 0 if name in ("confidence", "extended") else np.nan
                 result[name] = np.full(shape, missing, values.dtype)
-            result[name][view.position] = values
+            result[name][position] = values
     return AllViews(**result)
 
 
@@ -205,14 +179,17 @@ def maps_of_all_views(
     progress: Progress = no_progress,
     memory: int | None = None,
     edge_views: int = EDGE_VIEWS,
-) -> Iterator[ViewMaps]:
+) -> Iterator[tuple[tuple[int, int], ViewMaps]]:
     """The maps of one view after the other, row by row of the grid, without missing views.
 
     Arguments and errors are those of :func:`estimate_all_views`. Only a few views' maps are in memory at a time.
 
     Yields
     ------
-    ViewMaps
+    position : (int, int)
+        Row and column of the view in the grid.
+    maps : dict of str to ndarray, shape (H, W)
+        Its :data:`ViewMaps`.
     """
     if maps is not None and maps.disparity.shape != light_field.shape:
         raise SepiError(
@@ -240,15 +217,13 @@ def maps_of_all_views(
     # frees the other views' maps
     reference = found[0]
     del found
-    for begin in range(0, len(places), _AT_ONCE):
-        for number, view in enumerate(_fused(light_field, sources, places[begin : begin + _AT_ONCE])):
-            if view.position == light_field.reference_position:
-                own = {name: getattr(reference, name) for name in ERROR_BARS if view.sigma is not None}
-                yield view._replace(disparity=reference.disparity, confidence=reference.confidence, **own)
-            else:
-                decided = _with_own_edges(light_field, view, edge_views)
-                yield _with_doubt(light_field, view, decided)
-            progress((len(anchors) + 0.1 * (begin + number + 1)) / total)
+    for number, ((t, s), view) in enumerate(_fused(light_field, sources, places), 1):
+        if (t, s) == light_field.reference_position:
+            yield (t, s), {name: getattr(reference, name, values) for name, values in view.items()}
+        else:
+            decided = _with_own_edges(light_field.seen_from((t, s)), view["disparity"], edge_views)
+            yield (t, s), _with_doubt(light_field, view, decided)
+        progress((len(anchors) + 0.1 * number) / total)
 
 
 def anchor_views(light_field: LightField) -> list[tuple[int, int]]:
@@ -289,49 +264,52 @@ def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sour
     )
 
 
-def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int64]) -> list[ViewMaps]:
-    """Maps of some views, fused from the source maps."""
-    shape = (len(places), *light_field.shape)
-    disparity, confidence, extended = np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, bool)
-    baselines = np.ascontiguousarray(light_field.baselines[tuple(places.T)])
+def _fused(
+    light_field: LightField, sources: Sources, places: npt.NDArray[np.int64]
+) -> Iterator[tuple[tuple[int, int], ViewMaps]]:
+    """Positions and maps of views, fused from the source maps, some at a time."""
     told = len(sources.bars) > 0
-    bars = np.empty((*shape, 3) if told else (len(places), 0, 0, 3), np.float32)
-    kernels.maps_of_views(sources, baselines, disparity, confidence, bars, extended)
-    views = []
-    for (t, s), at, sure, beyond, own in zip(places.tolist(), disparity, confidence, extended, bars, strict=True):
-        of_view = (own[..., 0], at - own[..., 1], at + own[..., 2]) if told else ()
-        views.append(ViewMaps((t, s), at, sure, beyond, *of_view))
-    return views
+    for some in np.split(places, range(_AT_ONCE, len(places), _AT_ONCE)):
+        shape = (len(some), *light_field.shape)
+        disparity, confidence, extended = (
+            np.empty(shape, np.float32),
+            np.empty(shape, np.float32),
+            np.empty(shape, bool),
+        )
+        bars = np.empty((*shape, 3) if told else (len(some), 0, 0, 3), np.float32)
+        baselines = np.ascontiguousarray(light_field.baselines[tuple(some.T)])
+        kernels.maps_of_views(sources, baselines, disparity, confidence, bars, extended)
+        for (t, s), at, sure, beyond, own in zip(some.tolist(), disparity, confidence, extended, bars, strict=True):
+            of_view = {"sigma": own[..., 0], "low": at - own[..., 1], "high": at + own[..., 2]} if told else {}
+            yield (t, s), {"disparity": at, "confidence": sure, "extended": beyond, **of_view}
 
 
 def _with_doubt(light_field: LightField, view: ViewMaps, decided: FloatMap) -> ViewMaps:
     """A view's maps with the decided disparity, and error bars that allow for changes and extended background."""
-    if view.sigma is None or view.low is None or view.high is None:
-        return view._replace(disparity=decided)
+    if "sigma" not in view:
+        return view | {"disparity": decided}
     # a pixel that changed sides may belong to either surface
-    moved = decided - view.disparity
-    low, high = view.low + np.minimum(moved, 0), view.high + np.maximum(moved, 0)
-    sigma = np.hypot(view.sigma, moved / 2)
+    moved, anywhere = decided - view["disparity"], view["extended"]
     # extended and unknown pixels may have any disparity
     lowest, highest = light_field.require_disparity_range().candidates(2)
-    low = np.where(view.extended, np.minimum(lowest, decided), low)
-    high = np.where(view.extended, np.maximum(highest, decided), high)
-    sigma = np.where(view.extended, np.float32((highest - lowest) / 12**0.5), sigma)
-    return view._replace(disparity=decided, sigma=sigma, low=low, high=high)
+    sigma = np.where(anywhere, np.float32((highest - lowest) / 12**0.5), np.hypot(view["sigma"], moved / 2))
+    low = np.where(anywhere, np.minimum(lowest, decided), view["low"] + np.minimum(moved, 0))
+    high = np.where(anywhere, np.maximum(highest, decided), view["high"] + np.maximum(moved, 0))
+    return view | {"disparity": decided, "sigma": sigma, "low": low, "high": high}
 
 
-def _with_own_edges(light_field: LightField, view: ViewMaps, edge_views: int) -> FloatMap:
-    """A view's disparity, with pixels at its depth steps on the surface that fills most of them."""
+def _with_own_edges(own: LightField, disparity: FloatMap, edge_views: int) -> FloatMap:
+    """Disparity of a light field's reference view, its pixels at depth steps on the surface that fills most of them."""
     if edge_views == 0:
-        return view.disparity
+        return disparity
     from sepi.boundaries.decision import assigned_to_surfaces
     from sepi.boundaries.parameters import BoundaryParameters
 
-    own, parameters = light_field.seen_from(view.position), BoundaryParameters(share_views=edge_views)
-    decided = assigned_to_surfaces(own, view.disparity, parameters)
+    parameters = BoundaryParameters(share_views=edge_views)
+    decided = assigned_to_surfaces(own, disparity, parameters)
     # a steep slope is not a step, and its pixels stay on their surface
     beside = np.ones((2 * parameters.share_radius + 1,) * 2, np.uint8)
-    return np.where(cv2.dilate(torn_pixels(view.disparity).astype(np.uint8), beside) > 0, decided, view.disparity)
+    return np.where(cv2.dilate(torn_pixels(disparity).astype(np.uint8), beside) > 0, decided, disparity)
 
 
 def torn_pixels(disparity: FloatMap) -> BoolMap:

@@ -12,8 +12,7 @@ import click
 from sepi.process.command import SepiCommand, progress_bar
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
+    from sepi.extensions.views.all_views import ViewMaps
     from sepi.lightfield import LightField
     from sepi.stage import Progress, StageMaps
     from sepi.variants import Variant
@@ -55,12 +54,12 @@ def _write_all_views(
     from sepi.io.result_files import ALL_VIEWS
     from sepi.io.result_folder import write_as_taken
 
-    def of_views(progress: Progress) -> Iterator[tuple[tuple[int, int], Mapping[str, npt.NDArray[Any]]]]:
-        for view in maps_of_all_views(light_field, maps, variant, parameters, progress, memory):
+    def of_views(progress: Progress) -> Iterator[tuple[tuple[int, int], ViewMaps]]:
+        for position, view in maps_of_all_views(light_field, maps, variant, parameters, progress, memory):
             # also for the picture that its calibrated camera took
-            if view.position != light_field.reference_position:
-                write_as_taken(folder, light_field, view.disparity, view.position, view.sigma)
-            yield view.position, view.maps
+            if position != light_field.reference_position:
+                write_as_taken(folder, light_field, view["disparity"], position, view.get("sigma"))
+            yield position, view
 
     made_by = result_attributes(light_field, maps)
     with progress_bar(f"{light_field.name}, all views") as progress:

@@ -1,7 +1,5 @@
 """The command ``sepi refocus``: a folder of refocused images, with an index of where each is focused."""
 
-from __future__ import annotations
-
 import csv
 import math
 import os
@@ -10,22 +8,19 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 import numpy as np
 import numpy.typing as npt
 
+from sepi.camera import Camera
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, read_light_field_of, reading_flags
 from sepi.errors import SepiError
 from sepi.io.files import atomic_folder, atomic_path, naming, remove_files
 from sepi.io.images import write_png
-from sepi.lightfield import FloatMap, full_scale
-from sepi.process.command import SepiCommand, progress_bar
-
-if TYPE_CHECKING:
-    from sepi.camera import Camera
-    from sepi.lightfield import LightField
+from sepi.lightfield import FloatMap, LightField, full_scale
+from sepi.process.command import PATH, SepiCommand, progress_bar
 
 INDEX = "focus.csv"
 """Name of the index: a row for each image."""
@@ -130,14 +125,13 @@ def _earlier_files(index: Path) -> list[str]:
     return []
 
 
-_PATH = click.Path(path_type=Path)
 _STEPS = 9
 
 
 @click.command(cls=SepiCommand)
-@click.argument("light_field_path", metavar="INPUT", type=_PATH)
-@click.argument("result_path", metavar="[RESULT]", type=_PATH, required=False)
-@click.option("-o", "--output", type=_PATH, help="Folder to write; default: NAME-refocused for an INPUT called NAME.")
+@click.argument("light_field_path", metavar="INPUT", type=PATH)
+@click.argument("result_path", metavar="[RESULT]", type=PATH, required=False)
+@click.option("-o", "--output", type=PATH, help="Folder to write; default: NAME-refocused for an INPUT called NAME.")
 @click.option(
     "--steps",
     type=click.IntRange(1, 999),

@@ -11,8 +11,6 @@ References
    Stanford Tech Report CTSR 2005-02.
 """
 
-from __future__ import annotations
-
 import math
 from numbers import Real
 from typing import Any

@@ -16,7 +16,7 @@ from sepi.camera.rig import Lens, Shot
 from sepi.errors import SepiError
 from sepi.extensions.cameras.calibration import calibrate, pairs_of, pictures_in
 from sepi.extensions.cameras.model import CameraModel, Picture
-from sepi.extensions.cameras.plane import plane_through
+from sepi.extensions.cameras.plane import Plane
 from sepi.extensions.cameras.reader import read_model
 from sepi.scenes import render_shot
 
@@ -149,7 +149,7 @@ def test_row_that_structure_from_motion_found_is_not_seen_from_above() -> None:
     """Errors of the places across a row tilted the plane of all views, and pictures became half as tall again."""
     stray = np.random.default_rng(0).normal(0, 0.5, 51)
     shots = tuple(_shot(str(n), n, aside, 0.75 * aside) for n, aside in enumerate(stray.tolist()))
-    plane = plane_through(CameraModel(Path("row"), tuple(Picture(shot, Path()) for shot in shots)), None)
+    plane = Plane(CameraModel(Path("row"), tuple(Picture(shot, Path()) for shot in shots)), None)
     assert np.degrees(np.arccos(plane.rotation[2, 2])) < 12
 
 

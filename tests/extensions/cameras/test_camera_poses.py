@@ -7,7 +7,7 @@ import pytest
 from geometries import GEOMETRIES, standing
 
 from sepi.camera import Camera
-from sepi.extensions.cameras.posed_views import nominal_camera, posed_views
+from sepi.extensions.cameras.posed_views import PosedViews, nominal_camera
 from sepi.lightfield import LightField
 from sepi.matching.carried_map import carried_map
 from sepi.scenes import render
@@ -24,7 +24,7 @@ def light_field(**known: object) -> LightField:
 
 def test_the_centre_view_looks_through_the_middle() -> None:
     """Programs that take the middle of the picture for granted are right about one view at least."""
-    poses = posed_views(light_field(view=(0, 0)), np.zeros(SHAPE, np.float32), camera=SHEARED)
+    poses = PosedViews(light_field(view=(0, 0)), np.zeros(SHAPE, np.float32), camera=SHEARED)
     centre = poses.positions.index((1, 2))
     np.testing.assert_allclose(poses.principal_points[centre], [(SHAPE[1] - 1) / 2, (SHAPE[0] - 1) / 2], atol=1e-12)
     # one view step to the right, a baseline of b = scale / f, and b f / F pixels
@@ -61,7 +61,7 @@ def test_carried_map_has_the_nearer_surface_in_front_and_nothing_where_nothing_w
     disparity = np.zeros((5, 9), np.float32)
     disparity[1:4, 4:7] = 2
     views = np.zeros((1, 3, 5, 9, 3), np.uint8)
-    posed = posed_views(LightField(views=views, name="square"), disparity)
+    posed = PosedViews(LightField(views=views, name="square"), disparity)
     expected = np.zeros((5, 9), np.float32)
     expected[1:4, 2:5] = 2
     expected[1:4, 5:7] = np.nan
@@ -88,7 +88,7 @@ def test_what_is_unknown_is_carried_nowhere_and_spoils_nothing_beside_it() -> No
 def test_carried_pixels_have_the_colours_of_the_reference_view(geometry: str) -> None:
     """Depth of the other views must lie where their pictures show the thing: not mirrored, nor a row too far."""
     scene = render("curved_occluders", size=64, views=3, **standing(geometry, (3, 3)))
-    posed = posed_views(scene, np.asarray(scene.ground_truth))
+    posed = PosedViews(scene, np.asarray(scene.ground_truth))
     here = posed.picture(posed.reference).astype(np.float64)
     for view in range(len(posed.positions)):
         carried = posed.carried(view)
@@ -109,23 +109,23 @@ def test_points_are_the_surer_pixels_and_no_more_than_asked() -> None:
     confidence = np.linspace(0, 1, disparity.size, dtype=np.float32).reshape(SHAPE)
     confidence[0, 0] = np.nan
     scene = light_field()
-    half = posed_views(scene, disparity, confidence).chosen
+    half = PosedViews(scene, disparity, confidence).chosen
     np.testing.assert_array_equal(half, confidence >= np.median(np.nan_to_num(confidence, nan=-1)))
-    assert (posed_views(scene, disparity, confidence, min_confidence=0.9).chosen == (confidence >= 0.9)).all()
+    assert (PosedViews(scene, disparity, confidence, min_confidence=0.9).chosen == (confidence >= 0.9)).all()
     for most in (0, 1, 7, 40, 10**6):
-        posed = posed_views(scene, disparity, max_points=most)
+        posed = PosedViews(scene, disparity, max_points=most)
         assert posed.chosen.sum() <= most
         assert len(posed.points) == len(posed.colours) == posed.chosen.sum()
     unknown = np.zeros(SHAPE, bool)
     unknown[4:] = True
-    assert posed_views(scene, disparity, unknown=unknown, max_points=10**6).chosen.sum() == 4 * SHAPE[1]
+    assert PosedViews(scene, disparity, unknown=unknown, max_points=10**6).chosen.sum() == 4 * SHAPE[1]
 
 
 def test_what_lies_at_infinity_has_no_depth() -> None:
     """Beyond infinity, too: it would come out behind the cameras."""
     disparity = np.ones(SHAPE, np.float32)
     disparity[2, :3] = -8, -9, np.nan
-    posed = posed_views(light_field(camera=SHEARED), disparity)
+    posed = PosedViews(light_field(camera=SHEARED), disparity)
     depth = posed.depth(posed.carried(posed.reference))
     assert depth[2, :3].tolist() == [0, 0, 0]
     assert posed.chosen.sum() == disparity.size - 3
@@ -138,7 +138,7 @@ def test_pictures_are_8_bit_colour_whatever_the_views_are(kind: type) -> None:
     """What these programs read; a grey picture, or one of 16 bit, breaks some of them."""
     levels = np.random.default_rng(6).integers(0, 256, (*GRID, *SHAPE, 1), np.uint8)
     views = levels * kind(257) if kind is np.uint16 else (levels / 255).astype(kind)
-    posed = posed_views(replace(light_field(), views=views), np.ones(SHAPE, np.float32))
+    posed = PosedViews(replace(light_field(), views=views), np.ones(SHAPE, np.float32))
     picture = posed.picture(posed.reference)
     assert picture.dtype == np.uint8
     np.testing.assert_array_equal(picture, np.repeat(levels[1, 2], 3, axis=2))

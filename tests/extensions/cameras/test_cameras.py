@@ -22,9 +22,9 @@ from sepi.cli.main import main
 from sepi.errors import SepiError
 from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
 from sepi.extensions.cameras.files import rotation_of
-from sepi.extensions.cameras.posed_views import posed_views
+from sepi.extensions.cameras.posed_views import PosedViews
 from sepi.extensions.cameras.reader import read_model
-from sepi.extensions.cameras.rectification import light_field_of, rectification_of
+from sepi.extensions.cameras.rectification import Rectification, light_field_of
 from sepi.io.all_views import write_all_views
 from sepi.io.disparity_maps import read_pfm
 from sepi.io.point_cloud import point_cloud
@@ -93,7 +93,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_cameras_of_any_pose_see_what_the_rectified_camera_would(folder: Path) -> None:
     """Turned, bent, zoomed and displaced: the views move by the disparity, and points lie on the world's surface."""
-    found = rectification_of(read_model(folder), inverse_depths=(0.7, 1.4))
+    found = Rectification(read_model(folder), inverse_depths=(0.7, 1.4))
     light_field = light_field_of(found)
     camera, shot = light_field.camera, _rectified_shot(light_field)
     seen = render_shot("pyramids", shot, camera=CAMERA, size=SIZE)
@@ -131,7 +131,7 @@ def test_cameras_of_any_pose_see_what_the_rectified_camera_would(folder: Path) -
 
 def test_the_picture_is_the_reference_cameras_and_what_others_do_not_show_is_marked(folder: Path) -> None:
     """A third of the picture is lost where cameras are turned by a few degrees, or depth is made of what stands in."""
-    light_field = light_field_of(rectification_of(read_model(folder), inverse_depths=(0.7, 1.4)))
+    light_field = light_field_of(Rectification(read_model(folder), inverse_depths=(0.7, 1.4)))
     assert min(light_field.shape) > 0.88 * SIZE
     missing = light_field.missing
     assert not missing[light_field.reference_position].any()
@@ -157,9 +157,9 @@ def test_dots_are_where_they_should_be_in_every_rectified_view(tmp_path: Path) -
             picture += 60000 * np.exp(-((x - px) ** 2 + (y - py) ** 2) / (2 * 1.5**2))
         cv2.imwrite(str(tmp_path / shot.name), np.rint(picture).astype(np.uint16))
     (tmp_path / "cameras.yaml").write_text(json.dumps({"cameras": list(map(_entry, shots))}))
-    light_field = light_field_of(rectification_of(read_model(tmp_path), inverse_depths=(0.9, 1.1)))
+    light_field = light_field_of(Rectification(read_model(tmp_path), inverse_depths=(0.9, 1.1)))
     rig = light_field.reference_rig
-    poses = posed_views(light_field, np.zeros(light_field.shape, np.float32))
+    poses = PosedViews(light_field, np.zeros(light_field.shape, np.float32))
     seen = (dots @ TURN.T + AWAY - rig.origin) @ rig.rotation.T
     errors = []
     for view, (t, s) in enumerate(poses.positions):
@@ -214,7 +214,7 @@ def test_poses_that_were_written_give_their_light_field_again(tmp_path: Path, ki
         pytest.importorskip("pycolmap")
     light_field = replace(render("pyramids", size=SIZE, views=3), camera=CAMERA)
     truth = light_field.ground_truth
-    {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](tmp_path / "out", posed_views(light_field, truth))
+    {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](tmp_path / "out", PosedViews(light_field, truth))
     again = sepi.read_cameras(tmp_path / "out")
     assert again.grid == light_field.grid
     assert again.reference_position == (1, 1)
@@ -235,11 +235,11 @@ def test_written_cameras_stand_in_the_calibrated_world(folder: Path, tmp_path: P
         pytest.importorskip("pycolmap")
     light_field = sepi.read_cameras(folder)
     flat = np.zeros(light_field.shape, np.float32)
-    posed = posed_views(light_field, flat)
+    posed = PosedViews(light_field, flat)
     {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](tmp_path / "out", posed)
     model, rig = read_model(tmp_path / "out"), light_field.rig
     # what a camera does not show is no picture to others, either
-    again = light_field_of(rectification_of(model, inverse_depths=(0.7, 1.4)))
+    again = light_field_of(Rectification(model, inverse_depths=(0.7, 1.4)))
     np.testing.assert_array_equal(again.missing, light_field.missing)
     places = np.array([rig.centre(at) for at in light_field.positions[light_field.present]])
     np.testing.assert_allclose(model.centres, places, atol=1e-9)
@@ -262,7 +262,7 @@ def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path:
     """Their lengths would be those of the calibrated one, beside metres of the other."""
     light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)
     assert light_field.ground_truth is not None
-    write_nerfstudio(tmp_path / "rig", posed_views(light_field, light_field.ground_truth))
+    write_nerfstudio(tmp_path / "rig", PosedViews(light_field, light_field.ground_truth))
     flags = ("--focal-length", "35", "--baseline", "2", "--focus-distance", "3", "--sensor-size", "24")
     for name, more in (("as calibrated", ()), ("another", flags)):
         done("depth", tmp_path / "rig", "-o", tmp_path / name, "--variant", "fast", *more)
@@ -273,7 +273,7 @@ def test_another_camera_has_no_maps_of_the_pictures_as_they_were_taken(tmp_path:
 def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> None:
     """A hand before the lens, or the gantry itself, becomes part of the scene."""
     light_field = replace(render("dots", size=SIZE, views=3), camera=CAMERA)
-    write_nerfstudio(tmp_path / "rig", posed_views(light_field, np.zeros(light_field.shape, np.float32)))
+    write_nerfstudio(tmp_path / "rig", PosedViews(light_field, np.zeros(light_field.shape, np.float32)))
     told = json.loads((tmp_path / "rig/transforms.json").read_text())
     mask = np.full((SIZE, SIZE), 255, np.uint8)
     mask[20:30, 40:50] = 0
@@ -283,7 +283,7 @@ def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> Non
         told["frames"][n]["mask_path"] = f"masks/{n}.png"
     path = tmp_path / "rig/transforms.json"
     path.write_text(json.dumps(told))
-    read = light_field_of(rectification_of(read_model(path), inverse_depths=(0.7, 1.4)))
+    read = light_field_of(Rectification(read_model(path), inverse_depths=(0.7, 1.4)))
     assert not read.present[0, 1], "it shows nothing at all"
     assert read.shape == (SIZE, SIZE)
     np.testing.assert_array_equal(read.missing[0, 0], mask == 0)
@@ -292,7 +292,7 @@ def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> Non
     assert tmp_path / "rig/masks/1.png" in found.files
     cv2.imwrite(str(tmp_path / "rig/masks/1.png"), mask[:40])
     with pytest.raises(SepiError, match=r"1\.png: 64x40 pixels; expected a mask as large as its picture, 64x64"):
-        light_field_of(rectification_of(read_model(path), inverse_depths=(0.7, 1.4)))
+        light_field_of(Rectification(read_model(path), inverse_depths=(0.7, 1.4)))
 
 
 def test_other_exposure_is_made_up_for_and_equal_exposure_left_alone(folder: Path, tmp_path: Path) -> None:
@@ -301,7 +301,7 @@ def test_other_exposure_is_made_up_for_and_equal_exposure_left_alone(folder: Pat
     dark = tmp_path / "rig/02.png"
     cv2.imwrite(str(dark), np.rint(cv2.imread(str(dark)) * np.array([0.9, 0.9, 0.75])).astype(np.uint8))
     plain, made = (
-        light_field_of(rectification_of(read_model(path), inverse_depths=(0.7, 1.4)))
+        light_field_of(Rectification(read_model(path), inverse_depths=(0.7, 1.4)))
         for path in (folder, tmp_path / "rig")
     )
     assert not any("brightness" in note for note in plain.notes)
@@ -314,7 +314,7 @@ def test_camera_far_off_the_plane_is_left_out_by_name(tmp_path: Path) -> None:
     shots = _shots(3, turn=0, zoom=0, bend=0, ahead=0)
     shots[2] = replace(shots[2], centre=shots[2].centre + np.array([0, 0, 0.15]))
     model = read_model(_write(tmp_path / "rig", shots))
-    notes = rectification_of(model, inverse_depths=(0.7, 1.4)).notes
+    notes = Rectification(model, inverse_depths=(0.7, 1.4)).notes
     assert any("02.png" in note and "left out" in note for note in notes)
 
 
@@ -412,7 +412,7 @@ def test_a_lens_is_that_of_the_picture_at_hand_whoever_tells_it(tmp_path: Path, 
     assert {(shot.lens.width, shot.lens.height, shot.lens.focal, shot.lens.principal) for shot in half.shots} == {
         (64, 48, (50.0, 55.0), (30.0, 20.0))
     }
-    assert "128x96 pixels scaled to pictures of 64x48" in rectification_of(half).notes[0]
+    assert "128x96 pixels scaled to pictures of 64x48" in Rectification(half).notes[0]
     assert read_model(_told_at(tmp_path / "same", kind, (128, 96))).notes == ()
     # neither scaled nor turned, but a part
     cut = _told_at(tmp_path / "cut", kind, (64, 64))

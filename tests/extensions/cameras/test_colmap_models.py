@@ -13,7 +13,7 @@ import pytest
 from sepi.camera.rig import FISHEYE, PINHOLE, Lens
 from sepi.errors import SepiError
 from sepi.extensions.cameras.reader import read_model
-from sepi.extensions.cameras.rectification import rectification_of
+from sepi.extensions.cameras.rectification import Rectification
 
 pycolmap = pytest.importorskip("pycolmap")
 
@@ -92,7 +92,7 @@ def test_models_say_the_same_however_they_are_written(tmp_path: Path, kind: str,
         assert (shot.lens.kind, shot.lens.focal, shot.lens.principal) == (lens, (80.0, 80.0), (32.5, 30.5))
         assert shot.lens.distortion == distortion
     assert len(found.points) == 64
-    known = rectification_of(found).inverse_depths
+    known = Rectification(found).seeing.inverse_depths
     np.testing.assert_allclose(known, (1 / 2.2, 1 / 1.8), rtol=0.05)
 
 
@@ -134,7 +134,7 @@ def _of_unknown_lenses(folder: Path) -> None:
 def test_bad_models_are_refused_in_one_line(tmp_path: Path, spoil: Callable[[Path], None], expected: str) -> None:
     spoil(tmp_path)
     with pytest.raises(SepiError, match=expected) as caught:
-        rectification_of(read_model(tmp_path))
+        Rectification(read_model(tmp_path))
     assert "\n" not in str(caught.value)
     assert str(tmp_path) in str(caught.value)
 

@@ -12,7 +12,7 @@ from plyfile import PlyData
 
 from sepi.camera import Camera
 from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
-from sepi.extensions.cameras.posed_views import PosedViews, posed_views
+from sepi.extensions.cameras.posed_views import PosedViews
 from sepi.lightfield import LightField
 from sepi.scenes import render
 
@@ -31,7 +31,7 @@ def scene_of(geometry: str = "grid", **known: Any) -> LightField:
 
 
 def posed_of(scene: LightField, **options: Any) -> PosedViews:
-    return posed_views(scene, np.asarray(scene.ground_truth), **{"max_points": 300, **options})
+    return PosedViews(scene, np.asarray(scene.ground_truth), **{"max_points": 300, **options})
 
 
 def lines_of(path: Path) -> list[list[str]]:
@@ -82,7 +82,7 @@ def test_tracks_leave_out_views_in_which_a_point_is_hidden(tmp_path: Path) -> No
     disparity = np.zeros((8, 12), np.float32)
     disparity[2:6, 5:8] = 2
     views = np.random.default_rng(0).integers(0, 256, (1, 3, 8, 12, 3), np.uint8)
-    posed = posed_views(LightField(views=views, name="square", camera=CAMERA), disparity)
+    posed = PosedViews(LightField(views=views, name="square", camera=CAMERA), disparity)
     write_colmap(tmp_path / "model", posed)
     tracks = [line[8::2] for line in lines_of(tmp_path / "model/sparse/points3D.txt")]
     there = {tuple(place): track for place, track in zip(np.argwhere(posed.chosen).tolist(), tracks, strict=True)}

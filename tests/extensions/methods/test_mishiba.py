@@ -10,6 +10,7 @@ import pytest
 from sepi.extensions.methods.mishiba import (
     MishibaParameters,
     details,
+    pair_costs,
 )
 from sepi.kernels import mishiba as kernels
 from sepi.kernels import sheared_views
@@ -36,8 +37,7 @@ def test_counting_equals_the_sum_over_all_pairs_of_views(step: int) -> None:
     scene = render("pencils", size=64, views=3)
     disparities = np.array([-0.7, 0.0, 0.43], np.float32)
     offsets = -disparities[:, None, None].astype(float) * scene.baselines[scene.present]
-    found = np.empty((3, -(-64 // step), -(-64 // step)), np.float32)
-    kernels.pair_costs(details(scene, scene.present, 1.0), offsets, step, found)
+    found = pair_costs(details(scene, scene.present, 1.0), offsets, step)
     for disparity, costs in zip(disparities.tolist(), found, strict=True):
         of_view = bits(scene, scene.present, disparity)
         pairs = np.mean([a != b for a, b in combinations(of_view, 2)], axis=0) * (9 * 8 / 2) / (4 * 5)
@@ -55,8 +55,7 @@ def test_views_that_end_before_a_pixel_take_no_part() -> None:
     generator = np.random.default_rng(0)
     maps = generator.normal(size=(3, 8, 12)).astype(np.float32)
     offsets = np.array([[[0, 0], [0, 3], [-2, 0]]], float)
-    found = np.empty((1, 8, 12), np.float32)
-    kernels.pair_costs(maps, offsets, 1, found)
+    found = pair_costs(maps, offsets, 1)
     for y, x in np.ndindex(8, 12):
         seen = [maps[0, y, x] > 0]
         seen += [maps[1, y, x + 3] > 0] if x + 3 < 12 else []

@@ -78,7 +78,7 @@ def test_the_direction_with_the_texture_decides() -> None:
         disparities = parameters.candidates(light_field)
         along, down = (
             peak_weight(
-                side_distances(light_field, views, disparities, parameters, down=down, progress=no_progress),
+                side_distances(light_field, views, down, disparities, parameters, no_progress),
                 parameters.peak,
             )[beside]
             for views, down in views_of_directions(light_field)

@@ -1,5 +1,7 @@
 """Single pixels under the glass: the curves are the sweep's, SEPIs show straight lines where the depth is right."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
@@ -8,7 +10,7 @@ from bench.noisy import with_noise
 from sepi.errors import SepiError
 from sepi.extensions.page.curves import cost_curves
 from sepi.extensions.page.pixels import APART, BORDER, InterestingPixel, interesting_pixels
-from sepi.extensions.page.probe import GREY, HALF_WIDTH, probe, sepi_picture, to_json
+from sepi.extensions.page.probe import GREY, HALF_WIDTH, Probe, SepiPicture, to_json
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.view_subsets import halves_and_quarters
@@ -97,7 +99,7 @@ def raggedness(picture):
 def test_the_right_candidate_gives_upright_stripes(view, geometry):
     """The point of the picture: the reader sees at a glance which candidate is right."""
     light_field = plane(1.25, view=view, **standing(geometry, (5, 5)))
-    right, near, wrong = (sepi_picture(light_field, 30, 30, d) for d in (1.25, 1.0, -0.75))
+    right, near, wrong = (SepiPicture(light_field, 30, 30, d) for d in (1.25, 1.0, -0.75))
     assert raggedness(right) < 1.5
     assert raggedness(near) > 4 * raggedness(right)
     assert raggedness(wrong) > raggedness(near)
@@ -109,7 +111,7 @@ def test_grey_where_nothing_is_seen():
     present = np.ones((5, 5), bool)
     present[4, 0] = False
     light_field = plane(0.0, present=present)
-    picture = sepi_picture(light_field, 1, 2, 1.0)
+    picture = SepiPicture(light_field, 1, 2, 1.0)
     near = slice(HALF_WIDTH - 6, HALF_WIDTH + 7)
     rows = picture.pixels.reshape(5, 5, -1, 3)[:, :, near]
     inside = picture.inside.reshape(5, 5, -1)[:, :, near]
@@ -118,9 +120,9 @@ def test_grey_where_nothing_is_seen():
     assert not inside[2, 2, :4].any()
     assert inside[2, 2, 4:].all()
     assert np.all(rows[~inside] == GREY)
-    assert not sepi_picture(light_field, 30, 30, 0.0).inside[20].any()
+    assert not SepiPicture(light_field, 30, 30, 0.0).inside[20].any()
     with pytest.raises(SepiError, match="finite"):
-        sepi_picture(light_field, 1, 2, float("nan"))
+        SepiPicture(light_field, 1, 2, float("nan"))
 
 
 def made_maps(light_field, **extra):
@@ -141,7 +143,7 @@ def test_probe_tells_what_the_maps_say():
     best = StageMaps(np.full((60, 60), 0.625, np.float32), maps.confidence, bars)
     parameters = SweepParameters(num_disparities=41)
     pixel = InterestingPixel(20, 30, "here")
-    found = probe(light_field, pixel, maps, parameters, best)
+    found = Probe(light_field, pixel, maps, parameters, best)
     assert found.pixel == pixel
     assert (found.chosen, found.best, found.ground_truth, found.confidence) == (0.5, 0.625, 0.5, 0.75)
     assert (found.interval, to_json(found)["interval"]) == ((0.25, 1.0), [0.25, 1.0])
@@ -154,7 +156,7 @@ def test_probe_tells_what_the_maps_say():
     # every view sees the plane's point, so the patch has the pixel's colour
     colour = 255 * float(light_field.reference_view[20, 30, 0])
     np.testing.assert_allclose(found.pictures["chosen"].pixels[:, HALF_WIDTH], colour, atol=2)
-    other = probe(light_field, InterestingPixel(21, 30, ""), maps, parameters, None)
+    other = Probe(light_field, InterestingPixel(21, 30, ""), maps, parameters, None)
     assert (other.ground_truth, other.best, other.kept_subset, other.occluded) == (None, None, "full", False)
     assert other.kept.all()
     assert "ground_truth" not in other.pictures
@@ -163,8 +165,8 @@ def test_probe_tells_what_the_maps_say():
 def test_interesting_pixels_show_each_kind(occluder):
     """Pixels on top of each other, or none of a kind that the scene has, would leave the reader without an example."""
     light_field, maps = occluder
-    pixels = interesting_pixels(light_field, maps, light_field.ground_truth)
-    assert pixels == interesting_pixels(light_field, maps, light_field.ground_truth)
+    pixels = interesting_pixels(light_field, maps)
+    assert pixels == interesting_pixels(light_field, maps)
     labels = [pixel.label for pixel in pixels]
     assert labels[0] == "textured and sure"
     assert "largest error" in labels
@@ -174,7 +176,7 @@ def test_interesting_pixels_show_each_kind(occluder):
     for y, x, label in pixels:
         if label.startswith("occluded"):
             assert side_names[maps.extra["view_subset"][y, x]] in label
-    without = [pixel.label for pixel in interesting_pixels(light_field, maps, None)]
+    without = [pixel.label for pixel in interesting_pixels(replace(light_field, ground_truth=None), maps)]
     assert "largest error" not in without
 
 
@@ -188,11 +190,11 @@ def check_places(pixels, shape):
 
 def test_the_largest_error_is_found():
     """Truth is of use for this only: the pixel must lie in the wrong patch, whatever else is unknown."""
-    light_field = plane(0.5)
     ground_truth = np.full((60, 60), 0.5, np.float32)
     ground_truth[30:40, 42:50] = -1
     ground_truth[10:20] = np.nan
-    pixels = interesting_pixels(light_field, made_maps(light_field), ground_truth)
+    light_field = plane(0.5, ground_truth=ground_truth)
+    pixels = interesting_pixels(light_field, made_maps(light_field))
     (wrong,) = [pixel for pixel in pixels if pixel.label == "largest error"]
     assert 30 <= wrong.y < 40
     assert 42 <= wrong.x < 50
@@ -207,7 +209,7 @@ def test_an_occluded_pixel_is_one_beside_its_occluder():
     # the left half is kept on both sides of the bar; only those left of it are hidden from the right
     side[:, 22:28] = side[:, 34:40] = 1
     maps = StageMaps(disparity, np.ones((60, 60), np.float32), {"view_subset": side, "occluded": side > 0})
-    (found,) = [pixel for pixel in interesting_pixels(light_field, maps, None) if "occluded" in pixel.label]
+    (found,) = [pixel for pixel in interesting_pixels(light_field, maps) if "occluded" in pixel.label]
     assert found.label == "occluded, left half kept"
     assert 22 <= found.x < 28
 

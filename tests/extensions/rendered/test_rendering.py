@@ -21,7 +21,7 @@ from sepi.extensions.rendered.rendering import render_world
 from sepi.extensions.rendered.sampling import pictured, planned
 from sepi.extensions.rendered.surfaces import FirstSurface, raster_of
 from sepi.extensions.rendered.tracing import Tracer
-from sepi.extensions.rendered.world import Light, Material, Sun, Thing, World, rig_of
+from sepi.extensions.rendered.world import Light, Material, Rig, Sun, Thing, World
 from sepi.extensions.rendered.worlds import RENDERED, world_of
 from sepi.scenes.folder import write_hci
 from sepi.workflow.rendered_scenes import NOISE_LEVELS
@@ -55,7 +55,7 @@ def carried(values: np.ndarray, render: Render, view: tuple[int, int]) -> np.nda
 
 
 def test_planes_have_the_disparity_of_their_formula(plain: Render) -> None:
-    rig = rig_of(room(), 96, (3, 3))
+    rig = Rig(room(), 96, (3, 3))
     expected = rig.disparity(depth_of_room(96, rig.focal_px))
     # but for the row in which they meet
     assert (
@@ -92,7 +92,7 @@ def test_points_have_one_colour_in_all_views(tmp_path: Path) -> None:
 def test_the_folder_is_as_the_benchmark_lays_it_out(plain: Render, tmp_path: Path) -> None:
     write_hci(exposed(plain, Exposure()), tmp_path / "room", plain.settings)
     light_field = sepi.read_light_field(tmp_path / "room")
-    rig = rig_of(room(), 96, (3, 3))
+    rig = Rig(room(), 96, (3, 3))
     depth = light_field.camera.depth(light_field.ground_truth)
     assert np.allclose(depth[:40], 3.0, rtol=1e-4)
     assert np.allclose(depth[90:], depth_of_room(96, rig.focal_px)[90:], rtol=1e-4)
@@ -111,7 +111,7 @@ def test_no_number_of_threads_changes_a_picture() -> None:
     import drjit
 
     world = room()
-    tracer = Tracer(world, rig_of(world, 48, (1, 1)))
+    tracer = Tracer(world, Rig(world, 48, (1, 1)))
     at = tracer.position(0, 0)
     found = []
     for threads in (1, 16):
@@ -125,21 +125,21 @@ def test_paths_are_traced_where_views_differ() -> None:
     """A matte room takes few, a mirror all; a bar too thin for the rays through middles is not painted over."""
     world = room(ball(0.3, Material(kind="mirror")), bar(depth=1.5, width=0.01))
     size, samples = 64, 64
-    rig = rig_of(world, size, (9, 9))
+    rig = Rig(world, size, (9, 9))
     tracer = Tracer(world, rig)
     at = tracer.position(0, 0)
     seen = tracer.surfaces.first(at)
-    plan = planned(tracer, at, seen, samples, 0)
+    passes, _, whole = planned(tracer, at, seen, samples, 0)
     taken = np.zeros((size, size), int)
-    for pixels, before, paths, _ in plan.passes:
+    for pixels, before, paths, _ in passes:
         where = pixels[..., 0], pixels[..., 1]
         assert (taken[where] <= samples + before).all()
         taken[where] = before + paths
-    shown, mirror = pictured(plan), seen.thing == 2
+    shown, mirror = pictured(passes, size), seen.thing == 2
     # a tile of another kind may hold some of the mirror's border
     inside = ndimage.minimum_filter(mirror, 3)
     assert set(np.unique(taken[inside])) == {samples}
-    assert set(np.unique(taken[~plan.whole])) <= {12, samples}
+    assert set(np.unique(taken[~whole])) <= {12, samples}
     assert (taken == 3).mean() > 0.5
     assert taken.mean() < samples / 4
     # tiles lie where they belong
@@ -147,10 +147,10 @@ def test_paths_are_traced_where_views_differ() -> None:
     assert np.corrcoef(shown[mirror].ravel(), many[mirror].ravel())[0, 1] > 0.9
     assert abs(shown.mean() / many.mean() - 1) < 0.03
     # the bar is a quarter of a pixel wide and stands between the middle columns
-    assert not plan.whole[:20, 31:33].any()
+    assert not whole[:20, 31:33].any()
     # the wall is whole up to what stands before it, but for the pixels that show both
     beside = ndimage.maximum_filter(mirror, 3) & ~mirror
-    assert plan.whole[beside].any()
+    assert whole[beside].any()
 
 
 def test_masks_say_what_a_pixel_shows(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_masks_say_what_a_pixel_shows(tmp_path: Path) -> None:
     render = rendered(tmp_path, world, size=96, samples=1)
     masks = masks_in(render.masks[render.centre])
     assert list(masks) == list(MASKS)
-    rig = rig_of(world, 96, (3, 3))
+    rig = Rig(world, 96, (3, 3))
     d_bar, d_wall = rig.disparity(np.array([1.5, 3.0]))
     # the row lies above the balls: a bar of 0.06 m, and the wall
     half = rig.focal_px * 0.03 / 1.5
@@ -255,7 +255,7 @@ def test_lights_and_surfaces_do_what_they_say() -> None:
     """A lamp shines to the stated side, a sun where it is not shaded, a mirror shows what is before it."""
 
     def mean(world: World) -> np.ndarray:
-        tracer = Tracer(world, rig_of(world, 32, (1, 1)))
+        tracer = Tracer(world, Rig(world, 32, (1, 1)))
         return tracer.picture(tracer.position(0, 0), 0, 16)
 
     lamp = lamp_above()
@@ -336,7 +336,7 @@ def regular_waves(world: World, seen: FirstSurface) -> Iterator[float]:
 def test_every_ray_of_a_scene_meets_something(name: str) -> None:
     """At the corners of a 9x9 grid, too; disparities stay in what the scene says, and regular texture below moire."""
     world = world_of(name)
-    rig = rig_of(world, 128, (9, 9))
+    rig = Rig(world, 128, (9, 9))
     tracer = Tracer(world, rig)
     near, far = world.cameras.at_near, world.cameras.at_far
     slack = 0.1 * (near - far)

@@ -10,7 +10,7 @@ from sepi.extensions.rendered.render_file import masks_in, read_render
 from sepi.extensions.rendered.rendering import render_world
 from sepi.extensions.rendered.sampling import alike_light
 from sepi.extensions.rendered.tracing import Tracer
-from sepi.extensions.rendered.world import Material, rig_of
+from sepi.extensions.rendered.world import Material, Rig
 from sepi.kernels import reprojection as kernels
 
 SIZE, VIEWS = 48, 5
@@ -92,7 +92,7 @@ def test_noise_falls_and_the_picture_stays(tmp_path: object) -> None:
     path = tmp_path / "room.h5"  # type: ignore[operator]
     render_world("room", world, taking(size=SIZE, views=VIEWS, samples=16), path)
     render = read_render(path)
-    rig = rig_of(world, SIZE, (VIEWS, VIEWS))
+    rig = Rig(world, SIZE, (VIEWS, VIEWS))
     tracer = Tracer(world, rig)
     at = tracer.position(0, 0)
     truth, raw = tracer.picture(at, 1, 256), tracer.picture(at, 12, 16)

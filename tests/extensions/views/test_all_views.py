@@ -16,7 +16,7 @@ from several_threads import SEVERAL
 import sepi
 from bench.all_views import disagreement, moved_pixels
 from sepi.camera import Camera
-from sepi.extensions.views.all_views import AllViews, ViewMaps, estimate_all_views
+from sepi.extensions.views.all_views import AllViews, estimate_all_views
 from sepi.io.all_views import write_all_views
 from sepi.io.disparity_maps import read_pfm, write_pfm
 from sepi.io.hdf5 import read_attributes, write_light_field
@@ -323,12 +323,12 @@ def exact(here: Path) -> FloatMap:
     for name, light_field in (("maps", scene), ("corner", scene.seen_from((2, 0)))):
         maps = barred(truth[light_field.reference_position])
         write_result(name, light_field, maps.updated(maps.disparity, sure, unknown=nothing & (name == "corner")))
-    views = [
-        ViewMaps((t, s), truth[t, s], sure, nothing, **barred(truth[t, s]).extra)
+    maps_of = {
+        (t, s): {"disparity": truth[t, s], "confidence": sure, "extended": nothing, **barred(truth[t, s]).extra}
         for t, s in np.argwhere(scene.present).tolist()
-    ]
+    }
     attributes = result_attributes(scene, StageMaps(truth[1, 1], sure))
-    write_all_views(Path("maps/all_views.h5"), scene, ((view.position, view.maps) for view in views), attributes)
+    write_all_views(Path("maps/all_views.h5"), scene, maps_of.items(), attributes)
     return truth
 
 

@@ -4,17 +4,6 @@
 namespace sepi::mishiba {
 namespace {
 
-// Row y of a view, interpolated, into row (W + 2 margin), with its ends repeated.
-void interpolate_row(Array<const float, 2> view, Index y, double offset, Index margin, float *__restrict row) {
-    const Index H = view.shape[0], W = view.shape[1], down = Index(std::floor(offset));
-    const auto w = cubic_weights(offset - double(down));
-    const auto below = [&](Index n) { return view.at(clamped(y + down + n, H)); };
-    const float *a = below(-1), *b = below(0), *c = below(1), *d = below(2);
-    for (Index x = 0; x < W; ++x) row[margin + x] = w[0] * a[x] + w[1] * b[x] + w[2] * c[x] + w[3] * d[x];
-    std::fill_n(row, margin, row[margin]);
-    std::fill_n(row + margin + W, margin, row[margin + W - 1]);
-}
-
 // Weighted median of the values, by bisection.
 std::int32_t weighted_median(const std::int32_t *values, const std::int32_t *weights, Index count) {
     std::int32_t low = values[0], high = values[0], total = 0;
@@ -30,47 +19,6 @@ std::int32_t weighted_median(const std::int32_t *values, const std::int32_t *wei
         (enough ? high : low) = enough ? middle : middle + 1;
     }
     return low;
-}
-
-// Number of pairs of views whose bits differ, at every step-th row and column, relative to the largest possible number;
-// 1 without a pair. Views in which a pixel lies outside take no part.
-// details (N, H, W), whose signs are the bits; offsets (K, N, 2), down and across from a reference pixel to its sample,
-// for each candidate, in pixels; out (K, ceil(H / step), ceil(W / step)).
-void pair_costs(Array<const float, 3> details, Array<const double, 3> offsets, Index step, Array<float, 3> out) {
-    const Index N = details.shape[0], H = details.shape[1], W = details.shape[2], K = offsets.shape[0], columns = out.shape[2];
-    double farthest = 0;
-    for (Index k = 0; k < K; ++k)
-        for (Index n = 0; n < N; ++n) farthest = std::max({farthest, std::abs(offsets(k, n, 0)), std::abs(offsets(k, n, 1))});
-    const Index margin = Index(std::ceil(farthest)) + 3;
-    // table by the number of views that see a pixel, and of ones among them
-    const auto shares = Scratch<float, 2>(N + 1, N + 1).filled(1.0f);
-    for (Index seen = 2; seen <= N; ++seen)
-        for (Index ones = 0; ones <= seen; ++ones) shares.array()(seen, ones) = float(double(ones * (seen - ones)) / double((seen / 2) * (seen - seen / 2)));
-    parallel_for(0, out.shape[1], [&](Index i) {
-        const Index y = i * step;
-        const Scratch<float, 1> rows(W + 2 * margin);
-        const Scratch<std::int32_t, 2> counts(2, columns);
-        float *row = rows.array().data;
-        std::int32_t *__restrict ones = counts.array().at(0), *__restrict seen = counts.array().at(1);
-        for (Index k = 0; k < K; ++k) {
-            std::fill_n(ones, 2 * columns, 0);
-            for (Index n = 0; n < N; ++n) {
-                const double down = offsets(k, n, 0), across = offsets(k, n, 1), left = std::floor(across);
-                if (!(0 <= double(y) + down && double(y) + down <= double(H - 1))) continue;
-                interpolate_row(details[n], y, down, margin, row);
-                const auto w = cubic_weights(across - left);
-                const Index low = std::max<Index>(0, Index(std::ceil(-across / double(step))));
-                const Index high = std::min(columns, Index(std::floor((double(W - 1) - across) / double(step))) + 1);
-                const float *sample = row + margin + Index(left) - 1;
-                for (Index j = low; j < high; ++j) {
-                    const float *at = sample + j * step;
-                    ones[j] += w[0] * at[0] + w[1] * at[1] + w[2] * at[2] + w[3] * at[3] > 0;
-                    ++seen[j];
-                }
-            }
-            for (Index j = 0; j < columns; ++j) out(k, i, j) = shares.array()(seen[j], ones[j]);
-        }
-    });
 }
 
 // Interpolate the costs of candidate k to all pixels, and update each pixel's least cost. Candidates come in rising
@@ -132,7 +80,6 @@ void median_pass(Array<const std::int32_t, 2> current, Array<const std::int32_t,
 }
 
 const Submodule submodule("mishiba", [](Kernels &m) {
-    m.def("pair_costs", &pair_costs);
     m.def("keep_least", &keep_least);
     m.def("median_pass", &median_pass);
 });

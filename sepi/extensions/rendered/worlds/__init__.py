@@ -1,7 +1,5 @@
 """Catalogue of the path-traced scenes: their difficulty, and whether parameters may be chosen on them."""
 
-from __future__ import annotations
-
 import importlib
 from typing import NamedTuple
 
