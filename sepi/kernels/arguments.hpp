@@ -5,6 +5,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/variant.h>
 
+#include <functional>
 #include <vector>
 
 #include "array.hpp"
@@ -74,9 +75,28 @@ struct Kernels : nanobind::module_ {
     }
 };
 
+// What a submodule has by a name: a constant, or a kernel, which may be several for different types of arrays.
+struct Entry {
+    template <class... Things>
+    Entry(const char *name, Things... things) : add([=](Kernels &m) { (add_one(m, name, things), ...); }) {}
+
+    std::function<void(Kernels &)> add;
+
+  private:
+    static void add_one(Kernels &m, const char *name, auto constant) { m.attr(name) = constant; }
+
+    template <class Result, class... Arguments>
+    static void add_one(Kernels &m, const char *name, Result (*kernel)(Arguments...)) {
+        m.def(name, kernel);
+    }
+};
+
 // Submodule of a source of kernels in Python. Each source has one, filled when the extension module is loaded.
 struct Submodule {
-    Submodule(const char *name, void (*fill)(Kernels &)) : name(name), fill(fill) { all().push_back(*this); }
+    Submodule(const char *name, std::function<void(Kernels &)> fill) : name(name), fill(fill) { all().push_back(*this); }
+
+    Submodule(const char *name, std::initializer_list<Entry> entries)
+        : Submodule(name, [entries = std::vector(entries)](Kernels &m) { for (const Entry &entry : entries) entry.add(m); }) {}
 
     static std::vector<Submodule> &all() {
         static std::vector<Submodule> submodules;
@@ -84,7 +104,7 @@ struct Submodule {
     }
 
     const char *name;
-    void (*fill)(Kernels &);
+    std::function<void(Kernels &)> fill;
 };
 
 }  // namespace sepi

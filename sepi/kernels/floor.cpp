@@ -41,10 +41,7 @@ void windows(Index passes, Array<const float, 3> data, Array<float, 2> out) {
     });
 }
 
-const Submodule submodule("floor", [](Kernels &m) {
-    m.def("samples", &samples);
-    m.def("windows", &windows);
-});
+const Submodule submodule("floor", {{"samples", &samples}, {"windows", &windows}});
 
 }  // namespace
 }  // namespace sepi::floor

@@ -67,9 +67,7 @@ void mixture_evidence(Array<const float, 2> disparity, const Surroundings &aroun
     });
 }
 
-const Submodule submodule("colour_mixture", [](Kernels &m) {
-    m.def("mixture_evidence", &mixture_evidence);
-});
+const Submodule submodule("colour_mixture", {{"mixture_evidence", &mixture_evidence}});
 
 }  // namespace
 }  // namespace sepi::colour_mixture

@@ -38,9 +38,7 @@ void specks_of(Array<const float, 2> disparity, float difference, Index most_pix
     }
 }
 
-const Submodule submodule("specks", [](Kernels &m) {
-    m.def("specks_of", &specks_of);
-});
+const Submodule submodule("specks", {{"specks_of", &specks_of}});
 
 }  // namespace
 }  // namespace sepi::specks

@@ -112,11 +112,7 @@ void describe(const ErrorMixture &mixture, double tail, double close, Array<floa
     });
 }
 
-const Submodule submodule("mixture", [](Kernels &m) {
-    m.attr("RIM_WIDTH") = RIM_WIDTH;
-    m.attr("LEAST_RIM") = LEAST_RIM;
-    m.def("describe", &describe);
-});
+const Submodule submodule("mixture", {{"RIM_WIDTH", RIM_WIDTH}, {"LEAST_RIM", LEAST_RIM}, {"describe", &describe}});
 
 }  // namespace
 }  // namespace sepi::mixture

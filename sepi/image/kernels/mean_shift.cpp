@@ -94,10 +94,7 @@ void sample_modes(Array<const double, 2> samples, double bandwidth, Array<double
     });
 }
 
-const Submodule submodule("mean_shift", [](Kernels &m) {
-    m.def("patch_modes", &patch_modes);
-    m.def("sample_modes", &sample_modes);
-});
+const Submodule submodule("mean_shift", {{"patch_modes", &patch_modes}, {"sample_modes", &sample_modes}});
 
 }  // namespace
 }  // namespace sepi::mean_shift

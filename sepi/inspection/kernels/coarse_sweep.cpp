@@ -112,9 +112,7 @@ void coarse_sweep(Array<const float, 2> reference, Array<const float, 3> views, 
     });
 }
 
-const Submodule submodule("coarse_sweep", [](Kernels &m) {
-    m.def("coarse_sweep", &coarse_sweep);
-});
+const Submodule submodule("coarse_sweep", {{"coarse_sweep", &coarse_sweep}});
 
 }  // namespace
 }  // namespace sepi::coarse_sweep

@@ -92,10 +92,7 @@ void residuals(Array<const float, 2> reference, Array<const float, 2> view, Arra
     });
 }
 
-const Submodule submodule("view_order", [](Kernels &m) {
-    m.def("layout_costs", &layout_costs);
-    m.def("residuals", &residuals);
-});
+const Submodule submodule("view_order", {{"layout_costs", &layout_costs}, {"residuals", &residuals}});
 
 }  // namespace
 }  // namespace sepi::view_order

@@ -125,9 +125,7 @@ void detail_of_views(const Views &views, float unit, Array<const bool, 2> presen
     });
 }
 
-const Submodule submodule("base_detail", [](Kernels &m) {
-    m.def("detail_of_views", &detail_of_views);
-});
+const Submodule submodule("base_detail", {{"detail_of_views", &detail_of_views}});
 
 }  // namespace
 }  // namespace sepi::base_detail

@@ -34,11 +34,11 @@ void corner_disparities(Array<const float, 2> disparity, Array<float, 3> out) {
     });
 }
 
-const Submodule submodule("carried_map", [](Kernels &m) {
-    m.attr("EMPTY") = EMPTY;
-    m.attr("TOLERANCE") = TOLERANCE;
-    m.def("corner_disparities", &corner_disparities);
-    m.def("carry", &carry);
+const Submodule submodule("carried_map", {
+    {"EMPTY", EMPTY},
+    {"TOLERANCE", TOLERANCE},
+    {"corner_disparities", &corner_disparities},
+    {"carry", &carry},
 });
 
 }  // namespace

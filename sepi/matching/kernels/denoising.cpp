@@ -119,9 +119,7 @@ void denoise_views(const Views &views, Array<const bool, 2> present, float full,
     });
 }
 
-const Submodule submodule("denoising", [](Kernels &m) {
-    m.def("denoise_views", &denoise_views);
-});
+const Submodule submodule("denoising", {{"denoise_views", &denoise_views}});
 
 }  // namespace
 }  // namespace sepi::denoising

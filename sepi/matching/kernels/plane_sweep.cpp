@@ -344,10 +344,7 @@ void sweep_plane_rows(const ViewStack &views, const Candidates &candidates, cons
     });
 }
 
-const Submodule submodule("plane_sweep", [](Kernels &m) {
-    m.def("sweep_plane_rows", &sweep_plane_rows);
-    m.attr("BLOCK") = BLOCK;
-});
+const Submodule submodule("plane_sweep", {{"sweep_plane_rows", &sweep_plane_rows}, {"BLOCK", BLOCK}});
 
 }  // namespace
 }  // namespace sepi::plane_sweep

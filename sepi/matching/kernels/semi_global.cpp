@@ -208,13 +208,13 @@ void choose(Array<const std::uint16_t, 1> smoothed, Array<const std::uint16_t, 1
     });
 }
 
-const Submodule submodule("semi_global", [](Kernels &m) {
-    m.attr("AT_ONCE") = AT_ONCE;
-    m.attr("ONE") = ONE;
-    m.attr("PATHS_AT_ONCE") = PATHS_AT_ONCE;
-    m.def("aggregate", &aggregate);
-    m.def("semi_global", &semi_global);
-    m.def("choose", &choose);
+const Submodule submodule("semi_global", {
+    {"AT_ONCE", AT_ONCE},
+    {"ONE", ONE},
+    {"PATHS_AT_ONCE", PATHS_AT_ONCE},
+    {"aggregate", &aggregate},
+    {"semi_global", &semi_global},
+    {"choose", &choose},
 });
 
 }  // namespace

@@ -41,9 +41,7 @@ void shear(Array<const float, 4> views, Strided<const double, 2> offsets, bool c
     });
 }
 
-const Submodule submodule("sheared_views", [](Kernels &m) {
-    m.def("shear", &shear);
-});
+const Submodule submodule("sheared_views", {{"shear", &shear}});
 
 }  // namespace
 }  // namespace sepi::sheared_views

@@ -85,11 +85,11 @@ void view_splines(const Views &views, float colour_unit, Array<const std::int16_
     });
 }
 
-const Submodule submodule("splines", [](Kernels &m) {
-    m.attr("MARGIN") = SPLINE_MARGIN;
-    m.attr("REACH") = SPLINE_REACH;
-    m.def("spline_coefficients", &spline_coefficients);
-    m.def("view_splines", &view_splines);
+const Submodule submodule("splines", {
+    {"MARGIN", SPLINE_MARGIN},
+    {"REACH", SPLINE_REACH},
+    {"spline_coefficients", &spline_coefficients},
+    {"view_splines", &view_splines},
 });
 
 }  // namespace

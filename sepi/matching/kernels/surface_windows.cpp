@@ -52,9 +52,7 @@ void sums_of_surface(Array<const float, 2> gradient, Array<const float, 2> curva
     });
 }
 
-const Submodule submodule("surface_windows", [](Kernels &m) {
-    m.def("sums_of_surface", &sums_of_surface);
-});
+const Submodule submodule("surface_windows", {{"sums_of_surface", &sums_of_surface}});
 
 }  // namespace
 }  // namespace sepi::surface_windows

@@ -50,10 +50,7 @@ void least_differences(const Views &views, Index t0, Index s0, Array<const std::
     });
 }
 
-const Submodule submodule("view_noise", [](Kernels &m) {
-    m.def("least_differences", &least_differences);
-    m.attr("BLOCK") = BLOCK;
-});
+const Submodule submodule("view_noise", {{"least_differences", &least_differences}, {"BLOCK", BLOCK}});
 
 }  // namespace
 }  // namespace sepi::view_noise

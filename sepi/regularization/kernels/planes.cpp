@@ -46,10 +46,10 @@ void support_of(Array<const double, 2> positions, Array<const double, 1> values,
     });
 }
 
-const Submodule submodule("planes", [](Kernels &m) {
-    m.def("support_of", &support_of);
-    m.def("add_normal_equations", &add_normal_equations);
-    m.def("values_of_planes", &values_of_planes);
+const Submodule submodule("planes", {
+    {"support_of", &support_of},
+    {"add_normal_equations", &add_normal_equations},
+    {"values_of_planes", &values_of_planes},
 });
 
 }  // namespace

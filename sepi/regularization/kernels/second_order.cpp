@@ -210,24 +210,17 @@ void diagonal_of_hats(Array<const Number, 3> stencil, Index spacing, Array<Numbe
     });
 }
 
-// The kernels of the second-order smoothing that work in single or double precision.
-template <class Number>
-void bind_of_numbers(Kernels &m) {
-    m.def("bend", &bend<Number>);
-    m.def("step", &step<Number>);
-    m.def("diagonal_of_hats", &diagonal_of_hats<Number>);
-    m.def("onto_finest", &onto_finest<Number>);
-    m.def("onto_coarser", &onto_coarser<Number>);
-    m.def("onto_finer", &onto_finer<Number>);
-    m.def("diagonal_and_finest", &diagonal_and_finest<Number>);
-}
-
-const Submodule submodule("second_order", [](Kernels &m) {
-    m.attr("MARGIN") = MARGIN;
-    m.attr("SPACING") = SPACING;
-    m.def("weights_of_differences", &weights_of_differences);
-    bind_of_numbers<float>(m);
-    bind_of_numbers<double>(m);
+const Submodule submodule("second_order", {
+    {"MARGIN", MARGIN},
+    {"SPACING", SPACING},
+    {"weights_of_differences", &weights_of_differences},
+    {"bend", &bend<float>, &bend<double>},
+    {"step", &step<float>, &step<double>},
+    {"diagonal_of_hats", &diagonal_of_hats<float>, &diagonal_of_hats<double>},
+    {"onto_finest", &onto_finest<float>, &onto_finest<double>},
+    {"onto_coarser", &onto_coarser<float>, &onto_coarser<double>},
+    {"onto_finer", &onto_finer<float>, &onto_finer<double>},
+    {"diagonal_and_finest", &diagonal_and_finest<float>, &diagonal_and_finest<double>},
 });
 
 }  // namespace

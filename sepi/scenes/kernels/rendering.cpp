@@ -172,12 +172,12 @@ void cast(const Drawing &drawing, Array<const double, 2> boxes, Array<const doub
     });
 }
 
-const Submodule submodule("rendering", [](Kernels &m) {
-    m.attr("BEYOND") = BEYOND;
-    m.def("nearest", &nearest);
-    m.def("shade", &shade);
-    m.def("hide", &hide);
-    m.def("cast", &cast);
+const Submodule submodule("rendering", {
+    {"BEYOND", BEYOND},
+    {"nearest", &nearest},
+    {"shade", &shade},
+    {"hide", &hide},
+    {"cast", &cast},
 });
 
 }  // namespace

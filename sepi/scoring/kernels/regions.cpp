@@ -38,9 +38,7 @@ void occluded(Array<const double, 2> ground_truth, Array<const double, 2> baseli
     });
 }
 
-const Submodule submodule("regions", [](Kernels &m) {
-    m.def("occluded", &occluded);
-});
+const Submodule submodule("regions", {{"occluded", &occluded}});
 
 }  // namespace
 }  // namespace sepi::regions

@@ -80,11 +80,11 @@ void constrained_least_patch(Array<const float, 3> response, Array<const float, 
     });
 }
 
-const Submodule submodule("cae", [](Kernels &m) {
-    m.attr("LEVELS") = LEVELS;
-    m.attr("PATCH") = PATCH;
-    m.def("constrained_entropies", &constrained_entropies);
-    m.def("constrained_least_patch", &constrained_least_patch);
+const Submodule submodule("cae", {
+    {"LEVELS", LEVELS},
+    {"PATCH", PATCH},
+    {"constrained_entropies", &constrained_entropies},
+    {"constrained_least_patch", &constrained_least_patch},
 });
 
 }  // namespace

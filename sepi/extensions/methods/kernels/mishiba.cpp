@@ -131,10 +131,10 @@ void median_pass(Array<const std::int32_t, 2> current, Array<const std::int32_t,
     });
 }
 
-const Submodule submodule("mishiba", [](Kernels &m) {
-    m.def("pair_costs", &pair_costs);
-    m.def("keep_least", &keep_least);
-    m.def("median_pass", &median_pass);
+const Submodule submodule("mishiba", {
+    {"pair_costs", &pair_costs},
+    {"keep_least", &keep_least},
+    {"median_pass", &median_pass},
 });
 
 }  // namespace

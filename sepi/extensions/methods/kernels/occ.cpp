@@ -33,9 +33,7 @@ void moments_of_halves(Array<const float, 4> sheared, Array<const float, 3> refe
     });
 }
 
-const Submodule submodule("occ", [](Kernels &m) {
-    m.def("moments_of_halves", &moments_of_halves);
-});
+const Submodule submodule("occ", {{"moments_of_halves", &moments_of_halves}});
 
 }  // namespace
 }  // namespace sepi::occ

@@ -87,9 +87,7 @@ void half_distances(Array<const float, 4> lines, Array<const float, 1> shares, I
     });
 }
 
-const Submodule submodule("spo", [](Kernels &m) {
-    m.def("half_distances", &half_distances);
-});
+const Submodule submodule("spo", {{"half_distances", &half_distances}});
 
 }  // namespace
 }  // namespace sepi::spo

@@ -25,9 +25,7 @@ void weighted_medians(Array<const float, 2> values, Array<const float, 3> guide,
     });
 }
 
-const Submodule submodule("weighted_median", [](Kernels &m) {
-    m.def("weighted_medians", &weighted_medians);
-});
+const Submodule submodule("weighted_median", {{"weighted_medians", &weighted_medians}});
 
 }  // namespace
 }  // namespace sepi::weighted_median

@@ -71,10 +71,7 @@ void gathered_light(Array<const float, 4> light, Array<const float, 3> dispariti
     });
 }
 
-const Submodule submodule("reprojection", [](Kernels &m) {
-    m.def("seen_elsewhere", &seen_elsewhere);
-    m.def("gathered_light", &gathered_light);
-});
+const Submodule submodule("reprojection", {{"seen_elsewhere", &seen_elsewhere}, {"gathered_light", &gathered_light}});
 
 }  // namespace
 }  // namespace sepi::reprojection

@@ -89,9 +89,7 @@ void first_met(Array<const double, 3> corners, Array<const double, 1> origin, Ar
     });
 }
 
-const Submodule submodule("triangles", [](Kernels &m) {
-    m.def("first_met", &first_met);
-});
+const Submodule submodule("triangles", {{"first_met", &first_met}});
 
 }  // namespace
 }  // namespace sepi::triangles

@@ -145,10 +145,7 @@ void maps_of_views(const Sources &sources, Array<const double, 2> baselines, Arr
     });
 }
 
-const Submodule submodule("all_views", [](Kernels &m) {
-    m.attr("EMPTY") = EMPTY;
-    m.def("maps_of_views", &maps_of_views);
-});
+const Submodule submodule("all_views", {{"EMPTY", EMPTY}, {"maps_of_views", &maps_of_views}});
 
 }  // namespace
 }  // namespace sepi::all_views

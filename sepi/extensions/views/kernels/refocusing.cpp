@@ -96,11 +96,7 @@ void fill_between(Array<const float, 3> sheared, Array<const float, 2> surfaces,
     });
 }
 
-const Submodule submodule("refocusing", [](Kernels &m) {
-    m.attr("WIDEST") = WIDEST;
-    m.def("add_view", &add_view);
-    m.def("fill_between", &fill_between);
-});
+const Submodule submodule("refocusing", {{"WIDEST", WIDEST}, {"add_view", &add_view}, {"fill_between", &fill_between}});
 
 }  // namespace
 }  // namespace sepi::refocusing
