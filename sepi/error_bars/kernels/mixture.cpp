@@ -2,6 +2,7 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::mixture {
+// Clang vectorises the search for the bounds less well if other sources might call it
 namespace {
 
 // Mean absolute error about the other surface's disparity: as a share of its distance, and least, pixels per view step.

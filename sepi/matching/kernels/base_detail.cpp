@@ -5,7 +5,6 @@
 #include "pixels.hpp"
 
 namespace sepi::base_detail {
-namespace {
 
 // Rows of a turn of a thread, for which rows of the windows are converted once.
 constexpr Index ROWS_AT_ONCE = 32;
@@ -127,5 +126,4 @@ void detail_of_views(const Views &views, float unit, Array<const bool, 2> presen
 
 const Submodule submodule("base_detail", {{"detail_of_views", &detail_of_views}});
 
-}  // namespace
 }  // namespace sepi::base_detail

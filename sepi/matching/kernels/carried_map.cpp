@@ -2,7 +2,6 @@
 #include "carried_map.hpp"
 
 namespace sepi::carried_map {
-namespace {
 
 // Disparity at the corners of each pixel of a map (H, W), clockwise from the top left, out (H, W, 4). Pixels that meet
 // in a corner belong to one surface if their disparities there differ by at most the tolerance.
@@ -41,5 +40,4 @@ const Submodule submodule("carried_map", {
     {"carry", &carry},
 });
 
-}  // namespace
 }  // namespace sepi::carried_map

@@ -2,7 +2,6 @@
 #include "pixels.hpp"
 
 namespace sepi::denoising {
-namespace {
 
 // Views that are written to, (T, S, H, W, C).
 using NewViews = std::variant<Array<std::uint8_t, 5>, Array<std::uint16_t, 5>, Array<float, 5>>;
@@ -121,5 +120,4 @@ void denoise_views(const Views &views, Array<const bool, 2> present, float full,
 
 const Submodule submodule("denoising", {{"denoise_views", &denoise_views}});
 
-}  // namespace
 }  // namespace sepi::denoising

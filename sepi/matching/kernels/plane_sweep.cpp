@@ -10,7 +10,6 @@
 #include "sweep_arrays.hpp"
 
 namespace sepi::plane_sweep {
-namespace {
 
 // Columns of a row whose costs are computed and aggregated together.
 constexpr Index BLOCK = 32;
@@ -346,5 +345,4 @@ void sweep_plane_rows(const ViewStack &views, const Candidates &candidates, cons
 
 const Submodule submodule("plane_sweep", {{"sweep_plane_rows", &sweep_plane_rows}, {"BLOCK", BLOCK}});
 
-}  // namespace
 }  // namespace sepi::plane_sweep

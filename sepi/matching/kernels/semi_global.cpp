@@ -3,7 +3,6 @@
 #include "pixels.hpp"
 
 namespace sepi::semi_global {
-namespace {
 
 // Paths from row to row that a thread follows together, with contiguous costs that fit in its cache.
 constexpr Index PATHS_AT_ONCE = 32;
@@ -217,5 +216,4 @@ const Submodule submodule("semi_global", {
     {"choose", &choose},
 });
 
-}  // namespace
 }  // namespace sepi::semi_global

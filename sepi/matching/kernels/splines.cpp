@@ -4,7 +4,6 @@
 #include "pixels.hpp"
 
 namespace sepi::splines {
-namespace {
 
 // Reach of the convolution for the views' coefficients; the rest is a tenth of the rounding to int16.
 constexpr Index SPLINE_REACH = 8;
@@ -92,5 +91,4 @@ const Submodule submodule("splines", {
     {"view_splines", &view_splines},
 });
 
-}  // namespace
 }  // namespace sepi::splines

@@ -3,7 +3,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::planes {
-namespace {
 
 // Weighted least squares of each superpixel's data, in the order of the pixels, added to left (N, 3, 3) and
 // right (N, 3) of zeros; weight and disparity (H W).
@@ -52,5 +51,4 @@ const Submodule submodule("planes", {
     {"values_of_planes", &values_of_planes},
 });
 
-}  // namespace
 }  // namespace sepi::planes

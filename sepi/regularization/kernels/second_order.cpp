@@ -7,7 +7,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::second_order {
-namespace {
 
 constexpr Index MARGIN = 2;   // reach of second differences, pixels
 constexpr Index SPACING = 2;  // distance of nodes of the finest hats, pixels
@@ -223,5 +222,4 @@ const Submodule submodule("second_order", {
     {"diagonal_and_finest", &diagonal_and_finest<float>, &diagonal_and_finest<double>},
 });
 
-}  // namespace
 }  // namespace sepi::second_order

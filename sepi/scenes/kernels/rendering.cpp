@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::rendering {
-namespace {
 
 // Texels after each row of a texture, its periodic continuation for a sample's reach.
 constexpr Index BEYOND = 3;
@@ -180,5 +179,4 @@ const Submodule submodule("rendering", {
     {"cast", &cast},
 });
 
-}  // namespace
 }  // namespace sepi::rendering

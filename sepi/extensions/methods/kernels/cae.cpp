@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::cae {
-namespace {
 
 constexpr Index LEVELS = 256;  // bins of the histograms, over colours in 0..1
 constexpr Index PATCH = 5;     // width of a sub-patch in pixels; the neighbourhood has three by three of them
@@ -87,5 +86,4 @@ const Submodule submodule("cae", {
     {"constrained_least_patch", &constrained_least_patch},
 });
 
-}  // namespace
 }  // namespace sepi::cae

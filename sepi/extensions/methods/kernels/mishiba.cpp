@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::mishiba {
-namespace {
 
 // Row y of a view, interpolated, into row (W + 2 margin), with its ends repeated.
 void interpolate_row(Array<const float, 2> view, Index y, double offset, Index margin, float *__restrict row) {
@@ -137,5 +136,4 @@ const Submodule submodule("mishiba", {
     {"median_pass", &median_pass},
 });
 
-}  // namespace
 }  // namespace sepi::mishiba

@@ -2,7 +2,6 @@
 #include "matching/kernels/carried_map.hpp"
 
 namespace sepi::all_views {
-namespace {
 
 using namespace carried_map;
 
@@ -147,5 +146,4 @@ void maps_of_views(const Sources &sources, Array<const double, 2> baselines, Arr
 
 const Submodule submodule("all_views", {{"EMPTY", EMPTY}, {"maps_of_views", &maps_of_views}});
 
-}  // namespace
 }  // namespace sepi::all_views
