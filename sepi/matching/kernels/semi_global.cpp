@@ -149,9 +149,7 @@ void aggregate(Array<const float, 3> cost, Index top, Array<const float, 3> guid
             // rows of eight candidates become those of a pixel each
             for (const Index begin_of_block : blocks)
                 for (Index x = begin_of_block; x < std::min(W, begin_of_block + ACROSS); x += LANES) {
-                    Float8 block[LANES];
-                    for (Index k = 0; k < LANES; ++k) block[k] = load(total.array().at(k, x));
-                    transpose(block);
+                    const auto block = transposed(total.array().at(0, x), W + LANES);
                     for (Index i = 0; i < LANES && x + i < W; ++i)
                         if (has(x + i)) store(out.data + places.origin(y, x + i) + few, block[i] * ONE);
                 }
