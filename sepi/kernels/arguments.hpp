@@ -5,6 +5,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/variant.h>
 
+#include <functional>
 #include <vector>
 
 #include "array.hpp"
@@ -66,17 +67,26 @@ struct type_caster<Struct> {
 
 namespace sepi {
 
-// Module of kernels in Python, which run outside Python's lock.
-struct Kernels : nanobind::module_ {
-    template <class Kernel>
-    void def(const char *name, Kernel kernel) {
-        nanobind::module_::def(name, kernel, nanobind::call_guard<nanobind::gil_scoped_release>());
+// What a submodule has by a name: a constant, or a kernel, which may be several for different types of arrays, and runs
+// outside Python's lock.
+struct Entry {
+    template <class... Things>
+    Entry(const char *name, Things... things) : add([=](nanobind::module_ &m) { (add_one(m, name, things), ...); }) {}
+
+    std::function<void(nanobind::module_ &)> add;
+
+  private:
+    static void add_one(nanobind::module_ &m, const char *name, auto constant) { m.attr(name) = constant; }
+
+    template <class Result, class... Arguments>
+    static void add_one(nanobind::module_ &m, const char *name, Result (*kernel)(Arguments...)) {
+        m.def(name, kernel, nanobind::call_guard<nanobind::gil_scoped_release>());
     }
 };
 
 // Submodule of a source of kernels in Python. Each source has one, filled when the extension module is loaded.
 struct Submodule {
-    Submodule(const char *name, void (*fill)(Kernels &)) : name(name), fill(fill) { all().push_back(*this); }
+    Submodule(const char *name, std::initializer_list<Entry> entries) : name(name), entries(entries) { all().push_back(*this); }
 
     static std::vector<Submodule> &all() {
         static std::vector<Submodule> submodules;
@@ -84,7 +94,7 @@ struct Submodule {
     }
 
     const char *name;
-    void (*fill)(Kernels &);
+    std::vector<Entry> entries;
 };
 
 }  // namespace sepi

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -20,8 +21,8 @@ using Index = std::ptrdiff_t;
 template <class T, int N>
 struct Array {
     T *data;
-    Index shape[N];
-    Index strides[N];  // in elements
+    std::array<Index, N> shape;
+    std::array<Index, N> strides;  // in elements
 
     // Address of an element, or of the first element of the remaining axes if there are fewer indices than axes.
     template <class... Indices>
@@ -45,8 +46,8 @@ struct Array {
         static_assert(N > 1);
         check(i, 0);
         Array<T, N - 1> part{at(i), {}, {}};
-        std::copy(shape + 1, shape + N, part.shape);
-        std::copy(strides + 1, strides + N, part.strides);
+        std::copy(shape.begin() + 1, shape.end(), part.shape.begin());
+        std::copy(strides.begin() + 1, strides.end(), part.strides.begin());
         return part;
     }
 
@@ -54,10 +55,7 @@ struct Array {
     operator Array<const T, N>() const
         requires(!std::is_const_v<T>)
     {
-        Array<const T, N> same{data, {}, {}};
-        std::copy(shape, shape + N, same.shape);
-        std::copy(strides, strides + N, same.strides);
-        return same;
+        return {data, shape, strides};
     }
 
   private:

@@ -27,8 +27,9 @@ NB_MODULE(_native, m) {
     m.def("has_x86_64_v3", &has_x86_64_v3, "Whether this processor can use kernels that are built for x86-64-v3.");
     m.def("thread_count", &sepi::thread_count, "Threads of a loop, the caller's among them.");
     m.def("set_thread_count", &sepi::set_thread_count, nanobind::arg("count"), "Have each loop use so many threads.");
-    for (const auto &[name, fill] : sepi::Submodule::all()) {
-        sepi::Kernels submodule{m.def_submodule(name)};
-        fill(submodule);
+    m.def("forget_threads", &sepi::forget_threads, "Start new threads for loops, in a fork, which has none.");
+    for (const auto &[name, entries] : sepi::Submodule::all()) {
+        nanobind::module_ submodule = m.def_submodule(name);
+        for (const auto &entry : entries) entry.add(submodule);
     }
 }

@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::floor {
-namespace {
 
 // A thread adds the results for seven vectors and a weight that changes, as it does from candidate to candidate.
 template <class One>
@@ -41,10 +40,6 @@ void windows(Index passes, Array<const float, 3> data, Array<float, 2> out) {
     });
 }
 
-const Submodule submodule("floor", [](Kernels &m) {
-    m.def("samples", &samples);
-    m.def("windows", &windows);
-});
+const Submodule submodule("floor", {{"samples", &samples}, {"windows", &windows}});
 
-}  // namespace
 }  // namespace sepi::floor

@@ -2,7 +2,6 @@
 #include "view_samples.hpp"
 
 namespace sepi::background {
-namespace {
 
 constexpr Index FEWEST_VIEWS = 3;  // least number of views for the colour of a background
 constexpr float UNSEEN = -1;       // variance of a background that fewer views see; negative
@@ -78,11 +77,10 @@ void background_of(const RimViews &views, Array<const float, 2> layer, Array<con
     });
 }
 
-const Submodule submodule("background", [](Kernels &m) {
-    m.def("background_of", &background_of);
-    m.attr("FEWEST_VIEWS") = FEWEST_VIEWS;
-    m.attr("UNSEEN") = UNSEEN;
+const Submodule submodule("background", {
+    {"background_of", &background_of},
+    {"FEWEST_VIEWS", FEWEST_VIEWS},
+    {"UNSEEN", UNSEEN},
 });
 
-}  // namespace
 }  // namespace sepi::background

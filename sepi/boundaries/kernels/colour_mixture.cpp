@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::colour_mixture {
-namespace {
 
 // The least and the largest disparity of each pixel and its eight neighbours: the fields of
 // sepi.boundaries.rim.Surroundings, in their order; (H, W).
@@ -67,9 +66,6 @@ void mixture_evidence(Array<const float, 2> disparity, const Surroundings &aroun
     });
 }
 
-const Submodule submodule("colour_mixture", [](Kernels &m) {
-    m.def("mixture_evidence", &mixture_evidence);
-});
+const Submodule submodule("colour_mixture", {{"mixture_evidence", &mixture_evidence}});
 
-}  // namespace
 }  // namespace sepi::colour_mixture

@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::edge_lines {
-namespace {
 
 // Steps between shares that have costs, in shares that an edge may leave.
 constexpr Index STEPS = 3;
@@ -61,10 +60,6 @@ void evidence_of_lines(Array<const float, 2> disparity, Array<const float, 2> mi
     });
 }
 
-const Submodule submodule("edge_lines", [](Kernels &m) {
-    m.def("evidence_of_lines", &evidence_of_lines);
-    m.attr("STEPS") = STEPS;
-});
+const Submodule submodule("edge_lines", {{"evidence_of_lines", &evidence_of_lines}, {"STEPS", STEPS}});
 
-}  // namespace
 }  // namespace sepi::edge_lines

@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::specks {
-namespace {
 
 // Pixels of small parts of a map (H, W): of at most most_pixels, or most_of_hole with only nearer pixels around. A part
 // consists of eight-connected pixels that differ by at most difference.
@@ -38,9 +37,6 @@ void specks_of(Array<const float, 2> disparity, float difference, Index most_pix
     }
 }
 
-const Submodule submodule("specks", [](Kernels &m) {
-    m.def("specks_of", &specks_of);
-});
+const Submodule submodule("specks", {{"specks_of", &specks_of}});
 
-}  // namespace
 }  // namespace sepi::specks

@@ -2,7 +2,6 @@
 #include "view_samples.hpp"
 
 namespace sepi::surface_shares {
-namespace {
 
 // Pixels beside a depth step, and their two possible surfaces; (H, W).
 struct Rim {
@@ -240,12 +239,11 @@ void costs_of_shares(const RimViews &views, const Rim &rim, Array<const float, 3
     });
 }
 
-const Submodule submodule("surface_shares", [](Kernels &m) {
-    m.def("costs_of_shares", &costs_of_shares);
-    m.attr("FEWEST_SAMPLES") = FEWEST_SAMPLES;
-    m.attr("FEWEST_ALONE") = FEWEST_ALONE;
-    m.attr("SHARES") = SHARES;
+const Submodule submodule("surface_shares", {
+    {"costs_of_shares", &costs_of_shares},
+    {"FEWEST_SAMPLES", FEWEST_SAMPLES},
+    {"FEWEST_ALONE", FEWEST_ALONE},
+    {"SHARES", SHARES},
 });
 
-}  // namespace
 }  // namespace sepi::surface_shares

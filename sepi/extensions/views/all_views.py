@@ -43,11 +43,11 @@ class Sources(NamedTuple):
 
     Attributes
     ----------
-    disparity, confidence : ndarray, shape (N, H, W), float32
-        Pixels per view step; 0..1.
-    bars : ndarray, shape (N, H, W, 3), float32
-        Standard deviation of the disparity, and distances of its interval's bounds below and above it; N is 0 without
-        error bars.
+    disparity : ndarray, shape (N, H, W), float32
+        Pixels per view step.
+    told : ndarray, shape (N, H, W, 1 or 4), float32
+        Confidence; with error bars also the standard deviation of the disparity, and distances of its interval's bounds
+        below and above it.
     corners : ndarray, shape (N, H, W, 4), float32
         Disparity at the corners of each pixel, from :func:`sepi.matching.carried_map.corner_disparities`.
     baselines : ndarray, shape (N, 2), float64
@@ -55,8 +55,7 @@ class Sources(NamedTuple):
     """
 
     disparity: FloatMap
-    confidence: FloatMap
-    bars: FloatMap
+    told: FloatMap
     corners: FloatMap
     baselines: npt.NDArray[np.float64]
 
@@ -246,19 +245,18 @@ def anchor_views(light_field: LightField) -> list[tuple[int, int]]:
 
 def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sources:
     """The source maps, with the surfaces of their pixels."""
-    shape, bars = found[0].disparity.shape, []
+    told = []
     for maps in found:
         # error bars of all maps, or of none
         if maps.sigma is None or maps.low is None or maps.high is None:
-            bars = [np.empty((0, *shape, 3), np.float32)]
+            told = [maps.confidence[..., None] for maps in found]
             break
         # distances of the bounds hold in other views, too; an unknown disparity may lie beyond both
         below, above = np.maximum(maps.disparity - maps.low, 0), np.maximum(maps.high - maps.disparity, 0)
-        bars.append(np.stack([maps.sigma, below, above], axis=2)[None])
+        told.append(np.stack([maps.confidence, maps.sigma, below, above], axis=2))
     return Sources(
         np.stack([maps.disparity for maps in found], dtype=np.float32),
-        np.stack([maps.confidence for maps in found], dtype=np.float32),
-        np.concatenate(bars, dtype=np.float32),
+        np.stack(told, dtype=np.float32),
         np.stack([corner_disparities(maps.disparity) for maps in found], dtype=np.float32),
         baselines,
     )
@@ -268,20 +266,16 @@ def _fused(
     light_field: LightField, sources: Sources, places: npt.NDArray[np.int64]
 ) -> Iterator[tuple[tuple[int, int], ViewMaps]]:
     """Positions and maps of views, fused from the source maps, some at a time."""
-    told = len(sources.bars) > 0
     for some in np.split(places, range(_AT_ONCE, len(places), _AT_ONCE)):
         shape = (len(some), *light_field.shape)
-        disparity, confidence, extended = (
-            np.empty(shape, np.float32),
-            np.empty(shape, np.float32),
-            np.empty(shape, bool),
-        )
-        bars = np.empty((*shape, 3) if told else (len(some), 0, 0, 3), np.float32)
+        disparity, extended = np.empty(shape, np.float32), np.empty(shape, bool)
+        told = np.empty((*shape, sources.told.shape[3]), np.float32)
         baselines = np.ascontiguousarray(light_field.baselines[tuple(some.T)])
-        kernels.maps_of_views(sources, baselines, disparity, confidence, bars, extended)
-        for (t, s), at, sure, beyond, own in zip(some.tolist(), disparity, confidence, extended, bars, strict=True):
-            of_view = {"sigma": own[..., 0], "low": at - own[..., 1], "high": at + own[..., 2]} if told else {}
-            yield (t, s), {"disparity": at, "confidence": sure, "extended": beyond, **of_view}
+        kernels.maps_of_views(sources, baselines, disparity, told, extended)
+        for (t, s), at, own, beyond in zip(some.tolist(), disparity, told, extended, strict=True):
+            sure, *bars = np.moveaxis(own, 2, 0)
+            of_view = {"sigma": bars[0], "low": at - bars[1], "high": at + bars[2]} if bars else {}
+            yield (t, s), {"disparity": at, "confidence": np.ascontiguousarray(sure), "extended": beyond, **of_view}
 
 
 def _with_doubt(light_field: LightField, view: ViewMaps, decided: FloatMap) -> ViewMaps:

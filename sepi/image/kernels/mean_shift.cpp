@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::mean_shift {
-namespace {
 
 constexpr int ITERATIONS = 5;
 // End of the search for a mode: number of iterations, or update relative to the bandwidth.
@@ -94,10 +93,6 @@ void sample_modes(Array<const double, 2> samples, double bandwidth, Array<double
     });
 }
 
-const Submodule submodule("mean_shift", [](Kernels &m) {
-    m.def("patch_modes", &patch_modes);
-    m.def("sample_modes", &sample_modes);
-});
+const Submodule submodule("mean_shift", {{"patch_modes", &patch_modes}, {"sample_modes", &sample_modes}});
 
-}  // namespace
 }  // namespace sepi::mean_shift

@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::coarse_sweep {
-namespace {
 
 constexpr Index ROWS = 16;  // rows of a thread for all candidates, a few MB
 constexpr Index LINE = 16;  // numbers in a cache line, so that planes of costs begin in different cache sets
@@ -112,9 +111,6 @@ void coarse_sweep(Array<const float, 2> reference, Array<const float, 3> views, 
     });
 }
 
-const Submodule submodule("coarse_sweep", [](Kernels &m) {
-    m.def("coarse_sweep", &coarse_sweep);
-});
+const Submodule submodule("coarse_sweep", {{"coarse_sweep", &coarse_sweep}});
 
-}  // namespace
 }  // namespace sepi::coarse_sweep

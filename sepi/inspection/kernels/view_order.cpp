@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::view_order {
-namespace {
 
 constexpr float HALF = 0.25f;  // difference of two patches that counts one half, as a share of the patch's own variation
 
@@ -92,10 +91,6 @@ void residuals(Array<const float, 2> reference, Array<const float, 2> view, Arra
     });
 }
 
-const Submodule submodule("view_order", [](Kernels &m) {
-    m.def("layout_costs", &layout_costs);
-    m.def("residuals", &residuals);
-});
+const Submodule submodule("view_order", {{"layout_costs", &layout_costs}, {"residuals", &residuals}});
 
-}  // namespace
 }  // namespace sepi::view_order

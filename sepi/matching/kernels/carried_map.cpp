@@ -2,7 +2,6 @@
 #include "carried_map.hpp"
 
 namespace sepi::carried_map {
-namespace {
 
 // Disparity at the corners of each pixel of a map (H, W), clockwise from the top left, out (H, W, 4). Pixels that meet
 // in a corner belong to one surface if their disparities there differ by at most the tolerance.
@@ -34,12 +33,11 @@ void corner_disparities(Array<const float, 2> disparity, Array<float, 3> out) {
     });
 }
 
-const Submodule submodule("carried_map", [](Kernels &m) {
-    m.attr("EMPTY") = EMPTY;
-    m.attr("TOLERANCE") = TOLERANCE;
-    m.def("corner_disparities", &corner_disparities);
-    m.def("carry", &carry);
+const Submodule submodule("carried_map", {
+    {"EMPTY", EMPTY},
+    {"TOLERANCE", TOLERANCE},
+    {"corner_disparities", &corner_disparities},
+    {"carry", &carry},
 });
 
-}  // namespace
 }  // namespace sepi::carried_map

@@ -2,7 +2,6 @@
 #include "pixels.hpp"
 
 namespace sepi::denoising {
-namespace {
 
 // Views that are written to, (T, S, H, W, C).
 using NewViews = std::variant<Array<std::uint8_t, 5>, Array<std::uint16_t, 5>, Array<float, 5>>;
@@ -22,8 +21,9 @@ Float8 variance_at(Float8 level, Array<const float, 2> lines) {
     return line[2] + (level - line[0]) / line[1] * line[3];
 }
 
-Float8 binomial_mean(const float *before, const float *here, const float *after) {
-    return 0.5f * load(here) + 0.25f * (load(before) + load(after));
+// Mean of three lines of n by 1 2 1.
+void binomial_mean(const float *before, const float *here, const float *after, Index n, float *__restrict out) {
+    for (Index x = 0; x < n; ++x) out[x] = 0.5f * here[x] + 0.25f * (before[x] + after[x]);
 }
 
 // Some rows of a view, and SIDE above and below: their mean by 1 2 1 along both axes, mirrored at the borders, and the
@@ -35,22 +35,16 @@ class Stretch {
         Array<float, 3> rows = detail_.array();
         ++rows.data;
         load_rows(views, t, s, first - SIDE, rows, [=](auto colour) { return colour / full; });
-        const auto across = zeros<float, 2>(n_, width_ + LANES);
-        const Index width = width_;
+        const Scratch<float, 2> across(n_, width_);
         for (Index c = 0; c < channels_; ++c) {
             for (Index i = 0; i < n_; ++i) {
-                float *row = detail(c, i), *out = across.array().at(i);
-                mirror_ends(row, width, 1);
-                for (Index x = 0; x < width; x += LANES) store(out + x, binomial_mean(row + x - 1, row + x, row + x + 1));
+                float *row = detail(c, i);
+                mirror_ends(row, width_, 1);
+                binomial_mean(row - 1, row, row + 1, width_, across.array().at(i));
             }
             for (Index i = 1; i < n_ - 1; ++i) {
-                const float *above = across.array().at(i - 1), *here = across.array().at(i), *below = across.array().at(i + 1);
-                float *rough = detail(c, i), *smooth = mean(c, i);
-                for (Index x = 0; x < width; x += LANES) {
-                    const Float8 middle = binomial_mean(above + x, here + x, below + x);
-                    store(smooth + x, middle);
-                    store(rough + x, load(rough + x) - middle);
-                }
+                binomial_mean(across.array().at(i - 1), across.array().at(i), across.array().at(i + 1), width_, mean(c, i));
+                std::transform(detail(c, i), detail(c, i) + width_, mean(c, i), detail(c, i), std::minus());
             }
         }
     }
@@ -58,17 +52,10 @@ class Stretch {
     // Row i, denoised, as out (C, W or more).
     void denoise(Index i, Array<const float, 2> noise, const float *least, Array<float, 2> out) const {
         const float *least_here = std::copy_n(least, width_, least_.array().data) - width_;
-        float *energies = energies_.array().at(REACH);
-        for (Index x = 0; x < width_; x += LANES) {
-            Float8 energy{};
-            for (Index k = i - REACH; k <= i + REACH; ++k) {
-                for (Index c = 0; c < 3; ++c) {
-                    const Float8 value = load(detail(c, k) + x);
-                    energy += value * value;
-                }
-            }
-            store(energies + x, energy);
-        }
+        float *energies = std::fill_n(energies_.array().at(REACH), width_, 0.0f) - width_;
+        for (Index k = i - REACH; k <= i + REACH; ++k)
+            for (Index c = 0; c < 3; ++c)
+                std::transform(energies, energies + width_, detail(c, k), energies, [](float sum, float value) { return sum + value * value; });
         mirror_ends(energies, width_, REACH);
         for (Index x = 0; x < width_; x += LANES) {
             const Float8 level = (load(mean(0, i) + x) + load(mean(1, i) + x) + load(mean(2, i) + x)) / 3.0f;
@@ -119,9 +106,6 @@ void denoise_views(const Views &views, Array<const bool, 2> present, float full,
     });
 }
 
-const Submodule submodule("denoising", [](Kernels &m) {
-    m.def("denoise_views", &denoise_views);
-});
+const Submodule submodule("denoising", {{"denoise_views", &denoise_views}});
 
-}  // namespace
 }  // namespace sepi::denoising

@@ -2,7 +2,6 @@
 #include "pixels.hpp"
 
 namespace sepi::gaps {
-namespace {
 
 // Squared residual of a bilinear sample of a view (H, W, 3) from reference (3,), in units of its expectation by noise,
 // which interpolation averages.
@@ -71,10 +70,6 @@ void compare_depths(const Views &views, float unit, Array<const float, 2> dispar
     });
 }
 
-const Submodule submodule("gaps", [](Kernels &m) {
-    m.def("farther_alike", &farther_alike);
-    m.def("compare_depths", &compare_depths);
-});
+const Submodule submodule("gaps", {{"farther_alike", &farther_alike}, {"compare_depths", &compare_depths}});
 
-}  // namespace
 }  // namespace sepi::gaps

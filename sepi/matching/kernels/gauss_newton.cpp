@@ -6,7 +6,6 @@
 #include "pixels.hpp"
 
 namespace sepi::gauss_newton {
-namespace {
 
 // Pixels of a row computed together, so that their data stays in the first cache.
 constexpr Index AT_ONCE = 128;
@@ -254,11 +253,10 @@ void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<co
         });
 }
 
-const Submodule submodule("gauss_newton", [](Kernels &m) {
-    m.attr("AT_ONCE") = AT_ONCE;
-    m.def("mean_of_views", &mean_of_views);
-    m.def("equations_of_views", &equations_of_views);
+const Submodule submodule("gauss_newton", {
+    {"AT_ONCE", AT_ONCE},
+    {"mean_of_views", &mean_of_views},
+    {"equations_of_views", &equations_of_views},
 });
 
-}  // namespace
 }  // namespace sepi::gauss_newton

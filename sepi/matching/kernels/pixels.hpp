@@ -11,7 +11,7 @@ using Views = std::variant<Strided<const std::uint8_t, 5>, Strided<const std::ui
 // Coefficients of a spline beyond each side of a view.
 constexpr Index SPLINE_MARGIN = 2;
 
-inline const Index *shape_of(const Views &views) {
+inline std::array<Index, 5> shape_of(const Views &views) {
     return std::visit([](const auto &some) { return some.shape; }, views);
 }
 
@@ -37,7 +37,7 @@ struct AskedViews {
 
 // Calls body(t, s, first, number) for groups of the n rows of each view of a grid.
 template <class Body>
-void over_stretches(const Index (&grid)[2], Index n, Index rows, const Body &body) {
+void over_stretches(std::array<Index, 2> grid, Index n, Index rows, const Body &body) {
     const Index S = grid[1], pieces = (n + rows - 1) / rows;
     parallel_for(0, grid[0] * S * pieces, [&](Index task) {
         const Index view = task / pieces, first = task % pieces * rows;
@@ -46,21 +46,22 @@ void over_stretches(const Index (&grid)[2], Index n, Index rows, const Body &bod
 }
 
 // Rows from first on of a view (H, W, C), mirrored at its ends: channel by channel into out (C or more, n, W or more), as
-// scale converts numbers and vectors.
+// scale converts them.
 template <class Colour, class Number, class Scale = std::identity>
 void load_rows(Array<const Colour, 3> view, Index first, Array<Number, 3> out, Scale scale = {}) {
     const Index W = view.shape[1], C = std::min(view.shape[2], out.shape[0]);
     for (Index i = 0; i < out.shape[1]; ++i) {
         const auto row = view[mirrored(first + i, view.shape[0])];
-        Index x = 0;
-        for (; x <= W - LANES && row.strides[0] == 1; x += LANES)
-            for (Index c = 0; c < C; ++c) store(out.at(c, i) + x, scale(load(row.at(0, c) + x)));
-        for (; x <= W - LANES && row.strides[0] == 3 && row.strides[1] == 1; x += LANES) {
-            const auto channels = load_interleaved(row.data + 3 * x);
-            for (Index c = 0; c < 3; ++c) store(out.at(c, i) + x, scale(channels[c]));
+        if (C == 3 && row.strides[0] == 3 && row.strides[1] == 1) {
+            Number *__restrict red = out.at(0, i), *__restrict green = out.at(1, i), *__restrict blue = out.at(2, i);
+            for (Index x = 0; x < W; ++x) {
+                const Colour *colour = row.data + 3 * x;
+                red[x] = scale(float(colour[0])), green[x] = scale(float(colour[1])), blue[x] = scale(float(colour[2]));
+            }
+        } else {
+            for (Index c = 0; c < C; ++c)
+                for (Index x = 0; x < W; ++x) out(c, i, x) = scale(float(row(x, c)));
         }
-        for (Index c = 0; c < C; ++c)
-            for (Index rest = x; rest < W; ++rest) out(c, i, rest) = scale(float(row(rest, c)));
     }
 }
 

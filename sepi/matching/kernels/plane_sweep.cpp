@@ -10,7 +10,6 @@
 #include "sweep_arrays.hpp"
 
 namespace sepi::plane_sweep {
-namespace {
 
 // Columns of a row whose costs are computed and aggregated together.
 constexpr Index BLOCK = 32;
@@ -199,11 +198,9 @@ struct TileSweep {
         for (Index k = 0; k < padded; k += LANES) {
             const Index place = g * padded + k;
             for (Index x = run.begin; x < run.end; x += LANES) {
-                Float8 rows[LANES];
-                for (Index i = 0; i < LANES; ++i) rows[i] = load(costs + (k + i) * BLOCK_ROW + x - run.begin);
-                transpose(rows);
+                const auto columns = transposed(costs + k * BLOCK_ROW + x - run.begin, BLOCK_ROW);
                 float *target = ring.at(run.y % size, place / AT_ONCE, x - tile.begin + window.radius, place % AT_ONCE);
-                for (Index i = 0; i < LANES; ++i) store(target + i * AT_ONCE, rows[i]);
+                for (Index i = 0; i < LANES; ++i) store(target + i * AT_ONCE, columns[i]);
             }
         }
     }
@@ -344,10 +341,6 @@ void sweep_plane_rows(const ViewStack &views, const Candidates &candidates, cons
     });
 }
 
-const Submodule submodule("plane_sweep", [](Kernels &m) {
-    m.def("sweep_plane_rows", &sweep_plane_rows);
-    m.attr("BLOCK") = BLOCK;
-});
+const Submodule submodule("plane_sweep", {{"sweep_plane_rows", &sweep_plane_rows}, {"BLOCK", BLOCK}});
 
-}  // namespace
 }  // namespace sepi::plane_sweep

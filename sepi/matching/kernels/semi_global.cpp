@@ -3,7 +3,6 @@
 #include "pixels.hpp"
 
 namespace sepi::semi_global {
-namespace {
 
 // Paths from row to row that a thread follows together, with contiguous costs that fit in its cache.
 constexpr Index PATHS_AT_ONCE = 32;
@@ -150,9 +149,7 @@ void aggregate(Array<const float, 3> cost, Index top, Array<const float, 3> guid
             // rows of eight candidates become those of a pixel each
             for (const Index begin_of_block : blocks)
                 for (Index x = begin_of_block; x < std::min(W, begin_of_block + ACROSS); x += LANES) {
-                    Float8 block[LANES];
-                    for (Index k = 0; k < LANES; ++k) block[k] = load(total.array().at(k, x));
-                    transpose(block);
+                    const auto block = transposed(total.array().at(0, x), W + LANES);
                     for (Index i = 0; i < LANES && x + i < W; ++i)
                         if (has(x + i)) store(out.data + places.origin(y, x + i) + few, block[i] * ONE);
                 }
@@ -208,14 +205,13 @@ void choose(Array<const std::uint16_t, 1> smoothed, Array<const std::uint16_t, 1
     });
 }
 
-const Submodule submodule("semi_global", [](Kernels &m) {
-    m.attr("AT_ONCE") = AT_ONCE;
-    m.attr("ONE") = ONE;
-    m.attr("PATHS_AT_ONCE") = PATHS_AT_ONCE;
-    m.def("aggregate", &aggregate);
-    m.def("semi_global", &semi_global);
-    m.def("choose", &choose);
+const Submodule submodule("semi_global", {
+    {"AT_ONCE", AT_ONCE},
+    {"ONE", ONE},
+    {"PATHS_AT_ONCE", PATHS_AT_ONCE},
+    {"aggregate", &aggregate},
+    {"semi_global", &semi_global},
+    {"choose", &choose},
 });
 
-}  // namespace
 }  // namespace sepi::semi_global

@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::sheared_views {
-namespace {
 
 // Samples of a line: offset in whole pixels, and weights of the pixels at -1, 0, 1 and 2 from there.
 struct Shift {
@@ -41,9 +40,6 @@ void shear(Array<const float, 4> views, Strided<const double, 2> offsets, bool c
     });
 }
 
-const Submodule submodule("sheared_views", [](Kernels &m) {
-    m.def("shear", &shear);
-});
+const Submodule submodule("sheared_views", {{"shear", &shear}});
 
-}  // namespace
 }  // namespace sepi::sheared_views

@@ -4,7 +4,6 @@
 #include "pixels.hpp"
 
 namespace sepi::splines {
-namespace {
 
 // Reach of the convolution for the views' coefficients; the rest is a tenth of the rounding to int16.
 constexpr Index SPLINE_REACH = 8;
@@ -85,12 +84,11 @@ void view_splines(const Views &views, float colour_unit, Array<const std::int16_
     });
 }
 
-const Submodule submodule("splines", [](Kernels &m) {
-    m.attr("MARGIN") = SPLINE_MARGIN;
-    m.attr("REACH") = SPLINE_REACH;
-    m.def("spline_coefficients", &spline_coefficients);
-    m.def("view_splines", &view_splines);
+const Submodule submodule("splines", {
+    {"MARGIN", SPLINE_MARGIN},
+    {"REACH", SPLINE_REACH},
+    {"spline_coefficients", &spline_coefficients},
+    {"view_splines", &view_splines},
 });
 
-}  // namespace
 }  // namespace sepi::splines

@@ -2,7 +2,6 @@
 #include "pixels.hpp"
 
 namespace sepi::surface_windows {
-namespace {
 
 // Rows of a turn of a thread.
 constexpr Index ROWS_AT_ONCE = 32;
@@ -52,9 +51,6 @@ void sums_of_surface(Array<const float, 2> gradient, Array<const float, 2> curva
     });
 }
 
-const Submodule submodule("surface_windows", [](Kernels &m) {
-    m.def("sums_of_surface", &sums_of_surface);
-});
+const Submodule submodule("surface_windows", {{"sums_of_surface", &sums_of_surface}});
 
-}  // namespace
 }  // namespace sepi::surface_windows

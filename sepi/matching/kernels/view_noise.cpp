@@ -2,7 +2,6 @@
 #include "pixels.hpp"
 
 namespace sepi::view_noise {
-namespace {
 
 // Width of a block, pixels: a vector of them.
 constexpr Index BLOCK = LANES;
@@ -50,10 +49,6 @@ void least_differences(const Views &views, Index t0, Index s0, Array<const std::
     });
 }
 
-const Submodule submodule("view_noise", [](Kernels &m) {
-    m.def("least_differences", &least_differences);
-    m.attr("BLOCK") = BLOCK;
-});
+const Submodule submodule("view_noise", {{"least_differences", &least_differences}, {"BLOCK", BLOCK}});
 
-}  // namespace
 }  // namespace sepi::view_noise

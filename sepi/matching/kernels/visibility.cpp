@@ -3,6 +3,7 @@
 #include "sweep_arrays.hpp"
 
 namespace sepi::visibility {
+// its loops are faster if Clang knows that no other source calls it
 namespace {
 
 constexpr float EMPTY = -1e9f;   // in a z-buffer where no pixel of the reference view falls: nothing is nearer
@@ -332,12 +333,12 @@ void sweep_visible_rows(const BaseDetail &views, const Visibility &visibility, A
     parallel_for(begin, end, [&](Index y) { VisibleRow{views, visibility, scales2, shares, candidates, cost}.sweep(y, y - begin); });
 }
 
-const Submodule submodule("visibility", [](Kernels &m) {
-    m.attr("EMPTY") = EMPTY;
-    m.attr("MISSING") = MISSING;
-    m.def("z_buffers", &z_buffers);
-    m.def("occluded_in_any_view", &occluded_in_any_view);
-    m.def("sweep_visible_rows", &sweep_visible_rows);
+const Submodule submodule("visibility", {
+    {"EMPTY", EMPTY},
+    {"MISSING", MISSING},
+    {"z_buffers", &z_buffers},
+    {"occluded_in_any_view", &occluded_in_any_view},
+    {"sweep_visible_rows", &sweep_visible_rows},
 });
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::planes {
-namespace {
 
 // Weighted least squares of each superpixel's data, in the order of the pixels, added to left (N, 3, 3) and
 // right (N, 3) of zeros; weight and disparity (H W).
@@ -46,11 +45,10 @@ void support_of(Array<const double, 2> positions, Array<const double, 1> values,
     });
 }
 
-const Submodule submodule("planes", [](Kernels &m) {
-    m.def("support_of", &support_of);
-    m.def("add_normal_equations", &add_normal_equations);
-    m.def("values_of_planes", &values_of_planes);
+const Submodule submodule("planes", {
+    {"support_of", &support_of},
+    {"add_normal_equations", &add_normal_equations},
+    {"values_of_planes", &values_of_planes},
 });
 
-}  // namespace
 }  // namespace sepi::planes

@@ -7,7 +7,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::second_order {
-namespace {
 
 constexpr Index MARGIN = 2;   // reach of second differences, pixels
 constexpr Index SPACING = 2;  // distance of nodes of the finest hats, pixels
@@ -43,12 +42,12 @@ Number dot(const Number *a, const Number *b, Index n) {
     return sums[0];
 }
 
-// Sum over rows, added in order, whichever thread computed them.
-template <class Number>
-double in_order(const Scratch<Number, 1> &rows) {
-    double total = 0;
-    for (Index y = 0; y < rows.array().shape[0]; ++y) total += double(rows.array()(y));
-    return total;
+// Sum of what turn(y) returns for n rows, added in order, whichever thread computed them.
+template <class Turn>
+double sum_of_rows(Index n, const Turn &turn) {
+    std::vector<double> rows(n);
+    parallel_for(0, n, [&](Index y) { rows[y] = double(turn(y)); });
+    return std::accumulate(rows.begin(), rows.end(), 0.0);
 }
 
 // Weights of second differences in one direction; corners (n, 2) and factors (n) are the pixels of a difference, at most four.
@@ -77,9 +76,9 @@ void weights_of_differences(Array<const float, 2> disparity, Array<const float, 
 template <class Number>
 double bend(Array<const Number, 3> stencil, Array<const Number, 2> ahead, Number share, Array<Number, 2> direction, Array<Number, 2> out) {
     const Index H = direction.shape[0] - 2 * MARGIN, W = direction.shape[1] - 2 * MARGIN;
-    const Scratch<Number, 1> along(H);
     parallel_for_pixels(direction.shape[0], direction.shape[1], [&](Index y, Index x) { direction(y, x) = share * direction(y, x) + ahead(y, x); });
-    parallel_for(MARGIN, MARGIN + H, [&](Index y) {
+    return sum_of_rows(H, [&](Index row) {
+        const Index y = row + MARGIN;
         const Number *own = stencil.at(0, y, MARGIN), *here = direction.at(y, MARGIN);
         Number *__restrict target = out.at(y, MARGIN);
         for (Index x = 0; x < W; ++x) target[x] = own[x] * here[x];
@@ -90,27 +89,23 @@ double bend(Array<const Number, 3> stencil, Array<const Number, 2> ahead, Number
             const Number *back = stencil.at(k, y - dy, MARGIN - dx), *before = direction.at(y - dy, MARGIN - dx);
             for (Index x = 0; x < W; ++x) target[x] += forth[x] * there[x] + back[x] * before[x];
         }
-        along.array()(y - MARGIN) = dot(here, out.at(y, MARGIN), W);
+        return dot(here, out.at(y, MARGIN), W);
     });
-    return in_order(along);
 }
 
 // Add a multiple of a direction to the solution, and subtract that of bent, the matrix times it, from the residual;
 // returns the squared norm of the residual.
 template <class Number>
 double step(Number length, Array<const Number, 2> direction, Array<const Number, 2> bent, Array<Number, 2> solution, Array<Number, 2> residual) {
-    const Scratch<Number, 1> squares(solution.shape[0]);
-    const Index n = solution.shape[1];
-    parallel_for(0, solution.shape[0], [&](Index y) {
+    return sum_of_rows(solution.shape[0], [&, n = solution.shape[1]](Index y) {
         Number *__restrict found = solution.at(y), *__restrict left = residual.at(y);
         const Number *ahead = direction.at(y), *taken = bent.at(y);
         for (Index x = 0; x < n; ++x) {
             found[x] += length * ahead[x];
             left[x] -= length * taken[x];
         }
-        squares.array()(y) = dot(residual.at(y), residual.at(y), n);
+        return dot(residual.at(y), residual.at(y), n);
     });
-    return in_order(squares);
 }
 
 // Inner products of a picture with the finest hats, out (h, w).
@@ -164,8 +159,7 @@ double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = fine.shape[1];
     const Nodes down(fine.shape[0], SPACING, H), across(w, SPACING, W);
     const Number h[] = {Number(across.height(0)), Number(across.height(1)), Number(across.height(2)), Number(across.height(3))};
-    const Scratch<Number, 1> along(H);
-    parallel_for(0, H, [&](Index y) {
+    return sum_of_rows(H, [&](Index y) {
         const Scratch<Number, 1> lines(w), all_hats(2 * w);
         Number *__restrict line = lines.array().data, *__restrict hats = all_hats.array().data;
         const Index i = (y + down.before) / 2, odd = (y + down.before) % 2;
@@ -178,9 +172,8 @@ double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2
         const Number *row = vector.at(y + MARGIN, MARGIN), *own = inverse.at(y + MARGIN, MARGIN);
         Number *__restrict target = out.at(y + MARGIN, MARGIN);
         for (Index x = 0; x < W; ++x) target[x] = own[x] * row[x] + hats[across.before - SPACING + x];
-        along.array()(y) = dot<Number>(row, target, W);
+        return dot<Number>(row, target, W);
     });
-    return in_order(along);
 }
 
 // Diagonal of the matrix in hats with this spacing, out (h, w).
@@ -210,25 +203,17 @@ void diagonal_of_hats(Array<const Number, 3> stencil, Index spacing, Array<Numbe
     });
 }
 
-// The kernels of the second-order smoothing that work in single or double precision.
-template <class Number>
-void bind_of_numbers(Kernels &m) {
-    m.def("bend", &bend<Number>);
-    m.def("step", &step<Number>);
-    m.def("diagonal_of_hats", &diagonal_of_hats<Number>);
-    m.def("onto_finest", &onto_finest<Number>);
-    m.def("onto_coarser", &onto_coarser<Number>);
-    m.def("onto_finer", &onto_finer<Number>);
-    m.def("diagonal_and_finest", &diagonal_and_finest<Number>);
-}
-
-const Submodule submodule("second_order", [](Kernels &m) {
-    m.attr("MARGIN") = MARGIN;
-    m.attr("SPACING") = SPACING;
-    m.def("weights_of_differences", &weights_of_differences);
-    bind_of_numbers<float>(m);
-    bind_of_numbers<double>(m);
+const Submodule submodule("second_order", {
+    {"MARGIN", MARGIN},
+    {"SPACING", SPACING},
+    {"weights_of_differences", &weights_of_differences},
+    {"bend", &bend<float>, &bend<double>},
+    {"step", &step<float>, &step<double>},
+    {"diagonal_of_hats", &diagonal_of_hats<float>, &diagonal_of_hats<double>},
+    {"onto_finest", &onto_finest<float>, &onto_finest<double>},
+    {"onto_coarser", &onto_coarser<float>, &onto_coarser<double>},
+    {"onto_finer", &onto_finer<float>, &onto_finer<double>},
+    {"diagonal_and_finest", &diagonal_and_finest<float>, &diagonal_and_finest<double>},
 });
 
-}  // namespace
 }  // namespace sepi::second_order

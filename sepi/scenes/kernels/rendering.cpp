@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::rendering {
-namespace {
 
 // Texels after each row of a texture, its periodic continuation for a sample's reach.
 constexpr Index BEYOND = 3;
@@ -172,13 +171,12 @@ void cast(const Drawing &drawing, Array<const double, 2> boxes, Array<const doub
     });
 }
 
-const Submodule submodule("rendering", [](Kernels &m) {
-    m.attr("BEYOND") = BEYOND;
-    m.def("nearest", &nearest);
-    m.def("shade", &shade);
-    m.def("hide", &hide);
-    m.def("cast", &cast);
+const Submodule submodule("rendering", {
+    {"BEYOND", BEYOND},
+    {"nearest", &nearest},
+    {"shade", &shade},
+    {"hide", &hide},
+    {"cast", &cast},
 });
 
-}  // namespace
 }  // namespace sepi::rendering

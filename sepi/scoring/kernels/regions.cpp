@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::regions {
-namespace {
 
 constexpr double HALF_PIXEL = 0.501;  // slightly more than a half, so that rounding of float32 disparities decides no tie
 constexpr double STRETCH = 2;         // largest distance in a view of neighbouring pixels of one surface, pixels
@@ -38,9 +37,6 @@ void occluded(Array<const double, 2> ground_truth, Array<const double, 2> baseli
     });
 }
 
-const Submodule submodule("regions", [](Kernels &m) {
-    m.def("occluded", &occluded);
-});
+const Submodule submodule("regions", {{"occluded", &occluded}});
 
-}  // namespace
 }  // namespace sepi::regions

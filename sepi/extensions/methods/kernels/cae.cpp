@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::cae {
-namespace {
 
 constexpr Index LEVELS = 256;  // bins of the histograms, over colours in 0..1
 constexpr Index PATCH = 5;     // width of a sub-patch in pixels; the neighbourhood has three by three of them
@@ -80,12 +79,11 @@ void constrained_least_patch(Array<const float, 3> response, Array<const float, 
     });
 }
 
-const Submodule submodule("cae", [](Kernels &m) {
-    m.attr("LEVELS") = LEVELS;
-    m.attr("PATCH") = PATCH;
-    m.def("constrained_entropies", &constrained_entropies);
-    m.def("constrained_least_patch", &constrained_least_patch);
+const Submodule submodule("cae", {
+    {"LEVELS", LEVELS},
+    {"PATCH", PATCH},
+    {"constrained_entropies", &constrained_entropies},
+    {"constrained_least_patch", &constrained_least_patch},
 });
 
-}  // namespace
 }  // namespace sepi::cae

@@ -5,7 +5,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::message_passing {
-namespace {
 
 enum Side { LEFT, ABOVE, RIGHT, BELOW };
 
@@ -68,10 +67,6 @@ void decode(Array<const float, 3> costs, Array<const float, 2> across, Array<con
     }
 }
 
-const Submodule submodule("message_passing", [](Kernels &m) {
-    m.def("pass_messages", &pass_messages);
-    m.def("decode", &decode);
-});
+const Submodule submodule("message_passing", {{"pass_messages", &pass_messages}, {"decode", &decode}});
 
-}  // namespace
 }  // namespace sepi::message_passing

@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::mishiba {
-namespace {
 
 // Weighted median of the values, by bisection.
 std::int32_t weighted_median(const std::int32_t *values, const std::int32_t *weights, Index count) {
@@ -79,10 +78,9 @@ void median_pass(Array<const std::int32_t, 2> current, Array<const std::int32_t,
     });
 }
 
-const Submodule submodule("mishiba", [](Kernels &m) {
-    m.def("keep_least", &keep_least);
-    m.def("median_pass", &median_pass);
+const Submodule submodule("mishiba", {
+    {"keep_least", &keep_least},
+    {"median_pass", &median_pass},
 });
 
-}  // namespace
 }  // namespace sepi::mishiba

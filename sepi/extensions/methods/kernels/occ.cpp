@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::occ {
-namespace {
 
 // Colours of the halves of P patches in views sheared by a candidate, sheared (N, 3, H, W), relative to the reference
 // view (3, H, W): means (P, 2, 3), and variances (P, 2), means over the channels.
@@ -33,9 +32,6 @@ void moments_of_halves(Array<const float, 4> sheared, Array<const float, 3> refe
     });
 }
 
-const Submodule submodule("occ", [](Kernels &m) {
-    m.def("moments_of_halves", &moments_of_halves);
-});
+const Submodule submodule("occ", {{"moments_of_halves", &moments_of_halves}});
 
-}  // namespace
 }  // namespace sepi::occ

@@ -5,7 +5,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::spo {
-namespace {
 
 // The lower of the two bins of a colour, numbered over all channels, and the weight of the upper one.
 struct Entry {
@@ -87,9 +86,6 @@ void half_distances(Array<const float, 4> lines, Array<const float, 1> shares, I
     });
 }
 
-const Submodule submodule("spo", [](Kernels &m) {
-    m.def("half_distances", &half_distances);
-});
+const Submodule submodule("spo", {{"half_distances", &half_distances}});
 
-}  // namespace
 }  // namespace sepi::spo

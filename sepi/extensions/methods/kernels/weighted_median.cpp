@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::weighted_median {
-namespace {
 
 // As sepi.extensions.methods.costs.weighted_median; values, weight and out (H, W), guide (H, W, 3).
 void weighted_medians(Array<const float, 2> values, Array<const float, 3> guide, Index radius, double sigma, Array<const float, 2> weight,
@@ -25,9 +24,6 @@ void weighted_medians(Array<const float, 2> values, Array<const float, 3> guide,
     });
 }
 
-const Submodule submodule("weighted_median", [](Kernels &m) {
-    m.def("weighted_medians", &weighted_medians);
-});
+const Submodule submodule("weighted_median", {{"weighted_medians", &weighted_medians}});
 
-}  // namespace
 }  // namespace sepi::weighted_median

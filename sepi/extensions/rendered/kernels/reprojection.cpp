@@ -3,7 +3,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::reprojection {
-namespace {
 
 // Calls body(other, x, place) where another view contains the point of a pixel of row y. View by view, since adjacent
 // pixels stay adjacent in memory.
@@ -71,10 +70,6 @@ void gathered_light(Array<const float, 4> light, Array<const float, 3> dispariti
     });
 }
 
-const Submodule submodule("reprojection", [](Kernels &m) {
-    m.def("seen_elsewhere", &seen_elsewhere);
-    m.def("gathered_light", &gathered_light);
-});
+const Submodule submodule("reprojection", {{"seen_elsewhere", &seen_elsewhere}, {"gathered_light", &gathered_light}});
 
-}  // namespace
 }  // namespace sepi::reprojection

@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::triangles {
-namespace {
 
 // Rows of rays of a turn of a thread.
 constexpr Index BAND = 32;
@@ -89,9 +88,6 @@ void first_met(Array<const double, 3> corners, Array<const double, 1> origin, Ar
     });
 }
 
-const Submodule submodule("triangles", [](Kernels &m) {
-    m.def("first_met", &first_met);
-});
+const Submodule submodule("triangles", {{"first_met", &first_met}});
 
-}  // namespace
 }  // namespace sepi::triangles

@@ -2,7 +2,6 @@
 #include "matching/kernels/carried_map.hpp"
 
 namespace sepi::all_views {
-namespace {
 
 using namespace carried_map;
 
@@ -10,12 +9,12 @@ constexpr float LEAST_WEIGHT = 0.05f;   // vote of a map with confidence 0: wher
 
 // The maps that are carried: the fields of sepi.extensions.views.all_views.Sources, in their order.
 struct Sources {
-    Array<const float, 3> disparity, confidence;  // (N, H, W)
-    Array<const float, 4> bars;                   // (N or 0, H, W, 3)
-    Array<const float, 4> corners;                // (N, H, W, 4)
-    Array<const double, 2> baselines;             // (N, 2)
+    Array<const float, 3> disparity;   // (N, H, W)
+    Array<const float, 4> told;        // (N, H, W, C): the confidence first
+    Array<const float, 4> corners;     // (N, H, W, 4)
+    Array<const double, 2> baselines;  // (N, 2)
 
-    bool fields(auto visit) { return visit(disparity, confidence, bars, corners, baselines); }
+    bool fields(auto visit) { return visit(disparity, told, corners, baselines); }
 };
 
 constexpr float FARTHER = 1e9f;     // above all disparities
@@ -25,13 +24,13 @@ struct Fusion {
     const Sources &sources;
     const double v, u;
 
-    // A map's disparity at a pixel of the view.
+    // A map's disparity at a pixel of the view, and what it tells of it, if anything.
     struct Shown {
-        float disparity, confidence, weight;
-        const float *bars;
+        float disparity, weight;
+        const float *told;
     };
 
-    const Index N = sources.disparity.shape[0], H = sources.disparity.shape[1], W = sources.disparity.shape[2];
+    const Index N = sources.told.shape[0], H = sources.told.shape[1], W = sources.told.shape[2], C = sources.told.shape[3];
     const Scratch<float, 3> nearest{N, H, W};
     const Scratch<std::int32_t, 3> origin{N, H, W};
     std::vector<Shown> maps = std::vector<Shown>(N);
@@ -41,7 +40,7 @@ struct Fusion {
     double across(Index n) const { return u - sources.baselines(n, 1); }
 
     // EMPTY where none shows anything.
-    void fuse(Array<float, 2> disparity, Array<float, 2> confidence, Array<float, 3> bars) {
+    void fuse(Array<float, 2> disparity, Array<float, 3> told) {
         for (Index n = 0; n < N; ++n) {
             closeness[n] = float(1 / (1 + std::hypot(down(n), across(n))));
             carry(sources.disparity[n], sources.corners[n], down(n), across(n), nearest.array()[n], origin.array()[n]);
@@ -51,28 +50,24 @@ struct Fusion {
                 for (Index n = 0; n < N; ++n) maps[n] = shown(n, y, x);
                 const float best = best_disparity(y, x);
                 // mean of the maps that agree with the best
-                float total = 0, belief = 0, weight = 0, sums[3] = {};
+                float total = 0, weight = 0, *sums = std::fill_n(told.at(y, x), C, 0.0f) - C;
                 for (const Shown &map : maps) {
                     if (!(map.disparity > EMPTY) || std::abs(map.disparity - best) > TOLERANCE) continue;
                     total += map.weight * (map.disparity - best);
-                    belief += map.weight * map.confidence;
                     weight += map.weight;
                     // errors of one light field's maps are correlated, so the mean is no surer than each map
-                    for (Index k = 0; map.bars && k < 3; ++k) sums[k] += map.weight * map.bars[k];
+                    for (Index k = 0; k < C; ++k) sums[k] += map.weight * map.told[k];
                 }
                 disparity(y, x) = weight > 0 ? best + total / weight : EMPTY;
-                confidence(y, x) = weight > 0 ? belief / weight : 0;
-                for (Index k = 0; sources.bars.shape[0] > 0 && k < 3; ++k) bars(y, x, k) = weight > 0 ? sums[k] / weight : 0;
+                for (Index k = 0; k < C; ++k) sums[k] = weight > 0 ? sums[k] / weight : 0;
             }
         }
     }
 
     Shown shown(Index n, Index y, Index x) const {
         const std::int32_t pixel = origin.array()(n, y, x);
-        const Index row = pixel / std::int32_t(W), column = pixel % std::int32_t(W);
-        const float believed = pixel >= 0 ? sources.confidence(n, row, column) : 0;
-        const float *bars = pixel >= 0 && sources.bars.shape[0] > 0 ? sources.bars.at(n, row, column) : nullptr;
-        return {nearest.array()(n, y, x), believed, closeness[n] * (LEAST_WEIGHT + believed), bars};
+        const float *told = pixel >= 0 ? sources.told.at(n, pixel / W, pixel % W) : nullptr;
+        return {nearest.array()(n, y, x), closeness[n] * (LEAST_WEIGHT + (told ? *told : 0)), told};
     }
 
     // The disparity with most votes, if maps differ.
@@ -133,22 +128,17 @@ void extend_background(double v, double u, Array<float, 2> disparity, Array<bool
     }
 }
 
-// Maps (V, H, W) of views with baselines (V, 2), bars (V, H, W, 3) if the sources have them, and mask of pixels that no
+// Maps (V, H, W) of views with baselines (V, 2), what the sources tell of them (V, H, W, C), and mask of pixels that no
 // source shows, filled with the background.
-void maps_of_views(const Sources &sources, Array<const double, 2> baselines, Array<float, 3> disparity, Array<float, 3> confidence, Array<float, 4> bars,
-                   Array<bool, 3> extended) {
+void maps_of_views(const Sources &sources, Array<const double, 2> baselines, Array<float, 3> disparity, Array<float, 4> told, Array<bool, 3> extended) {
     parallel_for(0, baselines.shape[0], [&](Index view) {
         const double v = baselines(view, 0), u = baselines(view, 1);
-        Fusion{sources, v, u}.fuse(disparity[view], confidence[view], bars[view]);
+        Fusion{sources, v, u}.fuse(disparity[view], told[view]);
         // gaps lie along the baseline from the reference view, whose map covers most of the view
         extend_background(v, u, disparity[view], extended[view]);
     });
 }
 
-const Submodule submodule("all_views", [](Kernels &m) {
-    m.attr("EMPTY") = EMPTY;
-    m.def("maps_of_views", &maps_of_views);
-});
+const Submodule submodule("all_views", {{"EMPTY", EMPTY}, {"maps_of_views", &maps_of_views}});
 
-}  // namespace
 }  // namespace sepi::all_views

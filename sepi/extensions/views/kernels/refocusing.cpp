@@ -2,7 +2,6 @@
 #include "kernels/kernel.hpp"
 
 namespace sepi::refocusing {
-namespace {
 
 // Largest box in pixels; views farther apart show a point more than once.
 constexpr float WIDEST = 17;
@@ -96,11 +95,6 @@ void fill_between(Array<const float, 3> sheared, Array<const float, 2> surfaces,
     });
 }
 
-const Submodule submodule("refocusing", [](Kernels &m) {
-    m.attr("WIDEST") = WIDEST;
-    m.def("add_view", &add_view);
-    m.def("fill_between", &fill_between);
-});
+const Submodule submodule("refocusing", {{"WIDEST", WIDEST}, {"add_view", &add_view}, {"fill_between", &fill_between}});
 
-}  // namespace
 }  // namespace sepi::refocusing
