@@ -25,7 +25,7 @@ _MORE, _ERRORS = 0.12, 6.0
 _EDGE = 8.0
 # errors at block borders up to which matching does better without noise, colours in 0..1; strength of the noise
 # relative to the errors beyond them, since a border shows only what differs between blocks, in the mean of the channels
-BORNE, _STRENGTH = 1.5 / 255, 2.2
+_BORNE, _STRENGTH = 1.5 / 255, 2.2
 
 
 def coding_error(light_field: LightField) -> float:
@@ -110,4 +110,4 @@ def without_blocks(light_field: LightField) -> LightField:
 
 def _noise_of(error: float) -> float:
     """Standard deviation of the noise that hides errors of a coder."""
-    return _STRENGTH * float(np.sqrt(max(error**2 - BORNE**2, 0)))
+    return _STRENGTH * float(np.sqrt(max(error**2 - _BORNE**2, 0)))

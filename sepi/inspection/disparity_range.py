@@ -13,18 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from sepi.errors import SepiError, warn
 from sepi.image.noise import noise_of_reference_view
 from sepi.inspection.coarse_sweep import agreeing, coarse_sweep, dark_corners
-from sepi.inspection.coded_views import BORNE, coding_error
-from sepi.inspection.view_layouts import HIGH_PASS, Baseline, Views
-from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, require_light_field
+from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float, require_light_field
 
 # Search: pixels per view step to each side, and at most this share of a view
 _WIDEST = 128.0
@@ -35,11 +31,15 @@ _MOST_MOVEMENT_PART = 0.25
 _SAMPLING = 0.5
 # number of views if there is no cross of them
 _MOST_VIEWS = 16
+# views much darker than the reference view are skipped
+_LEAST_BRIGHTNESS = 0.3
 # larger pictures are reduced by a whole factor; those that are searched by a larger one
 _MOST_PIXELS = 600_000
 _MOST_SEARCHED = 100_000
 
-# half width of the matching window, pixels
+# Filters, pixels: against noise, against differences of brightness between views; matching window
+_BLUR_SIGMA = 0.8
+_HIGH_PASS = 9
 _RADIUS = 3
 # window of the median of disparities
 _MEDIAN = 5
@@ -53,6 +53,11 @@ _MOST_AMBIGUITY = 0.8
 # blocks, edges of blocks that match any other block's (full range = 1)
 _FLAT = 1e-3
 _FLAT_BLOCKS = 3e-3
+# side of these blocks; least ratio of differences across their edges to those inside; differences above the last, full
+# range = 1, belong to the scene
+_BLOCK = 8
+_BLOCKINESS = 1.9
+_FAINT = 4 / 255
 # window, and least number of its pixels that agree within a candidate step
 _SUPPORT_WINDOW = 5
 _LEAST_SUPPORT = 13
@@ -74,6 +79,10 @@ _TEXTURE = 0.003
 _MISFIT = 0.9
 _HOLE = 5
 _MOST_UNMATCHED = 0.08
+
+# row and column of a view in the grid
+_Position = tuple[int, int]
+_Positions = list[_Position]
 
 
 def estimate_range(light_field: LightField) -> DisparityRange:
@@ -177,17 +186,18 @@ def unmatched(light_field: LightField) -> float:
     known = light_field.require_disparity_range()
     views = _Views(light_field, _MOST_SEARCHED)
     reach = views.reach(max(-known.minimum, known.maximum))
-    baselines = views.chosen(reach, [reach])
+    positions = views.positions(reach, [reach])
     # a lowest cost at an end of the candidates is no match
     step = _SAMPLING * views.factor / reach
     candidates = views.candidates(reach, known.minimum - step, known.maximum + step, _SAMPLING)
     # a pixel hidden from the views on one side is seen on the other
-    sides = filter(None, ([at for at in baselines if (sum(at) < 0) == before] for before in (True, False)))
+    before = {place for place in positions if sum(place) < sum(light_field.reference_position)}
+    sides = filter(None, (sorted(before), sorted({*positions} - before)))
     cost = np.minimum.reduce([views.sweep(side, candidates, truncation=math.inf)[0] for side in sides])
-    texture = cv2.blur(abs(views.detail((0, 0))), (2 * _RADIUS + 1, 2 * _RADIUS + 1))
+    texture = cv2.blur(abs(views.reference), (2 * _RADIUS + 1, 2 * _RADIUS + 1))
     # the mean absolute value of filtered noise is a quarter of its standard deviation
     textured = views.seen & (texture > max(_TEXTURE, noise_of_reference_view(light_field) / views.factor))
-    y, x = np.ceil(abs(views.offsets(baselines)).max(axis=0) * abs(candidates).max()).astype(int) + _RADIUS
+    y, x = np.ceil(abs(views.offsets(positions)).max(axis=0) * abs(candidates).max()).astype(int) + _RADIUS
     counted = textured[y:-y, x:-x]
     if not counted.any():
         return 0.0
@@ -196,34 +206,37 @@ def unmatched(light_field: LightField) -> float:
     return float(cv2.morphologyEx(alone, cv2.MORPH_OPEN, np.ones((_HOLE, _HOLE), np.uint8)).sum() / counted.sum())
 
 
-class _Views(Views):
-    """The views about the reference view; disparities are in reduced pixels."""
+class _Views:
+    """The reference view and others, filtered, reduced by a whole factor; disparities are in reduced pixels."""
 
     def __init__(self, light_field: LightField, most_pixels: int) -> None:
-        super().__init__(light_field, most_pixels, light_field.reference_position)
-        self.light_field, view = light_field, light_field.reference_view
-        self.seen = ~dark_corners(view, self.shape, HIGH_PASS + _RADIUS)
+        self.light_field = light_field
+        self.factor = math.ceil(math.sqrt(math.prod(light_field.shape) / most_pixels))
+        self._prepared: dict[_Position, FloatMap] = {}
+        self._own = light_field.reference_position
+        self._brightness = float(light_field.reference_view.mean())
+        self.reference = self._view(self._own)
+        self.seen = ~dark_corners(light_field.reference_view, self.reference.shape, _HIGH_PASS + _RADIUS)
+        view = light_field.reference_view
         brightest = float(np.quantile(np.max(cv2.split(view), axis=0), 0.99))
-        self._flat = max(_FLAT * brightest, _FLAT_BLOCKS if coding_error(light_field) > BORNE else 0.0)
-        away = [_distance(baseline) for baseline in self.baselines]
-        self.nearest, self._farthest = min(away), max(away)
-
-    def _in_grey(self, colours: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        # the mean has less noise
-        return cv2.transform(colours, np.full((1, 3), 1 / 3))
+        self._flat = max(_FLAT * brightest, _FLAT_BLOCKS if _has_blocks(view) else 0.0)
+        away = abs(np.argwhere(light_field.present) - self._own).max(axis=1)
+        self.nearest, self._farthest = int(away[away > 0].min()), int(away.max())
 
     def reach(self, disparity: float) -> int:
         """Rows or columns to the farthest views in which a disparity does not move a pixel too far."""
         movement = min(_MOST_MOVEMENT * self.factor, _MOST_MOVEMENT_PART * min(self.light_field.shape))
         return int(max(self.nearest, min(self._farthest, movement / max(disparity, 1e-3))))
 
-    def chosen(self, reach: int, distances: Sequence[int]) -> list[Baseline]:
-        """Baselines to views in the row and the column of the reference view; to any others without those."""
-        near = [baseline for baseline in self.baselines if _distance(baseline) <= reach]
-        cross = [baseline for baseline in near if 0 in baseline]
+    def positions(self, reach: int, distances: Sequence[int]) -> _Positions:
+        """Grid positions in the row and the column of the reference view; any others without those."""
+        t0, s0 = self._own
+        places = [(int(t), int(s)) for t, s in np.argwhere(self.light_field.present)]
+        present = [(t, s) for t, s in places if 0 < max(abs(t - t0), abs(s - s0)) <= reach]
+        cross = [(t, s) for t, s in present if t == t0 or s == s0]
         if len(cross) < 2:
-            return self.worth_matching(near[:: math.ceil(len(near) / _MOST_VIEWS)])
-        return self.worth_matching([baseline for baseline in cross if _distance(baseline) in distances] or cross)
+            return self._bright(present[:: math.ceil(len(present) / _MOST_VIEWS)])
+        return self._bright([(t, s) for t, s in cross if max(abs(t - t0), abs(s - s0)) in distances] or cross)
 
     def candidates(self, reach: int, low: float, high: float, sampling: float) -> FloatMap:
         """Disparities from low to high, ``sampling`` pixels apart in views ``reach`` steps away."""
@@ -231,32 +244,34 @@ class _Views(Views):
         numbers = np.arange(math.floor(low / self.factor / sampling), math.ceil(high / self.factor / sampling) + 1)
         return (numbers * sampling).astype(np.float32)
 
-    def offsets(self, baselines: list[Baseline], own: Baseline = (0, 0)) -> FloatMap:
-        """Baselines (V, 2) in view steps from a view, the reference view unless given, to others."""
-        return np.asarray(self.in_steps(baselines) - self.in_steps([own]), np.float32)
+    def offsets(self, positions: _Positions, own: _Position | None = None) -> FloatMap:
+        """Baselines (V, 2) from a view, the reference view unless given, to others."""
+        baselines = self.light_field.baselines
+        return np.asarray(baselines[tuple(np.transpose(positions))] - baselines[own or self._own], np.float32)
 
     def sweep(
-        self, baselines: list[Baseline], candidates: FloatMap, own: Baseline = (0, 0), truncation: float = _TRUNCATION
+        self, positions: _Positions, candidates: FloatMap, own: _Position | None = None, truncation: float = _TRUNCATION
     ) -> tuple[FloatMap, FloatMap, FloatMap, FloatMap]:
         """Match a view, the reference view unless given, with others (:func:`coarse_sweep`)."""
-        views, offsets = np.stack(self.details(baselines)), self.offsets(baselines, own)
-        return coarse_sweep(self.detail(own), views, offsets, candidates, truncation, _RADIUS)
+        views = np.stack([self._view(position) for position in positions])
+        offsets = self.offsets(positions, own)
+        return coarse_sweep(self._view(own or self._own), views, offsets, candidates, truncation, _RADIUS)
 
     def ends(self, reach: int, low: float, high: float, sampling: float) -> tuple[float, float, float]:
         """Lowest and highest trusted disparity, from views at most ``reach`` away, and movement of most pixels."""
-        baselines = self.chosen(reach, [max(1, round(reach * n / 4)) for n in range(1, 5)])
+        positions = self.positions(reach, [max(1, round(reach * n / 4)) for n in range(1, 5)])
         candidates = self.candidates(reach, low, high, sampling)
-        lowest, second, mean, disparity = self.sweep(baselines, candidates)
+        lowest, second, mean, disparity = self.sweep(positions, candidates)
         # neighbours agree within a pixel of the farthest view, for any sampling
         tolerance = max(sampling, 1) / reach
         trusted = _trusted(lowest, second, mean, disparity, tolerance, self._flat) & self.seen
-        if len(baselines) <= _FEW_VIEWS:
-            trusted &= self._matches_back(baselines, candidates, disparity, tolerance)
+        if len(positions) <= _FEW_VIEWS:
+            trusted &= self._matches_back(positions, candidates, disparity, tolerance)
         # against noise, which would stretch the range
         smooth = np.asarray(cv2.medianBlur(disparity, _MEDIAN), np.float32)
         # with few views, an unclear match counts less
         unclear = np.divide(lowest, second, out=np.ones_like(lowest), where=trusted)
-        pixels, patches = _patches(trusted, np.minimum(1, len(baselines) * (1 - unclear)) ** 2, smooth, tolerance)
+        pixels, patches = _patches(trusted, np.minimum(1, len(positions) * (1 - unclear)) ** 2, smooth, tolerance)
         if pixels.size < _FEWEST_PIXELS:
             raise SepiError(
                 f"{self.light_field.name}: the disparity range cannot be estimated: too few pixels match between the "
@@ -268,20 +283,54 @@ class _Views(Views):
         low, high, usual = (self.factor * float(value) for value in found)
         return low, high, usual
 
-    def _matches_back(
-        self, baselines: list[Baseline], candidates: FloatMap, disparity: FloatMap, tolerance: float
-    ) -> BoolMap:
+    def _matches_back(self, places: _Positions, candidates: FloatMap, disparity: FloatMap, tolerance: float) -> BoolMap:
         """Whether the first other view, matched with all others, has the same disparity there; shape (H, W)."""
-        first, *others = baselines
-        back = self.sweep([(0, 0), *others], candidates, first)[-1]
+        first, *others = places
+        back = self.sweep([self._own, *others], candidates, first)[-1]
         down, across = self.offsets([first])[0]
         y, x = np.indices(disparity.shape, np.float32)
         there = cv2.remap(back, x - disparity * across, y - disparity * down, cv2.INTER_NEAREST, borderValue=math.inf)
         return np.asarray(abs(there - disparity) < tolerance)
 
+    def _bright(self, positions: _Positions) -> _Positions:
+        """Positions of views that are not much darker than the reference view; all if these are too few."""
+        views = self.light_field.rgb_views
+        limit = _LEAST_BRIGHTNESS * float(views[self._own].mean())
+        bright = [position for position in positions if float(views[position].mean()) >= limit]
+        return bright if len(bright) > 1 else positions
 
-def _distance(baseline: Baseline) -> int:
-    return max(map(abs, baseline))
+    def _view(self, position: _Position) -> FloatMap:
+        if position not in self._prepared:
+            colours = as_unit_float(self.light_field.rgb_views[position])
+            view = np.asarray(np.mean(cv2.split(colours), axis=0), np.float32)
+            # as bright as the reference view, since lenses darken views at the border of the grid
+            mean = float(view.mean())
+            if position != self._own and mean > 0:
+                view *= np.float32(self._brightness / mean)
+            self._prepared[position] = _prepared(view, self.factor)
+        return self._prepared[position]
+
+
+def _prepared(grey: FloatMap, factor: int) -> FloatMap:
+    """Reduced, high-pass filtered grey picture, (H, W) float32."""
+    if factor > 1:
+        size = (max(1, grey.shape[1] // factor), max(1, grey.shape[0] // factor))
+        grey = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), np.float32)
+    smooth = cv2.GaussianBlur(grey, (0, 0), _BLUR_SIGMA)
+    return np.asarray(smooth - cv2.blur(smooth, (_HIGH_PASS, _HIGH_PASS)), np.float32)
+
+
+def _has_blocks(view: FloatMap) -> bool:
+    """Whether strong JPEG compression left its blocks in a picture, (H, W, 3)."""
+    grey = np.mean(cv2.split(view), axis=0)
+    ratios = []
+    for picture in (grey, grey.T):
+        faint = np.minimum(abs(np.diff(picture, axis=1)), _FAINT).mean(axis=0)
+        edges = np.arange(faint.size) % _BLOCK == _BLOCK - 1
+        if not edges.any():
+            return False
+        ratios.append(float(faint[edges].mean()) / max(float(faint[~edges].mean()), 1e-6))
+    return min(ratios) > _BLOCKINESS
 
 
 def _trusted(

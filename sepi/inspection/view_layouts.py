@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -33,7 +33,7 @@ Baseline = tuple[int, int]
 _MOST_PIXELS = 300_000
 _LEAST_SIDE = 16
 _BLUR_SIGMA = 0.8
-HIGH_PASS = 9
+_HIGH_PASS = 9
 
 # Baselines to the views that are tried first, and how many views; movement in the most distant of them, pixels, that is
 # searched, and its spacing; reductions that reach disparities beyond that
@@ -60,23 +60,21 @@ _LEAST_TEXTURE = 1.5
 
 
 class Views:
-    """The views about one of them, reduced and filtered when they are first asked for.
+    """The views about the middle of the grid, reduced and filtered when they are first asked for.
 
-    ``middle`` is the position of that view, by default in the middle of the grid. ``baselines`` lead from it to each
-    other one that is present, in rows and columns. ``factor`` is what larger pictures are reduced by, ``shape`` their
-    height and width then, in pixels.
+    ``middle`` is the position of the view in the middle, ``baselines`` lead from it to each other one that is present,
+    in rows and columns. ``factor`` is what larger pictures are reduced by, ``shape`` their height and width then, in
+    pixels.
     """
 
-    def __init__(
-        self, light_field: LightField, most_pixels: int = _MOST_PIXELS, middle: tuple[int, int] | None = None
-    ) -> None:
+    def __init__(self, light_field: LightField, most_pixels: int = _MOST_PIXELS) -> None:
         self._views = light_field.rgb_views
         self.factor = _reduction(light_field, most_pixels)
         self._grey: dict[tuple[int, int, int], FloatMap] = {}
         self._detail: dict[tuple[int, int, int], FloatMap] = {}
         positions = np.argwhere(light_field.present)
         distance = abs(positions - np.array(light_field.grid) // 2).sum(axis=1)
-        t0, s0 = self.middle = middle or tuple(map(int, positions[distance.argmin()]))
+        t0, s0 = self.middle = tuple(map(int, positions[distance.argmin()]))
         self.baselines: list[Baseline] = [
             (int(t) - t0, int(s) - s0) for t, s in positions if (int(t), int(s)) != self.middle
         ]
@@ -147,19 +145,16 @@ class Views:
             factor *= self.factor
             size = (max(1, view.shape[1] // factor), max(1, view.shape[0] // factor))
             reduced = cv2.resize(view, size, interpolation=cv2.INTER_AREA) if factor > 1 else view
-            grey = as_unit_float(self._in_grey(reduced))
+            grey = as_unit_float(cv2.cvtColor(reduced, cv2.COLOR_RGB2GRAY))
             self._grey[key] = np.asarray(cv2.GaussianBlur(grey, (0, 0), _BLUR_SIGMA), np.float32)
         return self._grey[key]
-
-    def _in_grey(self, colours: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        return cv2.cvtColor(colours, cv2.COLOR_RGB2GRAY)
 
     def detail(self, baseline: Baseline, factor: int = 1) -> FloatMap:
         """The same, high-pass filtered: differences of brightness between views do not count."""
         key = (*baseline, factor)
         if key not in self._detail:
             grey = self.plain(baseline, factor)
-            self._detail[key] = np.asarray(grey - cv2.blur(grey, (HIGH_PASS, HIGH_PASS)), np.float32)
+            self._detail[key] = np.asarray(grey - cv2.blur(grey, (_HIGH_PASS, _HIGH_PASS)), np.float32)
         return self._detail[key]
 
 
