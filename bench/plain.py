@@ -16,9 +16,10 @@ from scipy import ndimage
 
 from bench.measure import Figures, Prepared
 from sepi.image.noise import residual_variance
+from sepi.image.texture import variance_within_surface
 from sepi.io.hdf5 import read_light_field
 from sepi.lightfield import FloatMap, LightField, as_unit_float
-from sepi.matching.plane_sweep import SweepParameters, sweep
+from sepi.matching.plane_sweep import TEXTURE_SHARE, SweepParameters, sweep
 
 Warp = Callable[[FloatMap, float, float], FloatMap]
 """Function of a view ``(H, W, C)`` and an offset down and across to the moved view; any values outside."""
@@ -72,7 +73,8 @@ def plain_sweep(light_field: LightField, parameters: SweepParameters, warp: Warp
     views = as_unit_float(light_field.rgb_views)
     reference_view = light_field.reference_view
     noise = residual_variance(reference_view)
-    weights = _window_weights(reference_view, parameters.window_radius, parameters.window_sigma**2 + noise)
+    variance = variance_within_surface(reference_view, parameters.window_sigma**2 + noise, TEXTURE_SHARE)
+    weights = _window_weights(reference_view, parameters.window_radius, variance)
     scale2 = np.float32(parameters.scale**2 + noise)
     lowest = np.full(light_field.shape, np.inf, np.float32)
     best = np.zeros(light_field.shape, np.float32)
@@ -106,13 +108,13 @@ def _candidate_cost(
     return total, number
 
 
-def _window_weights(reference_view: FloatMap, radius: int, variance: float) -> FloatMap:
+def _window_weights(reference_view: FloatMap, radius: int, variance: FloatMap) -> FloatMap:
     """Weights of each pixel's window, (H, W, 2 r + 1, 2 r + 1), zero outside the picture."""
     squared = sum(
         (_windows(channel, radius, np.inf) - channel[..., None, None]) ** 2
         for channel in reference_view.transpose(2, 0, 1)
     )
-    weights = np.exp(-0.5 * squared / np.float32(variance))
+    weights = np.exp(-0.5 * squared / variance[..., None, None])
     return np.asarray(weights / weights.sum(axis=(2, 3), keepdims=True), np.float32)
 
 

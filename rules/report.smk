@@ -48,7 +48,7 @@ for plan in PLANS.values():
         params:
             results=placed(RESULTS),
             tables=folder_of_output,
-            charts=placed(CHARTS),
+            charts=lambda wildcards: placed(CHARTS),
             code=code_digest("sepi.report.tables"),
         message:
             "numbers, tables and charts of the report"
