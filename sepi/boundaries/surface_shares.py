@@ -37,8 +37,8 @@ _ACROSS = 64
 _MOST_DIFFERENCE = 0.1
 """Of one channel in a view's residual, colours in 0..1."""
 
-BYTES_PER_PIXEL = 4
-"""Of a pixel of a view: the z-buffer."""
+BYTES_PER_PIXEL, MOST_BYTES = 4, 2**26
+"""Of a pixel of a view: the z-buffer; and of a band, which fits where the sweep's costs were."""
 
 
 class ShareCosts(NamedTuple):
@@ -102,7 +102,7 @@ def share_costs(
     height, width = light_field.shape
     layer, wanted = _more_distant_layer(disparity, rim, views.margin, moved)
     background = np.zeros((height, width, 4), np.float32)
-    for begin, end, rows in row_bands(light_field, present, farthest, BYTES_PER_PIXEL, rows_moved):
+    for begin, end, rows in row_bands(light_field, present, farthest, BYTES_PER_PIXEL, rows_moved, MOST_BYTES):
         nearest = nearest_surfaces(light_field, around.nearest, present, rows)
         views = views._replace(nearest=nearest, low=rows.low)
         first, last = max(0, begin - rows_moved), min(height, end + rows_moved)

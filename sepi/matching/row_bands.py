@@ -32,7 +32,12 @@ class Band(NamedTuple):
 
 
 def row_bands(
-    light_field: LightField, present: BoolMap, reach: float, bytes_per_pixel: int, beside: int = 0
+    light_field: LightField,
+    present: BoolMap,
+    reach: float,
+    bytes_per_pixel: int,
+    beside: int = 0,
+    most_bytes: float = math.inf,
 ) -> list[Band]:
     """The bands in which a light field is processed.
 
@@ -47,6 +52,8 @@ def row_bands(
         Memory for each pixel of each view of a band.
     beside : int
         Rows above and below a band that its computation reads.
+    most_bytes : float
+        For a band, even where there is more memory.
 
     Returns
     -------
@@ -55,7 +62,8 @@ def row_bands(
     """
     height, width = light_field.shape
     moved = _rows_moved(light_field, present, reach) + beside
-    fitting = band_bytes_of(light_field) // max(1, bytes_per_pixel * width * int(present.sum()))
+    memory = min(band_bytes_of(light_field), most_bytes)
+    fitting = int(memory // max(1, bytes_per_pixel * width * int(present.sum())))
     number = 1 if fitting >= height else math.ceil(height / max(FEWEST_ROWS, fitting - 2 * moved))
     ends = [round(height * i / number) for i in range(number + 1)]
     return [Band(begin, end, Rows(max(0, begin - moved), min(height, end + moved))) for begin, end in pairwise(ends)]
