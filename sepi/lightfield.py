@@ -258,6 +258,7 @@ class LightField:
         self._require_array("positions", self.positions, (rows, columns, 2), "fiu")
         self._require_array("ground_truth", self.ground_truth, self.shape, "fiu")
         for name, mask in self.masks.items():
+            require_type(f"{self.name}: mask {name}", mask, np.ndarray, "an array")
             self._require_array(f"mask {name}", mask, self.shape, "b")
         t, s = self.reference_position
         ends = f"rows go from 0 to {rows - 1}, columns from 0 to {columns - 1}"

@@ -131,7 +131,7 @@ def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryPara
     pixels = np.ascontiguousarray(light_field.views)
     lines = pixels.reshape(*pixels.shape[:3], -1)
     margin = np.float32(parameters.occlusion_margin)
-    nothing = np.empty((0, 0, 0, pixels.shape[3]), np.float32)
+    nothing = np.empty((0, 0, pixels.shape[3]), np.float32)
     return RimViews(lines, pixels.shape[4], units, places[alike], baselines[alike], nothing, 0, margin)
 
 

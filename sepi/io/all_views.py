@@ -81,8 +81,10 @@ def read_error_bars_at(path: Path, view: View | None = None) -> StageMaps | None
     if path.suffix.lower() not in (".h5", ".hdf5") or not path.is_file():
         return None
     with hdf5.open_hdf5(path) as file:
+        if not {"disparity", "confidence", *ERROR_BARS} <= set(file):
+            return None
         maps = hdf5.float_maps(path, file, place_in(path, file, view))
-    if not {"disparity", "confidence", *ERROR_BARS} <= set(maps) or maps["disparity"].ndim != 2:
+    if maps["disparity"].ndim != 2:
         return None
     if len({values.shape for values in maps.values()}) > 1:
         raise SepiError(f"{path}: damaged: error bars {maps[ERROR_BARS[0]].shape} do not fit the disparity")

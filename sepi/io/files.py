@@ -112,7 +112,7 @@ def atomic_folder(path: Path, *, replace: bool = False, add: bool = False) -> It
     SepiError
         If ``path`` exists and is not an empty folder, or cannot be made or written to, or the disk is full.
     """
-    path = path.resolve() if add or path.is_symlink() else path
+    path = Path(os.path.realpath(path)) if add or path.is_symlink() else path
     full = path.is_dir() and any(path.iterdir())
     if path.exists() and (not path.is_dir() or (full and not replace and not add)):
         raise SepiError(f"{path}: exists already; remove it or choose a folder that does not exist")

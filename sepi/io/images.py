@@ -185,10 +185,17 @@ def picture_header(path: Path) -> Header:
 
 
 def png_texts(path: Path) -> dict[str, str]:
-    """Text chunks of a PNG before its pixels, by key; empty if the file cannot be read or is not a PNG."""
-    with suppress(SepiError), _opened(path) as file, _pillow_class("Png")(file) as image:
-        return {key: text for key, text in image.info.items() if isinstance(text, str)}
-    return {}
+    """Uncompressed text chunks of a PNG by key; empty if the file cannot be read or is not a PNG."""
+    data, at, texts = b"", len(_PNG), {}
+    with suppress(OSError):
+        data = path.read_bytes() if path.is_file() else b""
+    while data.startswith(_PNG) and at + 12 <= len(data):
+        end = at + 8 + int.from_bytes(data[at : at + 4], "big")
+        if data[at + 4 : at + 8] == b"tEXt" and data[end : end + 4] == _checksum(data[at + 4 : end]):
+            key, _, text = data[at + 8 : end].decode("latin-1").partition("\0")
+            texts[key] = text
+        at = end + 4
+    return texts
 
 
 def _checksum(chunk: bytes) -> bytes:
@@ -289,7 +296,7 @@ def _pillow_form(plugin: str, file: IO[bytes], path: Path, size: int) -> _Form:
 
 
 def _pillow_class(plugin: str) -> Any:
-    # ``Image.open`` refuses images that are allowed here, with a limit for all threads
+    # ``Image.open`` and the class for WebP refuse images that are allowed here, with a limit for all threads
     return getattr(import_module(f"PIL.{plugin}ImagePlugin"), f"{plugin}ImageFile")
 
 
@@ -297,6 +304,18 @@ def _avif_form(file: IO[bytes], path: Path, size: int) -> _Form:
     # the box 'ispe' holds the size of the image
     _, _, box = file.read(4096).partition(b"ispe\0\0\0\0")
     return int.from_bytes(box[4:8], "big"), int.from_bytes(box[:4], "big")
+
+
+def _webp_form(file: IO[bytes], path: Path, size: int) -> _Form:
+    head = file.read(30)
+    if head[12:16] == b"VP8X":
+        width, height = (1 + int.from_bytes(head[at : at + 3], "little") for at in (24, 27))
+    elif head[12:16] == b"VP8L":
+        bits = int.from_bytes(head[21:25], "little")
+        width, height = 1 + bits % 2**14, 1 + (bits >> 14) % 2**14
+    else:
+        width, height = (int.from_bytes(head[at : at + 2], "little") % 2**14 for at in (26, 28))
+    return height, width
 
 
 def _tiff_form(file: IO[bytes], path: Path, size: int) -> _Form:
@@ -365,6 +384,6 @@ _KINDS = {
     "GIF": _Kind(b"GIF8", partial(_pillow_form, "Gif"), partial(_codec_pixels, "gif")),
     "JPEG 2000": _Kind(_JPEG_2000, partial(_pillow_form, "Jpeg2K"), partial(_codec_pixels, "jpeg2k")),
     "AVIF": _Kind(_AVIF, _avif_form, partial(_codec_pixels, "avif")),
-    "WebP": _Kind(b"RIFF", partial(_pillow_form, "WebP"), partial(_codec_pixels, "webp")),
+    "WebP": _Kind(b"RIFF", _webp_form, partial(_codec_pixels, "webp")),
     "PNM": _Kind((b"P2", b"P3", b"P5", b"P6"), _pnm_form, lambda _, data: pnm_pixels(data)),
 }

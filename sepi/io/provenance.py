@@ -51,13 +51,13 @@ class Origin:
     file_format : str or None
         The format, if it was given.
     digest : str
-        :func:`digest_of` the light field; empty in results of earlier versions.
+        :func:`digest_of` the light field.
     picture : ndarray, shape (H, W, C), or None
         The view.
     rectified : bool
         Whether the views were rectified.
     files : tuple of str
-        Names of all files of the result; empty in results of earlier versions.
+        Names of all files of the result.
     """
 
     scene: str

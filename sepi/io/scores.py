@@ -1,13 +1,10 @@
 """Score files of a scene's disparity maps, those of external methods among them.
 
-A score file has a group ``maps/NAME`` for each map. It holds ``scores``, JSON from protocol and region to scores, the
-signed error map ``error (H, W)``, and the masks ``regions/NAME (H, W)``, which all maps share and which are stored
-once. A map with error bars also has ``reliability (3, 10)``. If the scene has no ground truth, these groups are empty,
-and the root attribute ``ground_truth`` is False.
-
-A file of external maps has a group ``methods/NAME`` for each method, in the order of the configuration, with the
-attributes ``source``, ``problem`` and ``sha256``. If there is no problem it holds ``disparity (H, W)``, and the
-datasets of a score file if the scene has ground truth.
+A score file has a group in ``maps`` for each map, with its ``name`` as an attribute. It holds ``scores``, JSON from
+protocol and region to scores, the signed error map ``error (H, W)``, and the masks ``regions/NAME (H, W)``, which all
+maps share and which are stored once. A map with error bars also has ``reliability (3, 10)``. If the scene has no ground
+truth, these groups are empty, and the root attribute ``ground_truth`` is False. The maps of external methods have
+attributes ``source``, ``problem`` and ``sha256``, too, and ``disparity (H, W)`` if there is no problem.
 """
 
 from __future__ import annotations
@@ -117,8 +114,9 @@ def write_scores(path: Path, maps: Mapping[str, Evaluation], attributes: Mapping
         groups = file.create_group(_MAPS, track_order=True)
         shared: Mapping[str, h5py.Dataset] = {}
         for name, evaluation in maps.items():
-            # a slash would make nested groups; no label of a choice has a colon
+            # a slash would make nested groups
             group = groups.create_group(name.replace("/", ":"))
+            group.attrs["name"] = name
             _put_evaluation(group, evaluation, shared)
             shared = shared or dict(members(group.get("regions", {})))
 
@@ -136,7 +134,7 @@ def read_evaluations(
         If the file is missing, not a score file, or lacks one of the maps.
     """
     with open_hdf5(path, _KIND) as file:
-        groups = {stored.replace(":", "/"): group for stored, group in members(file[_MAPS])}
+        groups = {str(attribute(group, "name")): group for _, group in members(file[_MAPS])}
         for name in names or ():
             if name not in groups:
                 raise SepiError(f"{path}: no scores of '{name}'; it holds: {', '.join(groups) or 'none'}")

@@ -45,8 +45,8 @@ def nearest_surfaces(light_field: LightField, disparity: FloatMap | None, presen
     else:
         nearest = z_buffers(disparity, light_field.baselines[present], *rows)
     if light_field.missing is not None:
-        for view, missing in zip(nearest, light_field.missing[present], strict=True):
-            beside = cv2.dilate(missing.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        for view, (t, s) in zip(nearest, np.argwhere(present), strict=True):
+            beside = cv2.dilate(light_field.missing[t, s].astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
             view[beside[rows.low : rows.high]] = MISSING
     return nearest
 

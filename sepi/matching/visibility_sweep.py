@@ -73,7 +73,7 @@ BYTES_PER_PIXEL = 2 + 4
 
 
 FirstViews = Annotated[
-    int, Field(ge=2, description="least number of views for all maps but the last; spread evenly over the grid")
+    int, Field(ge=2, description="least number of views for all maps but the last; of a single row, 25 or all")
 ]
 
 
@@ -246,7 +246,7 @@ def occluded_in_any_view(
         nearest = z_buffers(disparity, baselines[present], *rows)
         if light_field.missing is not None:
             # where a view has no pixels, nothing in it can occlude
-            nearest[light_field.missing[present][:, rows.low : rows.high]] = EMPTY
+            nearest[light_field.missing[:, :, rows.low : rows.high][present]] = EMPTY
         asked = (present, baselines, nearest, rows.low, occlusion_margin)
         kernels.occluded_in_any_view(disparity, asked, begin, end, occluded)
     return occluded

@@ -128,7 +128,8 @@ def stage_times(runs: Runs) -> pd.DataFrame:
     rows = [(*pair, variant) for pair in runs.plan.pairs for variant in runs.plan.compared]
     columns = pd.MultiIndex.from_product([runs.times.columns, runs.plan.stages])
     found = runs.times.unstack("stage").reindex(index=rows, columns=columns).fillna(0.0)
-    return found.set_axis(pd.MultiIndex.from_tuples([("/".join(pair), variant) for *pair, variant in rows]))
+    scenes, variants = ["/".join(pair) for *pair, _ in rows], [variant for *_, variant in rows]
+    return found.set_axis(pd.MultiIndex.from_arrays([scenes, variants]))
 
 
 def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:

@@ -16,7 +16,7 @@ COMMAND = [sys.executable, "-c", "import sys; from sepi.cli.main import main; sy
 
 
 @pytest.mark.parametrize(
-    "limit", [420, 460, 500, 800, *(pytest.param(n, marks=pytest.mark.faults) for n in (400, 440, 480, 600, 700))]
+    "limit", [420, 460, 500, 700, *(pytest.param(n, marks=pytest.mark.faults) for n in (400, 440, 480, 600))]
 )
 @pytest.mark.real
 @pytest.mark.skipif(sys.platform != "linux", reason="needs a limit on the address space that is kept")

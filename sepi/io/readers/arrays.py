@@ -187,8 +187,9 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     if array.dtype.kind not in "iuf" or array.dtype.itemsize > 8:
         raise SepiError(f"{source}: values of type {array.dtype}; expected integers such as uint8, or floats in 0..1")
     given = axes or options.axes
-    # MATLAB drops axes of size 1 at the end
-    array = array.reshape(*array.shape, *[1] * (len(given or "") - array.ndim))
+    if given is not None and path.suffix.lower() == ".mat":
+        # MATLAB drops axes of size 1 at the end
+        array = array.reshape(*array.shape, *[1] * (min(len(given), 5) - array.ndim))
     letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
     # drop a batch axis of size 1
     array = array.reshape(array.shape[array.ndim - len(letters) :])
@@ -238,7 +239,8 @@ def _checked_axes(source: str, array: Array, text: str) -> str:
     letters = text.upper()
     if sorted(letters) not in map(sorted, _LAYOUTS):
         raise SepiError(f"{source}: --axes {text}: expected T, S, H and W once each, C for colours ({_AXES_HELP})")
-    if prod(array.shape[: array.ndim - len(letters)]) != 1:
+    spare = array.ndim - len(letters)
+    if spare < 0 or prod(array.shape[:spare]) != 1:
         raise SepiError(f"{source}: --axes {text} names {len(letters)} axes, the array has {array.ndim}: {array.shape}")
     return letters
 

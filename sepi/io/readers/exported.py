@@ -27,6 +27,7 @@ from sepi.io.readers.options import ReadOptions, in_grid, unarranged
 from sepi.io.readers.view_files import read_grid
 from sepi.io.result_files import require_target
 from sepi.lightfield import BoolMap, LightField
+from sepi.validation import require_known
 from sepi.validation.models import validated
 
 MANIFEST = "light_field.json"
@@ -60,6 +61,7 @@ def read_manifest(path: Path) -> Manifest:
         values = json.loads(path.read_bytes())
         if not isinstance(values, dict):
             raise ValueError("expected keys with values")
+        require_known(f"{path}: light field", values, Manifest.model_fields.keys() - _APART)
         known = validated(Manifest, values, f"{path}: light field")
         columns = len(known.views[0]) if known.views else 0
         for key, rows in (("views", known.views), ("positions", known.positions), ("missing", known.missing)):

@@ -78,18 +78,20 @@ def _arrays_of_version_5(path: Path) -> Arrays:
     found, holders = {}, []
     for order, name, parts, whole in _variables(path):
         if _is_real(order, parts):
-            found[name] = StoredArray(*_form(order, parts)[:2], partial(_values, path, order, whole, name))
+            found[name] = StoredArray(*_form(order, parts)[:2], partial(_values, path, order, whole, name, name))
         elif _flags(order, parts) & 0xFF in (_CELLS, _STRUCTURE):
             holders.append((order, whole, name))
     if not any(is_likely(one.shape) for one in found.values()):
-        inner = (one for order, whole, name in holders for one in _fields(order, whole(), name))
-        found |= {name: StoredArray(array.shape, array.dtype, partial(np.asarray, array)) for name, array in inner}
+        for order, whole, holder in holders:
+            for name, array in _fields(order, whole(), holder):
+                read = partial(_values, path, order, whole, holder, name)
+                found[name] = StoredArray(array.shape, array.dtype, read)
     return found
 
 
-def _values(path: Path, order: str, whole: Callable[[], memoryview], name: str) -> npt.NDArray[Any]:
+def _values(path: Path, order: str, whole: Callable[[], memoryview], holder: str, wanted: str) -> npt.NDArray[Any]:
     with reading(path, _KIND):
-        return next(array for _, array in _fields(order, whole(), name))
+        return next(array for name, array in _fields(order, whole(), holder) if name == wanted)
 
 
 def _form(order: str, parts: list[_Part]) -> tuple[tuple[int, ...], np.dtype[Any], np.dtype[Any]]:
