@@ -62,7 +62,21 @@ def test_a_third_of_the_views_leaves_out_no_row() -> None:
         assert chosen.sum() == count
         # of 13, one row and column are two off the middle on either side
         assert all((chosen.sum(axis=axis) > 0).sum() >= 7 for axis in (0, 1))
-    assert views_without_aliases(field, 9).sum() == 9
+
+
+@pytest.mark.parametrize("side", [5, 9, 17])
+def test_nine_views_repeat_no_more_than_all_and_turn_with_the_grid(side: int) -> None:
+    """Views of every second or fourth column repeat stripes as often; a lattice that leans turns into another."""
+    ring = views_without_aliases(LightField(np.zeros((side, side, 4, 4, 3), np.uint8), "grid"), 9)
+    assert ring.sum() == 9
+    np.testing.assert_array_equal(ring, np.rot90(ring))
+    assert np.gcd.reduce(np.argwhere(ring)[:, 1] - side // 2) == 1
+
+
+def test_a_single_row_keeps_enough_views() -> None:
+    """It has no other rows to tell a texture from its repetition."""
+    row = LightField(np.zeros((1, 51, 4, 4, 3), np.uint8), "row")
+    assert views_without_aliases(row, 9).sum() >= 25
 
 
 @pytest.mark.parametrize(("grid", "at_least"), [((9, 9), 41), ((17, 17), 41), ((17, 17), 25)])
