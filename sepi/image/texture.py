@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from sepi.image.noise import sum_of_channels
 from sepi.lightfield import FloatMap
@@ -10,7 +11,7 @@ RADIUS = 4
 """Of the windows in which texture is measured, pixels; weights fall as a normal distribution of 0.4 of it."""
 
 
-def variance_within_surface(image: FloatMap, least: float, share: float) -> FloatMap:
+def variance_within_surface(image: FloatMap, least: float, share: npt.ArrayLike) -> FloatMap:
     """Squared difference that two pixels of one surface may have: that of neighbours around, or more.
 
     In texture, neighbours differ all over a window; an edge between two plain surfaces fills a small part of one. Of
@@ -23,7 +24,7 @@ def variance_within_surface(image: FloatMap, least: float, share: float) -> Floa
         Colours in 0..1.
     least : float
         Least squared difference, summed over channels, such as that of noise.
-    share : float
+    share : float or ndarray, shape (H, W)
         Of the texture that counts.
 
     Returns
@@ -39,4 +40,4 @@ def variance_within_surface(image: FloatMap, least: float, share: float) -> Floa
         own[1:] += between
         own[:-1] += between
     plainest = cv2.erode(cv2.GaussianBlur(energy / 4, size, 0.4 * RADIUS), np.ones(size, np.uint8))
-    return np.asarray(np.maximum(np.float32(share) * plainest, np.float32(least)))
+    return np.asarray(np.maximum(np.asarray(share, np.float32) * plainest, np.float32(least)))

@@ -58,12 +58,13 @@ TEXTURE = 1.85
 In views without noise the measurement is of texture. In strong texture few pixels of a window have similar colours.
 """
 
-SHARE_AFTER_FIRST = 0.18
-"""Share of the texture around a pixel that widens its window after the first map, which needs all of it where texture
-repeats. More would join thin structures to what is behind them."""
-
-LIKELY_RADIUS, LIKELY_CANDIDATES = 8, 5
+AROUND, LIKELY_CANDIDATES = 8, 5
 """Radius of the window whose disparities are likely candidates, pixels, and the number of candidates beyond them."""
+
+STEP, SHARE_BESIDE_STEPS = 0.3, 0.18
+"""Where a map's disparities differ by this step within ``AROUND``, pixels per view step, and the share of the texture
+that widens a pixel's window there: more would join thin structures to what is behind them. Elsewhere all of it does, so
+that the colours of a repeated texture share a window."""
 
 BYTES_PER_CANDIDATE = 5
 """Per pixel: averaged costs, smoothed costs, and costs of a few rows."""
@@ -270,10 +271,12 @@ def _sweep(
     the map where that is ``refined``.
     """
     disparities = light_field.require_disparity_range().candidates(parameters.fewer(light_field, sampling))
-    likely = None if disparity is None else _likely_candidates(disparity, disparities)
+    likely, share = None, np.float32(1)
+    if disparity is not None:
+        likely, share = _likely_candidates(disparity, disparities)
     guide = guide_of(light_field, mean)
     least = variance_of_residuals(_contrast_of_surfaces(light_field))
-    contrast = variance_within_surface(guide, least, 1.0 if disparity is None else SHARE_AFTER_FIRST)
+    contrast = variance_within_surface(guide, least, share)
     shown = light_field.present
     if light_field.missing is not None:
         shown = shown & ~light_field.missing.all(axis=(2, 3))
@@ -339,10 +342,17 @@ def _visibility(
     )
 
 
-def _likely_candidates(disparity: FloatMap, candidates: FloatMap) -> npt.NDArray[np.int32]:
-    """First and last of the candidates near the map's disparities around each pixel; shape (2, H, W)."""
-    window = np.ones((2 * LIKELY_RADIUS + 1, 2 * LIKELY_RADIUS + 1), np.uint8)
-    numbers = (disparity - candidates[0]) / (candidates[1] - candidates[0])
-    first = np.ceil(cv2.erode(numbers, window) - LIKELY_CANDIDATES)
-    last = np.floor(cv2.dilate(numbers, window) + LIKELY_CANDIDATES)
-    return np.stack([first, last]).clip(0, len(candidates) - 1).astype(np.int32)
+def _likely_candidates(
+    disparity: FloatMap, candidates: FloatMap
+) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.float32]]:
+    """First and last of the candidates near the map's disparities around each pixel, and what texture widens windows.
+
+    Shapes (2, H, W) and (H, W).
+    """
+    window = np.ones((2 * AROUND + 1, 2 * AROUND + 1), np.uint8)
+    lowest, highest = cv2.erode(disparity, window), cv2.dilate(disparity, window)
+    step = candidates[1] - candidates[0]
+    first = np.ceil((lowest - candidates[0]) / step - LIKELY_CANDIDATES)
+    last = np.floor((highest - candidates[0]) / step + LIKELY_CANDIDATES)
+    share = np.where(highest - lowest < STEP, np.float32(1), np.float32(SHARE_BESIDE_STEPS))
+    return np.stack([first, last]).clip(0, len(candidates) - 1).astype(np.int32), share
