@@ -41,6 +41,7 @@ def repeated(grid: tuple[int, int], period: float, disparity: float, *, checks: 
         ("best", (17, 17), 7, 0.3, True),
         ("fast", (5, 5), 5, 0.5, False),
         ("best", (9, 9), 5, 0.5, False),
+        ("fast", (9, 9), 5, 0.5, False),
     ],
 )
 def test_a_texture_without_an_alias_in_the_range_is_found(variant, grid, period, disparity, checks) -> None:
