@@ -271,7 +271,8 @@ def _sweep(
     the map where that is ``refined``.
     """
     disparities = light_field.require_disparity_range().candidates(parameters.fewer(light_field, sampling))
-    likely, share = None, np.float32(1)
+    likely: npt.NDArray[np.int32] | None = None
+    share: npt.ArrayLike = 1
     if disparity is not None:
         likely, share = _likely_candidates(disparity, disparities)
     guide = guide_of(light_field, mean)
