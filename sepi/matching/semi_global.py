@@ -34,9 +34,6 @@ HALF_CONFIDENT = 0.05
 ENOUGH_VIEWS = 25
 """Number of views beyond which a mean cost does not improve: its remaining errors are common to all views."""
 
-BAND_BYTES = 2**24
-"""Bytes of both volumes in a band of rows; all paths finish a band before the next, so that it stays in the cache."""
-
 ROWS_AT_ONCE = 64
 """Rows of costs that are averaged together."""
 
@@ -207,8 +204,7 @@ class AveragedCosts:
         """
         parameters, disparities = self._parameters, self._disparities
         penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
-        band = max(1, BAND_BYTES * self._height // (2 * self._averaged.nbytes))
-        kernels.semi_global(self._averaged, self._colours, self._places, *penalties, band, self._smoothed)
+        kernels.semi_global(self._averaged, self._colours, self._places, *penalties, self._smoothed)
         same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))
         disparity, margin = np.empty((2, *self._colours.shape[1:]), np.float32)
         kernels.choose(self._smoothed, self._averaged, disparities, self._places, same, disparity, margin)

@@ -27,7 +27,7 @@ struct Share {
 
 // Share of a Laplace distribution about 0 that lies above x.
 [[gnu::always_inline]] inline Share laplace_above(double x, double width) {
-    const double half = 0.5 * double(exp_of_negative(-std::abs(x) / width));
+    const double half = 0.5 * double(exp_of_negative(float(-std::abs(x) / width)));
     return {x > 0 ? half : 1 - half, half / width};
 }
 
@@ -82,7 +82,7 @@ struct PixelErrors {
 
     // Expected absolute error.
     double expected(Index i) const {
-        const auto distance = [](double apart) { return apart + width(apart) * double(exp_of_negative(-apart / width(apart))); };
+        const auto distance = [](double apart) { return apart + width(apart) * double(exp_of_negative(float(-apart / width(apart)))); };
         const double other = share(i) * distance(above[i]) + (1 - share(i)) * distance(below[i]);
         return own(i) * scale[i] + outlier[i] * outlier_scale[i] + rim[i] * other;
     }

@@ -8,16 +8,6 @@ constexpr int ITERATIONS = 5;
 constexpr int MAX_ITERATIONS = 50;
 constexpr double TOLERANCE = 1e-3;
 
-// exp of numbers up to 0, within a few roundings; nearly 0 below -87.
-Float8 exp_of_negative(Float8 x) {
-    const Float8 n = whole(x * spread(1.44269504f));
-    // the logarithm of two in two parts: products of the first with n are exact
-    const Float8 f = fma(n, spread(-1.42860682e-6f), fma(n, spread(-0.693145752f), x));
-    Float8 p = spread(float(1.0 / 720));
-    for (const double term : {1.0 / 120, 1.0 / 24, 1.0 / 6, 0.5, 1.0, 1.0}) p = fma(f, p, spread(float(term)));
-    return p * Float8((__builtin_convertvector(larger(spread(-126), n), Int8) + 127) << 23);
-}
-
 // Colours and disparity of eight pixels.
 using Pixels = std::array<Float8, 4>;
 

@@ -1,11 +1,13 @@
 // Semi-global smoothing of a cost volume, after averaging over pixels of similar colour. Both volumes are 16-bit integers:
 // the candidates of a pixel are contiguous, padded to whole vectors, and pixel follows pixel.
+#include <atomic>
+
 #include "pixels.hpp"
 
 namespace sepi::semi_global {
 
-// Paths from row to row that a thread follows together, with contiguous costs that fit in its cache.
-constexpr Index PATHS_AT_ONCE = 32;
+constexpr int PATHS = 4;           // of one scan
+constexpr Index STRETCH = 64;      // pixels of a row after which the next row goes on
 
 constexpr float ONE = 65535;           // an averaged cost of 1
 constexpr Index AT_ONCE = 2 * LANES;   // candidates
@@ -23,12 +25,14 @@ struct Places {
     bool has_all(Index y, Index x) const { return beyond(y, x) - first(y, x) == count; }
 };
 
-// Smoothing of costs along paths, into out.
-struct Smoothing {
+// Two scans over the picture, down and up again. Each follows four paths: along the row, and from three pixels of the row
+// before. A scan counts rows and columns from where it begins. Rows are on several threads, each behind the row before.
+struct Scan {
     Array<const std::uint16_t, 1> cost;
     const Places &places;
     Array<const float, 3> guide;
     double small, large, weakening;
+    bool down;
     Array<std::uint16_t, 1> out;
 
     const Index K = places.count, H = guide.shape[1], W = guide.shape[2];
@@ -40,58 +44,86 @@ struct Smoothing {
         return bits;
     }();
 
+    // Of rows on the way: the paths' costs, their least, and the penalties of a change from the pixel before.
+    const Index rows = thread_count() + 1;
+    const Scratch<std::uint16_t, 4> paths = Scratch<std::uint16_t, 4>(rows, W, PATHS, K + 2).filled(MOST);
+    const Scratch<std::uint16_t, 3> least = Scratch<std::uint16_t, 3>(rows, W, PATHS), penalties = Scratch<std::uint16_t, 3>(rows, PATHS, W);
+    const Scratch<std::uint16_t, 1> none = zeros<std::uint16_t, 1>(K + 2);
+
     std::uint16_t in_steps(double penalty) const { return std::uint16_t(std::min<double>(MOST, penalty * (ONE / double(1 << shift)) + 0.5)); }
 
-    // Advance a path from (y - dy, x - dx): path[1:-1] = cost + best - least, which is added to out; returns its least.
-    // best is the least of: before at the same candidate, at an adjacent one plus small, and the least of all plus large,
-    // reduced where colours change. Candidates that a pixel does not have, and those at either end, are unreachable.
-    std::uint16_t next_pixel(Index y, Index x, Index dy, Index dx, std::uint16_t *before, std::uint16_t least, std::uint16_t *path) const {
-        const Index row = y - dy, column = x - dx;
-        double penalty = 0;
-        if (row < 0 || row >= H || column < 0 || column >= W) {
-            // before the first pixel, all candidates cost 0
-            std::fill_n(before + 1, K, 0);
-            least = 0;
-        } else {
-            float change = 0;
-            for (Index c = 0; c < 3; ++c) change += std::abs(guide(c, y, x) - guide(c, row, column));
-            penalty = std::max(small * 1.5, large / (1 + double(change) * weakening));
-        }
-        const Word16 whole = Word16{} + least, jump = whole + in_steps(penalty), step = Word16{} + in_steps(small), most = Word16{} + MOST;
-        const std::uint16_t *own = cost.data + places.origin(y, x);
-        std::uint16_t *sum = out.data + places.origin(y, x);
-        Word16 lowest = most;
-        if (!places.has_all(y, x)) std::fill_n(path, K + 2, MOST);
-        for (Index k = places.first(y, x); k < places.beyond(y, x); k += AT_ONCE) {
-            const Word16 beside = smaller(load_words(before + k), load_words(before + k + 2)) + step;
-            const Word16 best = smaller(smaller(load_words(before + k + 1), jump), beside);
-            const Word16 value = smaller((load_words(own + k) >> shift) + best - whole, most);
-            store(path + k + 1, value);
-            store(sum + k, load_words(sum + k) + ((value + 2) >> 2));
-            lowest = smaller(value, lowest);
-        }
-        return least_of(lowest);
-    }
+    Index row(Index i) const { return down ? i : H - 1 - i; }
+    Index column(Index j) const { return down ? j : W - 1 - j; }
 
-    // The paths along row y.
-    void along_row(Index y) const {
-        const auto paths = Scratch<std::uint16_t, 2>(2, K + 2).filled(MOST);
-        for (const Index dx : {1, -1}) {
-            std::uint16_t least = 0;
-            for (Index i = 0; i < W; ++i) least = next_pixel(y, dx > 0 ? i : W - 1 - i, 0, dx, paths.array().at((i + 1) % 2), least, paths.array().at(i % 2));
-        }
-    }
+    // By how many columns the pixel before is to the right, in the same row (path 0) or in the one before.
+    static Index beside(int path) { return path ? path - 2 : -1; }
 
-    // Paths from row to row in the rows begin..end: those that began in columns from first on.
-    // A path that leaves the picture at one side continues as a new one at the other, so that all have a pixel per row.
-    // paths (2, n, K' + 2) are their costs in the row before and here, in turn, least (n) the least of the row before.
-    void along_lines(Array<std::uint16_t, 3> paths, std::uint16_t *least, Index first, Index begin, Index end, Index dy, Index dx) const {
-        for (Index i = begin; i < end; ++i) {
-            for (Index line = 0; line < std::min(PATHS_AT_ONCE, W - first); ++line) {
-                const Index y = dy > 0 ? i : H - 1 - i, x = ((first + line + dx * i) % W + W) % W;
-                least[line] = next_pixel(y, x, dy, dx, paths.at((i + 1) % 2, line), least[line], paths.at(i % 2, line));
+    // Penalties of row i, reduced where colours change.
+    void weigh(Index i) const {
+        for (int path = 0; path < (i > 0 ? PATHS : 1); ++path) {
+            const Index y = row(i), v = row(path ? i - 1 : i), first = beside(path), right = down ? first : -first;
+            std::uint16_t *penalty = penalties.array().at(i % rows, path);
+            for (Index x = std::max<Index>(0, -right); x < std::min(W, W - right); ++x) {
+                float change = 0;
+                for (Index c = 0; c < 3; ++c) change += std::abs(guide(c, y, x) - guide(c, v, x + right));
+                penalty[x] = in_steps(std::max(small * 1.5, large / (1 + double(change) * weakening)));
             }
         }
+    }
+
+    // Go on from the pixels before (i, j): a path's cost is cost + best - least, where best is the least of: before at the
+    // same candidate, at an adjacent one plus small, and the least of all plus a penalty. Candidates that a pixel does not
+    // have, and those at either end, are unreachable. Before the first pixel, all cost 0. here and there are the places of
+    // this row and of the one before among the rows on the way.
+    void pixel(Index i, Index j, Index here, Index there) const {
+        const Index y = row(i), x = column(j);
+        std::uint16_t *own = paths.array().at(here, j);
+        const std::uint16_t *last[PATHS];
+        Word16 whole[PATHS], jump[PATHS], lowest[PATHS];
+        const Word16 step = Word16{} + in_steps(small), most = Word16{} + MOST;
+        for (int path = 0; path < PATHS; ++path) {
+            const Index u = j + beside(path), slot = path ? there : here;
+            const bool goes_on = u >= 0 && u < W && (i > 0 || path == 0);
+            last[path] = goes_on ? paths.array().at(slot, u, path) : none.array().data;
+            whole[path] = Word16{} + (goes_on ? least.array()(slot, u, path) : std::uint16_t(0));
+            jump[path] = whole[path] + (goes_on ? penalties.array()(here, path, x) : std::uint16_t(0));
+            lowest[path] = most;
+        }
+        if (!places.has_all(y, x)) std::fill_n(own, PATHS * (K + 2), MOST);
+        const std::uint16_t *costs = cost.data + places.origin(y, x);
+        std::uint16_t *sums = out.data + places.origin(y, x);
+        for (Index k = places.first(y, x); k < places.beyond(y, x); k += AT_ONCE) {
+            Word16 sum = down ? Word16{} : load_words(sums + k);
+            const Word16 added = load_words(costs + k) >> shift;
+            for (int path = 0; path < PATHS; ++path) {
+                const std::uint16_t *before = last[path] + k;
+                const Word16 adjacent = smaller(load_words(before), load_words(before + 2)) + step;
+                const Word16 best = smaller(smaller(load_words(before + 1), jump[path]), adjacent);
+                const Word16 value = smaller(added + best - whole[path], most);
+                store(own + path * (K + 2) + k + 1, value);
+                sum += (value + 2) >> 2;
+                lowest[path] = smaller(value, lowest[path]);
+            }
+            store(sums + k, sum);
+        }
+        for (int path = 0; path < PATHS; ++path) least.array()(here, j, path) = least_of(lowest[path]);
+    }
+
+    void run() const {
+        std::vector<std::atomic<Index>> done(H);
+        std::atomic<Index> next = 0;
+        parallel_for(0, thread_count(), [&](Index) {
+            for (Index i; (i = next++) < H;) {
+                const Index here = i % rows, there = (i + rows - 1) % rows;
+                weigh(i);
+                for (Index j = 0; j < W; ++j) {
+                    if (i > 0 && j % STRETCH == 0)
+                        for (Index so_far; (so_far = done[i - 1]) < std::min(W, j + STRETCH + 1);) done[i - 1].wait(so_far);
+                    pixel(i, j, here, there);
+                    if ((j + 1) % STRETCH == 0 || j + 1 == W) done[i] = j + 1, done[i].notify_one();
+                }
+            }
+        });
     }
 };
 
@@ -157,32 +189,10 @@ void aggregate(Array<const float, 3> cost, Index top, Array<const float, 3> guid
     });
 }
 
-// Sum of the smoothed costs along eight paths, into out; guide (3, H, W). All paths of a direction go through
-// band rows before any goes on, so that costs and sums come from memory once for the paths down and once for those up.
+// Sum of the smoothed costs along eight paths, into out; guide (3, H, W).
 void semi_global(Array<const std::uint16_t, 1> cost, Array<const float, 3> guide, const Places &places, double small, double large, double weakening,
-                 Index band, Array<std::uint16_t, 1> out) {
-    const Index H = guide.shape[1], W = guide.shape[2], K = places.count;
-    const Smoothing smoothing{cost, places, guide, small, large, weakening, out};
-    const Index pieces = (W + PATHS_AT_ONCE - 1) / PATHS_AT_ONCE;
-    for (const Index dy : {1, -1}) {
-        const auto paths = Scratch<std::uint16_t, 4>(3 * pieces, 2, PATHS_AT_ONCE, K + 2).filled(MOST);
-        const auto least = zeros<std::uint16_t, 2>(3 * pieces, PATHS_AT_ONCE);
-        for (Index begin = 0; begin < H; begin += band) {
-            const Index end = std::min(H, begin + band);
-            parallel_for(begin, dy > 0 ? end : begin, [&](Index y) {
-                for (Index x = 0; x < W; ++x)
-                    std::fill(out.data + places.origin(y, x) + places.first(y, x), out.data + places.origin(y, x) + places.beyond(y, x), 0);
-                smoothing.along_row(y);
-            });
-            for (const Index dx : {0, 1, -1}) {
-                // paths of one direction have no common pixels
-                parallel_for(0, pieces, [&](Index piece) {
-                    const Index number = (dx + 1) * pieces + piece;
-                    smoothing.along_lines(paths.array()[number], least.array().at(number), piece * PATHS_AT_ONCE, begin, end, dy, dx);
-                });
-            }
-        }
-    }
+                 Array<std::uint16_t, 1> out) {
+    for (const bool down : {true, false}) Scan{cost, places, guide, small, large, weakening, down, out}.run();
 }
 
 // Winner of each pixel, refined by a parabola, and by how much the averaged cost of other minima exceeds its own:
@@ -208,7 +218,7 @@ void choose(Array<const std::uint16_t, 1> smoothed, Array<const std::uint16_t, 1
 const Submodule submodule("semi_global", {
     {"AT_ONCE", AT_ONCE},
     {"ONE", ONE},
-    {"PATHS_AT_ONCE", PATHS_AT_ONCE},
+    {"STRETCH", STRETCH},
     {"aggregate", &aggregate},
     {"semi_global", &semi_global},
     {"choose", &choose},
