@@ -41,7 +41,10 @@ LEFT_OF_SLOPES = 15 / 128
 """Share of the variance of a central difference of white noise that the binomial filter of denoising leaves."""
 
 MOST_CONTRADICTED = 0.1
-"""Largest share of a region in which views may contradict its plane; beyond, the whole region loses the plane."""
+"""Largest share of a region, before it spreads, in which views may contradict its plane; beyond, it loses the plane."""
+
+ROUNDS, FEW_PLAIN = 3, 2.0
+"""Number of times that regions spread, and factor of the squared gradient up to which few pixels are plain."""
 
 NOISY_VIEWS = 25
 """Least number of noisy views to average: in the mean of fewer, noise hides texture."""
@@ -114,8 +117,8 @@ def fill_uniform_regions(
     mean = matching.mean(before.disparity)[..., :3]
     core = plain_pixels(mean, of_mean, parameters)
     # noise is measured; what rounding adds is supposed, and a single pixel may be plain by chance
-    uniform = uniform_regions(mean, core, of_mean, before.confidence, parameters, fewest=1 if noisy else 2)
-    found = _with_borders(uniform, before, parameters)
+    inner = uniform_regions(mean, core, of_mean, before.confidence, parameters, fewest=1 if noisy else 2)
+    found = _with_borders(spread_over_plain(mean, inner, of_mean, before.confidence, parameters), before, parameters)
     lit = _by_light(light_field, matching, before.disparity, found, variance, noisy) if parameters.light else {}
     known = light_field.require_disparity_range()
     planes = [
@@ -135,7 +138,7 @@ def fill_uniform_regions(
     against = contradicted(light_field, before.disparity, disparity, regions, *asked)
     for _, (place, pixels), chosen in known_planes:
         kept = pixels & against[place]
-        if kept.sum() > MOST_CONTRADICTED * pixels.sum():
+        if (kept & inner[place]).sum() > MOST_CONTRADICTED * (pixels & inner[place]).sum():
             kept = pixels
         elif noisy:
             kept |= kept_pixels(pixels, disparity[place], before.disparity[place], chosen)
@@ -201,6 +204,20 @@ def _by_light(
     return {n: plane for n, plane in zip(asked, told, strict=True) if plane is not None}
 
 
+def _squared_gradients(mean: FloatMap) -> FloatMap:
+    """Of central differences, across and down; shape (H, W)."""
+    across, down = (
+        cv2.Sobel(mean, -1, *axis, ksize=1, scale=0.5, borderType=cv2.BORDER_REPLICATE) for axis in ((1, 0), (0, 1))
+    )
+    return np.asarray(np.sum(cv2.split(down * down + across * across), axis=0))
+
+
+def _most_gradient(variance: float | FloatMap, parameters: UniformPlanesParameters) -> float | FloatMap:
+    """Mean squared gradient up to which pixels are plain."""
+    # central differences halve the variance; two axes, three channels
+    return parameters.noise_factor * 3 * variance
+
+
 def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: UniformPlanesParameters) -> BoolMap:
     """Pixels round which the mean of the views varies no more than its noise.
 
@@ -216,14 +233,25 @@ def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: Uniform
     -------
     ndarray, shape (H, W), bool
     """
-    # central differences, across and down
-    across, down = (
-        cv2.Sobel(mean, -1, *axis, ksize=1, scale=0.5, borderType=cv2.BORDER_REPLICATE) for axis in ((1, 0), (0, 1))
-    )
     size = 2 * parameters.window_radius + 1
-    energy = cv2.blur(np.sum(cv2.split(down * down + across * across), axis=0), (size, size))
-    # central differences halve the variance; two axes, three channels
-    return np.asarray(energy < parameters.noise_factor * 3 * variance)
+    return np.asarray(cv2.blur(_squared_gradients(mean), (size, size)) < _most_gradient(variance, parameters))
+
+
+def _alike(
+    mean: FloatMap,
+    region: BoolMap,
+    variance: float | FloatMap,
+    confidence: FloatMap,
+    parameters: UniformPlanesParameters,
+) -> tuple[BoolMap, FloatMap]:
+    """Pixels of the colour that the region has within reach, and how much of the reach the region fills."""
+    size = 2 * (parameters.window_radius + parameters.growth) + 1
+    near = cv2.blur(region.astype(np.float32), (size, size))
+    colour = cv2.blur(mean * region[..., None].astype(np.float32), (size, size)) / np.maximum(near, 1e-9)[..., None]
+    alike = np.sum(cv2.split((mean - colour) ** 2), axis=0) < 27 * variance + parameters.colour_tolerance**2
+    # half a pixel is more than the rounding errors of a running sum
+    alike &= (confidence < parameters.grow_confidence) & (near > 0.5 / size**2)
+    return np.asarray(alike), np.asarray(near * np.float32(size**2))
 
 
 def uniform_regions(
@@ -253,12 +281,44 @@ def uniform_regions(
     """
     if not core.any():
         return core
-    size = 2 * (parameters.window_radius + parameters.growth) + 1
-    near = cv2.blur(core.astype(np.float32), (size, size))
-    colour = cv2.blur(mean * core[..., None].astype(np.float32), (size, size)) / np.maximum(near, 1e-9)[..., None]
-    alike = np.sum(cv2.split((mean - colour) ** 2), axis=0) < 27 * variance + parameters.colour_tolerance**2
-    alike &= confidence < parameters.grow_confidence
-    # half a pixel is more than the rounding errors of a running sum
-    uniform = core | (alike & (near > (fewest - 0.5) / size**2))
+    alike, number = _alike(mean, core, variance, confidence, parameters)
+    uniform = core | (alike & (number > fewest - 0.5))
     between = cv2.morphologyEx(uniform.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)) > 0
-    return np.asarray(uniform | (alike & between & (near > 0.5 / size**2)))
+    return np.asarray(uniform | (alike & between))
+
+
+def spread_over_plain(
+    mean: FloatMap,
+    region: BoolMap,
+    variance: float | FloatMap,
+    confidence: FloatMap,
+    parameters: UniformPlanesParameters,
+) -> BoolMap:
+    """Uniform regions, and what is plain among pixels of their colour, as in gaps that are narrower than a window.
+
+    Parameters
+    ----------
+    mean, variance, confidence
+        As in :func:`uniform_regions`.
+    region : ndarray, shape (H, W), bool
+        Of :func:`uniform_regions`.
+    parameters : UniformPlanesParameters
+
+    Returns
+    -------
+    ndarray, shape (H, W), bool
+    """
+    if not region.any():
+        return region
+    gradients, most = _squared_gradients(mean), FEW_PLAIN * _most_gradient(variance, parameters)
+    size = (2 * parameters.window_radius + 1,) * 2
+    beside = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    for _ in range(ROUNDS):
+        alike, _ = _alike(mean, region, variance, confidence, parameters)
+        # gradients between pixels of one colour: those of a border are larger
+        among = cv2.erode((region | alike).astype(np.float32), beside, borderValue=1)
+        share = cv2.blur(among, size)
+        plain = alike & (share > 0.5 / size[0] ** 2) & (cv2.blur(gradients * among, size) < most * share)
+        # a row of mixed pixels on an outline leads from one surface to the next
+        region = region | (cv2.morphologyEx((region | plain).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3))) > 0)
+    return region
