@@ -1,12 +1,13 @@
 """Regions of a picture, each with its own x and y axes."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatArray
+from sepi.lightfield import BoolMap, FloatArray, FloatMap
 
 Place = tuple[slice, slice]
 """Rows and columns of a picture."""
@@ -67,6 +68,52 @@ def parts_of(mask: BoolMap) -> Parts:
         (slice(top, top + height), slice(left, left + width)) for left, top, width, height, _ in stats[1:].tolist()
     ]
     return Parts(np.asarray(labels, np.int32), places, np.asarray(stats[1:, cv2.CC_STAT_AREA], np.int32))
+
+
+THIN, ALONG = 6, 3.0
+"""Width of something before a surface, pixels, on both sides of which the surface goes on; and along how much of the
+smaller side, in sides of a square of its area."""
+
+
+def together(parts: Parts, colours: FloatMap, most: FloatMap) -> list[list[int]]:
+    """Parts behind something thin, such as a wire, by their numbers: of one colour on both sides of it.
+
+    Parameters
+    ----------
+    parts : Parts
+    colours : ndarray, shape (H, W, C), float32
+    most : ndarray, shape (H, W), float32
+        Squared difference of colours, summed over channels, up to which they count as one.
+
+    Returns
+    -------
+    list of list of int
+        Each part is in one of the lists.
+    """
+    reach = THIN + 1
+    wide = np.pad(parts.labels, reach)
+    y, x = np.nonzero(parts.labels)
+    pairs, changes = [], []
+    for down, across in ((0, reach), (reach, 0), (reach, reach), (reach, -reach)):
+        here, there = parts.labels[y, x], wide[y + reach + down, x + reach + across]
+        apart = (there > 0) & (here != there)
+        v, u = y[apart], x[apart]
+        pairs.append(np.sort([here[apart], there[apart]], axis=0))
+        changes.append(((colours[v, u] - colours[v + down, u + across]) ** 2).sum(axis=-1) / most[v, u])
+    alike, where, number = np.unique(np.hstack(pairs), axis=1, return_inverse=True, return_counts=True)
+    along = number >= ALONG * np.sqrt(np.append(0, parts.areas)[alike].min(axis=0))
+    root = np.arange(len(parts.areas) + 1)
+    for one, other in alike.T[along & (np.bincount(where.ravel(), np.hstack(changes)) < number)]:
+        root[root == root[other]] = root[one]
+    return [np.flatnonzero(root == one).tolist() for one in np.unique(root[1:])]
+
+
+def around(places: Sequence[Place]) -> Place:
+    """The least place that contains all of some."""
+    rows, columns = (
+        slice(min(one.start for one in sides), max(one.stop for one in sides)) for sides in zip(*places, strict=True)
+    )
+    return rows, columns
 
 
 def widened(place: Place, margin: int) -> Place:

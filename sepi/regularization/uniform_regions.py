@@ -31,7 +31,7 @@ from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
 from sepi.regularization.contradiction import contradicted
 from sepi.regularization.lit_planes import LitPlane, lit_planes
 from sepi.regularization.plane_choice import LIT_AREA, chosen_plane, kept_pixels
-from sepi.regularization.regions import Region, parts_of, widened
+from sepi.regularization.regions import Region, around, parts_of, together, widened
 from sepi.stage import OcclusionMarginParameters, StageMaps
 
 LEAST_NOISE = 1e-5
@@ -118,7 +118,8 @@ def fill_uniform_regions(
     core = plain_pixels(mean, of_mean, parameters)
     # noise is measured; what rounding adds is supposed, and a single pixel may be plain by chance
     inner = uniform_regions(mean, core, of_mean, before.confidence, parameters, fewest=1 if noisy else 2)
-    found = _with_borders(spread_over_plain(mean, inner, of_mean, before.confidence, parameters), before, parameters)
+    uniform = spread_over_plain(mean, inner, of_mean, before.confidence, parameters)
+    found = _with_borders(uniform, mean, of_mean, before, parameters)
     lit = _by_light(light_field, matching, before.disparity, found, variance, noisy) if parameters.light else {}
     known = light_field.require_disparity_range()
     planes = [
@@ -160,18 +161,16 @@ def _variance_of_views(light_field: LightField, field: LightField, compared: Boo
 
 
 def _with_borders(
-    uniform: BoolMap, before: StageMaps, parameters: UniformPlanesParameters
+    uniform: BoolMap, mean: FloatMap, variance: FloatMap, before: StageMaps, parameters: UniformPlanesParameters
 ) -> list[tuple[Region, BorderPlane | None]]:
     """The regions that are large enough, and the planes of their borders."""
     parts = parts_of(uniform)
-    large = np.append(False, parts.areas >= parameters.min_area)
-    uniform = large[parts.labels]
+    uniform = np.append(False, parts.areas >= parameters.min_area)[parts.labels]
+    parts = parts_of(uniform)
     found: list[tuple[Region, BorderPlane | None]] = []
-    for number, inner in enumerate(parts.places, start=1):
-        if not large[number]:
-            continue
-        place = widened(inner, 2)
-        pixels = parts.labels[place] == number
+    for group in together(parts, mean, _most_apart(variance, parameters)):
+        place = widened(around([parts.places[number - 1] for number in group]), 2)
+        pixels = np.isin(parts.labels[place], group)
         border = cv2.dilate(pixels.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
         # pixels of other regions never count as border, so that the order of regions does not matter
         border &= ~uniform[place] & (before.confidence[place] > parameters.border_confidence)
@@ -212,20 +211,20 @@ def _squared_gradients(mean: FloatMap) -> FloatMap:
     return np.asarray(np.sum(cv2.split(down * down + across * across), axis=0))
 
 
-def _most_gradient(variance: float | FloatMap, parameters: UniformPlanesParameters) -> float | FloatMap:
+def _most_gradient(variance: FloatMap, parameters: UniformPlanesParameters) -> float | FloatMap:
     """Mean squared gradient up to which pixels are plain."""
     # central differences halve the variance; two axes, three channels
     return parameters.noise_factor * 3 * variance
 
 
-def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: UniformPlanesParameters) -> BoolMap:
+def plain_pixels(mean: FloatMap, variance: FloatMap, parameters: UniformPlanesParameters) -> BoolMap:
     """Pixels round which the mean of the views varies no more than its noise.
 
     Parameters
     ----------
     mean : ndarray, shape (H, W, 3), float32
         Colours, 0..1.
-    variance : float or ndarray, shape (H, W), float32
+    variance : ndarray, shape (H, W), float32
         Of the noise of one channel of the mean.
     parameters : UniformPlanesParameters
 
@@ -237,10 +236,15 @@ def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: Uniform
     return np.asarray(cv2.blur(_squared_gradients(mean), (size, size)) < _most_gradient(variance, parameters))
 
 
+def _most_apart(variance: FloatMap, parameters: UniformPlanesParameters) -> FloatMap:
+    """Squared difference up to which colours are one, summed over channels: three deviations of each, or more."""
+    return np.asarray(27 * variance + np.float32(parameters.colour_tolerance**2), np.float32)
+
+
 def _alike(
     mean: FloatMap,
     region: BoolMap,
-    variance: float | FloatMap,
+    variance: FloatMap,
     confidence: FloatMap,
     parameters: UniformPlanesParameters,
 ) -> tuple[BoolMap, FloatMap]:
@@ -248,7 +252,7 @@ def _alike(
     size = 2 * (parameters.window_radius + parameters.growth) + 1
     near = cv2.blur(region.astype(np.float32), (size, size))
     colour = cv2.blur(mean * region[..., None].astype(np.float32), (size, size)) / np.maximum(near, 1e-9)[..., None]
-    alike = np.sum(cv2.split((mean - colour) ** 2), axis=0) < 27 * variance + parameters.colour_tolerance**2
+    alike = np.sum(cv2.split((mean - colour) ** 2), axis=0) < _most_apart(variance, parameters)
     # half a pixel is more than the rounding errors of a running sum
     alike &= (confidence < parameters.grow_confidence) & (near > 0.5 / size**2)
     return np.asarray(alike), np.asarray(near * np.float32(size**2))
@@ -257,7 +261,7 @@ def _alike(
 def uniform_regions(
     mean: FloatMap,
     core: BoolMap,
-    variance: float | FloatMap,
+    variance: FloatMap,
     confidence: FloatMap,
     parameters: UniformPlanesParameters,
     fewest: int,
@@ -290,7 +294,7 @@ def uniform_regions(
 def spread_over_plain(
     mean: FloatMap,
     region: BoolMap,
-    variance: float | FloatMap,
+    variance: FloatMap,
     confidence: FloatMap,
     parameters: UniformPlanesParameters,
 ) -> BoolMap:

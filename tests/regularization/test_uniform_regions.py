@@ -6,7 +6,14 @@ from scipy.ndimage import gaussian_filter
 
 from sepi.lightfield import DisparityRange, LightField
 from sepi.regularization.border_planes import support
-from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions, uniform_regions
+from sepi.regularization.regions import parts_of, together
+from sepi.regularization.uniform_regions import (
+    UniformPlanesParameters,
+    fill_uniform_regions,
+    plain_pixels,
+    spread_over_plain,
+    uniform_regions,
+)
 from sepi.stage import StageMaps
 
 SHAPE = (60, 90)
@@ -20,8 +27,8 @@ def scene(*regions: tuple[slice, slice]) -> tuple[LightField, StageMaps]:
     texture = gaussian_filter(random.normal(0, 400, (*SHAPE, 3)), (1.5, 1.5, 0))
     view = np.clip(128 + texture, 0, 255).astype(np.uint8)
     noise = random.normal(0, 0.04, SHAPE)
-    for region in regions:
-        view[region] = 120
+    for number, region in enumerate(regions):
+        view[region] = 120 + 10 * number
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
     disparity = (0.004 * x - 0.003 * y + noise).astype(np.float32)
     # what stands before the background, and must not pull a plane nearer
@@ -133,3 +140,37 @@ def test_planes_are_held_by_the_pixels_that_lie_on_them() -> None:
     residual = values - planes @ positions.T
     expected = (abs(residual) < 0.2).sum(axis=1) - 0.7 * (residual < -0.2).sum(axis=1)
     np.testing.assert_allclose(support(positions, values, planes, 0.2, 0.7), expected)
+
+
+def test_a_bare_region_spreads_through_a_gap_that_no_window_fits_into() -> None:
+    """The sky between two houses had the houses' depth; what is as faint as noise is bare, what is textured is not."""
+    random, variance = np.random.default_rng(3), np.full((90, 80), 1e-6, np.float32)
+    mean = random.uniform(0, 1, (90, 80, 3)).astype(np.float32)
+    sky = np.zeros((90, 80), bool)
+    sky[:30] = sky[:70, 40:48] = True
+    mean[sky] = 0.5 + random.normal(0, 1e-3, (sky.sum(), 3))
+    doubtful, parameters = np.full((90, 80), 0.5, np.float32), UniformPlanesParameters()
+    inner = uniform_regions(mean, plain_pixels(mean, variance, parameters), variance, doubtful, parameters, 2)
+    spread = spread_over_plain(mean, inner, variance, doubtful, parameters)
+    assert not inner[50:65, 40:48].any()
+    assert spread[30:65, 42:46].all()
+    assert not spread[~sky].any()
+
+
+@pytest.mark.parametrize(
+    ("below", "colour", "joined"),
+    [
+        (np.s_[25:45, :], 0.5, True),
+        (np.s_[25:45, :], 0.6, False),
+        (np.s_[29:45, :], 0.5, False),
+        (np.s_[25:45, 30:33], 0.5, False),
+    ],
+    ids=["wire", "other colour", "wide", "short side"],
+)
+def test_parts_behind_something_thin_are_one(below: tuple[slice, slice], colour: float, joined: bool) -> None:
+    """Sky above a wire had the wire's depth; a dark fold beside a dark wall is no part of the wall."""
+    mask, colours = np.zeros((50, 60), bool), np.zeros((50, 60, 3), np.float32)
+    mask[:20] = mask[below] = True
+    colours[:20], colours[below] = 0.5, colour
+    groups = together(parts_of(mask), colours, np.full((50, 60), 1e-3, np.float32))
+    assert len(groups) == (1 if joined else 2)
