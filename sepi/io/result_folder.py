@@ -5,9 +5,10 @@ docs/reference/outputs.md describes the files.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import NoneType
 from typing import Any
@@ -21,13 +22,12 @@ from sepi.camera.rig import Rig
 from sepi.errors import SepiError
 from sepi.io import hdf5, map_pictures
 from sepi.io.disparity_maps import write_pfm
-from sepi.io.files import atomic_folder, atomic_path, remove_files, write_whole
+from sepi.io.files import atomic_folder, remove_files, write_whole
 from sepi.io.images import write_png
 from sepi.io.point_cloud import point_cloud, write_ply
 from sepi.io.provenance import DIGEST, RESULT, result_attributes
 from sepi.io.result_files import (
     ALL_VIEWS,
-    DEPTH,
     RESULT_FILES,
     RUNTIME,
     UNKNOWN,
@@ -37,7 +37,7 @@ from sepi.io.result_files import (
 )
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.process.threads import available_cores
-from sepi.stage import StageMaps
+from sepi.stage import ERROR_BARS, HIGH, LOW, SIGMA, StageMaps
 from sepi.validation import described, is_finite, require_path, require_type
 
 _Attributes = Mapping[str, hdf5.Attribute]
@@ -291,59 +291,58 @@ def _write_files(
     seconds: float | None,
     beside: _Names,
 ) -> _Names:
-    camera, view = light_field.camera, light_field.views[light_field.reference_position]
-    masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
-    more: dict[str, npt.NDArray[Any]] = {"view": view}
-    metres = map_pictures.bars_in_metres(maps, camera)
+    camera, disparity, sigma = light_field.camera, maps.disparity, maps.sigma
+    more: dict[str, npt.NDArray[Any]] = {"view": light_field.views[light_field.reference_position]}
     if camera is not None:
-        more |= {"depth": camera.depth(maps.disparity), **metres}
-    write_as_taken(folder, light_field, maps.disparity, sigma=maps.sigma)
-    unknown, digest = maps.mask(UNKNOWN), attributes.get(DIGEST)
+        more["depth"] = camera.depth(disparity)
+        if sigma is not None and maps.low is not None and maps.high is not None:
+            # larger disparities are nearer
+            more |= {"nearest": camera.depth(maps.high), "farthest": camera.depth(maps.low)}
+            more["depth_sigma"] = camera.depth_sigma(disparity, sigma)
+    writers, digest = _writers(light_field, maps, more, seconds), attributes.get(DIGEST)
+    taken = write_as_taken(folder, light_field, disparity, sigma=sigma)
     # images are packed outside Python's lock
     with ThreadPoolExecutor(min(4, available_cores())) as pool:
         # the digest of all views takes longest, and runs outside Python's lock
         told = pool.submit(result_attributes, light_field, maps, None if digest is None else str(digest))
-        written = [
-            pool.submit(map_pictures.write_16bit, folder / "disparity_16bit.png", maps.disparity),
-            pool.submit(map_pictures.write_error_bars, folder, maps, metres, unknown),
-            pool.submit(_write_pictures, folder, maps, masks, unknown),
-            pool.submit(_write_numbers, folder, light_field, maps, more.get("depth"), seconds),
-        ]
+        written = [pool.submit(write, folder / name) for name, write in writers.items()]
         with hdf5.create_hdf5(folder / RESULT) as file:
-            hdf5.put_maps(file, maps.updated(maps.disparity, maps.confidence, **more))
+            hdf5.put_maps(file, maps.updated(disparity, maps.confidence, **more))
             for one in written:
                 one.result()
+            names = (*RESULT_FILES[:-1], *sorted({*writers, *taken}.difference(RESULT_FILES)), RESULT)
             # a later result may replace these files: they are not a user's own
-            others = {path.name for path in folder.iterdir() if path.name[0] != "."}.difference(RESULT_FILES)
-            names = (*RESULT_FILES[:-1], *sorted(others), RESULT)
             files = {"files": " ".join(sorted((*names, *beside)))}
             file.attrs.update({**told.result(), **attributes, **files})
     return names
 
 
-def _write_pictures(folder: Path, maps: StageMaps, masks: Mapping[str, BoolMap], unknown: BoolMap) -> None:
-    write_png(folder / "disparity.png", map_pictures.colour_code(maps.disparity, unknown))
-    write_png(folder / "confidence.png", map_pictures.levels(maps.confidence))
-    for name, mask in masks.items():
-        write_png(folder / name, mask, _MASK_TEXT)
-
-
-def _write_numbers(
-    folder: Path, light_field: LightField, maps: StageMaps, depth: FloatMap | None, seconds: float | None
-) -> None:
-    if depth is not None:
-        write_pfm(folder / DEPTH, depth)
-    if seconds is not None:
-        write_whole(folder / RUNTIME, f"{seconds:.3f}\n")
-    write_pfm(folder / "disparity.pfm", maps.disparity)
-    with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
-        np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
-    view, unknown = light_field.views[light_field.reference_position], maps.mask(UNKNOWN)
+def _writers(
+    light_field: LightField, maps: StageMaps, more: Mapping[str, npt.NDArray[Any]], seconds: float | None
+) -> dict[str, Callable[[Path], None]]:
+    """What writes each file of a result beside ``result.h5``, by its name."""
+    disparity, unknown, sigma = maps.disparity, maps.mask(UNKNOWN), maps.sigma
     camera, centre, rig = light_field.camera, light_field.from_centre, light_field.reference_rig
-    cloud = point_cloud(
-        view, maps.disparity, camera=camera, from_centre=centre, unknown=unknown, rig=rig, sigma=maps.sigma
-    )
-    write_ply(folder / "points.ply", cloud)
+    shown: dict[str, Any] = {"camera": camera, "from_centre": centre, "unknown": unknown, "rig": rig, "sigma": sigma}
+    writers: dict[str, Callable[[Path], None]] = {
+        "disparity.npy": lambda path: np.save(path, disparity.astype("<f4"), allow_pickle=False),
+        "disparity_16bit.png": lambda path: map_pictures.write_16bit(path, disparity),
+        "disparity.png": lambda path: write_png(path, map_pictures.colour_code(disparity, unknown)),
+        "confidence.png": lambda path: write_png(path, map_pictures.levels(maps.confidence)),
+        "points.ply": lambda path: write_ply(path, point_cloud(more["view"], disparity, **shown)),
+    }
+    floats = {"disparity": disparity, **{name: maps.extra[name] for name in ERROR_BARS if name in maps.extra}, **more}
+    pfm = [name for name in ("disparity", SIGMA, "depth", "depth_sigma") if name in floats]
+    writers |= {f"{name}.pfm": partial(write_pfm, values=floats[name]) for name in pfm}
+    masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
+    writers |= {name: partial(write_png, pixels=mask, texts=_MASK_TEXT) for name, mask in masks.items()}
+    if sigma is not None:
+        bounds = {name: floats[name].astype("<f4") for name in (LOW, HIGH, "nearest", "farthest") if name in floats}
+        writers["sigma.png"] = lambda path: write_png(path, map_pictures.sigma_picture(sigma, unknown))
+        writers["interval.npz"] = lambda path: np.savez(path, allow_pickle=False, **bounds)
+    if seconds is not None:
+        writers[RUNTIME] = partial(write_whole, content=f"{seconds:.3f}\n")
+    return writers
 
 
 def write_as_taken(
@@ -352,7 +351,7 @@ def write_as_taken(
     disparity: FloatMap,
     position: _View | None = None,
     sigma: FloatMap | None = None,
-) -> None:
+) -> _Names:
     """Write the maps of a view at the pixels of the image as its calibrated camera took it; nothing without a rig.
 
     Parameters
@@ -365,13 +364,20 @@ def write_as_taken(
         Position of the view in the grid; default: the reference view.
     sigma : ndarray, shape (H, W), float32, optional
         Standard deviation of the disparity.
+
+    Returns
+    -------
+    tuple of str
+        Names of the files written.
     """
     if light_field.camera is None or light_field.rig is None:
-        return
+        return ()
     from sepi.camera.as_taken import as_taken
 
     t, s = position or light_field.reference_position
     down, across = (light_field.baselines[t, s] + light_field.from_centre).tolist()
     maps = as_taken(disparity, sigma, light_field.camera, light_field.rig, (t, s), (down, across))
-    for name, values in zip(names_as_taken(position, with_sigma=sigma is not None), maps, strict=True):
+    names = names_as_taken(position, with_sigma=sigma is not None)
+    for name, values in zip(names, maps, strict=True):
         write_pfm(folder / name, values)
+    return names
