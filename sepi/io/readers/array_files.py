@@ -209,11 +209,6 @@ def matches_numpy(path: Path) -> bool:
     return path.is_file() and (path.suffix.lower() in (".npy", ".npz") or bool(numpy_arrays(path)))
 
 
-def read_numpy(path: Path, options: ReadOptions) -> LightField:
-    """Light field from the array of a NumPy file; of an archive, ``options.variable`` or the array that fits."""
-    return light_field_of(path, numpy_arrays(path), options)
-
-
 def _mapped_array(path: Path) -> Array:
     """Array of a ``.npy`` file, memory-mapped: values are read when used."""
     with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"):
@@ -270,8 +265,3 @@ def matches_hdf5(path: Path) -> bool:
     """Whether ``path`` is an HDF5 file of another program, with an array that may be a light field."""
     others = has_dataset(path, "/", lambda root: not is_own(root))
     return others and any(is_likely(one.shape) for one in hdf5_arrays(path).values())
-
-
-def read_hdf5(path: Path, options: ReadOptions) -> LightField:
-    """Light field from the array ``options.variable``; default: the array that can be a light field."""
-    return light_field_of(path, hdf5_arrays(path), options)

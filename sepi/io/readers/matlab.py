@@ -32,10 +32,8 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import DEFLATE_RATIO, reading
-from sepi.io.readers.array_files import MATLAB_HDF5, Arrays, StoredArray, hdf5_arrays, light_field_of
+from sepi.io.readers.array_files import MATLAB_HDF5, Arrays, StoredArray, hdf5_arrays
 from sepi.io.readers.arrays import is_likely
-from sepi.io.readers.options import ReadOptions
-from sepi.lightfield import LightField
 
 _HEADER = 128
 """Bytes of the file's header; the last four are version and byte order."""
@@ -209,11 +207,6 @@ def matches(path: Path) -> bool:
         return path.is_file()
     head = _head(path)
     return head[-4:] in _ORDERS or head.startswith(MATLAB_HDF5)
-
-
-def read(path: Path, options: ReadOptions) -> LightField:
-    """Light field from the array ``options.variable``; default: the array that can be a light field."""
-    return light_field_of(path, arrays_in(path), options)
 
 
 def arrays_in(path: Path) -> Arrays:
