@@ -8,10 +8,10 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
-from importlib.metadata import PackageNotFoundError, distribution
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import NoneType
 from typing import Any
@@ -206,14 +206,9 @@ def package_version() -> str:
 @functools.cache
 def version_of(name: str) -> str:
     """Version of a distribution; empty if it is not installed."""
-    try:
-        files = distribution(name)
-        text = files.read_text("METADATA") or files.read_text("PKG-INFO") or ""
-    except PackageNotFoundError:
-        return ""
-    # the first lines alone: to read the others takes a job as long as a small stage
-    told = re.search(r"^Version: (.+)$", text, re.MULTILINE)
-    return told[1] if told else ""
+    with suppress(PackageNotFoundError):
+        return version(name)
+    return ""
 
 
 def stage_attributes(light_field: LightField, history: Sequence[Entry]) -> dict[str, Attribute]:

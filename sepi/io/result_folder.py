@@ -232,19 +232,8 @@ def read_result(path: str | Path, view: _View | None = None) -> Result:
     (True, True)
     """
     path = require_path("result", path)
-    return result_in(all_views_file(path, view) or (path / RESULT if path.is_dir() else path), view)
-
-
-def all_views_file(path: Path, view: _View | None) -> Path | None:
-    """The file of maps of all views; None: the map of a result's own view, or of another program."""
-    path = path / ALL_VIEWS if path.is_dir() and view is not None else path
-    # reading reports a damaged file
-    return path if hdf5.has_dataset(path, EXTENDED, if_damaged=True) else None
-
-
-def result_in(path: Path, view: _View | None, check: bool = True) -> Result:
-    """Result of a view in a file; ``check=False`` does not read the whole file for its digest."""
-    with hdf5.open_hdf5(path, "result of 'sepi depth'", check) as file:
+    path = all_views_file(path, view) or (path / RESULT if path.is_dir() else path)
+    with hdf5.open_hdf5(path, "result of 'sepi depth'") as file:
         own = tuple(map(int, hdf5.attribute(file, "view_position")))
         place = place_in(path, file, view)
         if place is ... and view not in (None, own):
@@ -269,6 +258,13 @@ def result_in(path: Path, view: _View | None, check: bool = True) -> Result:
     if set(shapes.values()) != {picture.shape[:2]} or picture.shape[2:] not in ((1,), (3,)):
         raise SepiError(f"{path}: damaged: view {picture.shape} and maps {shapes} do not fit together")
     return Result(scene, picture, **maps, unknown=unknown, camera=camera, from_centre=(down, across), rig=rig)
+
+
+def all_views_file(path: Path, view: _View | None) -> Path | None:
+    """The file of maps of all views; None: the map of a result's own view, or of another program."""
+    path = path / ALL_VIEWS if path.is_dir() and view is not None else path
+    # reading reports a damaged file
+    return path if hdf5.has_dataset(path, EXTENDED, if_damaged=True) else None
 
 
 def place_in(path: Path, file: h5py.File, view: _View | None) -> Any:

@@ -6,6 +6,7 @@ have any name, at the root or in groups.
 
 from __future__ import annotations
 
+import io
 import math
 import re
 import warnings
@@ -14,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -198,8 +199,8 @@ def _is_numbers(entry: Any) -> bool:
 
 
 _NUMPY = "NumPy file"
-# first bytes of a ZIP archive with members, and of an empty one
-_ZIP_MAGICS = (b"PK\x03\x04", b"PK\x05\x06")
+# NumPy itself refuses longer ones
+_LONGEST_HEADER = 2**14
 _OBJECTS = "Python objects, which may be any program; save images as one array, numpy.stack(them)"
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
@@ -209,48 +210,42 @@ def matches_numpy(path: Path) -> bool:
     return path.is_file() and (path.suffix.lower() in (".npy", ".npz") or bool(numpy_arrays(path)))
 
 
-def _mapped_array(path: Path) -> Array:
-    """Array of a ``.npy`` file, memory-mapped: values are read when used."""
-    with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"):
-        with path.open("rb") as file:
-            start = file.read(12)
-            # NumPy allocates this length before it reads; two bytes in version 1, four in later ones
-            length = int.from_bytes(start[8:10] if start[6:7] == b"\x01" else start[8:12], "little")
-            if length > path.stat().st_size:
-                raise ValueError(f"a header of {length} bytes")
-            if b"'|O'" in file.read(length):
-                raise SepiError(_OBJECTS)
-        array: Array = np.load(path, mmap_mode="r", allow_pickle=False)
-        return array
-
-
 def numpy_arrays(path: Path) -> Arrays:
     """Each array by name; a ``.npy`` has the file's own name. No values are read."""
     found = {}
-    with reading(path, _NUMPY), path.open("rb") as file:
-        is_zipped = file.read(4) in _ZIP_MAGICS
-    if not is_zipped:
-        array = _mapped_array(path)
-        return {path.stem: StoredArray(array.shape, array.dtype, lambda: array)}
-    with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"), zipfile.ZipFile(path) as archive:
-        for info in archive.infolist():
-            if info.filename.endswith(".npy"):
-                _require_room(path, info)
-                with archive.open(info) as file:
-                    shape, _, kind = _HEADERS[npy.read_magic(file)](file)
-                # NumPy allocates this shape before it reads
-                if math.prod(shape) * kind.itemsize > info.file_size:
-                    raise ValueError(f"{info.filename} of shape {shape} cannot lie in {info.file_size} bytes")
-                name = info.filename.removesuffix(".npy")
-                found[name] = StoredArray(shape, kind, partial(_packed_array, path, name, kind))
+    with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"), path.open("rb") as file:
+        if not zipfile.is_zipfile(file) and file.seek(0) == 0:
+            shape, kind = _form(file, path.stat().st_size)
+            if kind.hasobject:
+                raise SepiError(_OBJECTS)
+            return {path.stem: StoredArray(shape, kind, partial(_values, path, None, kind))}
+        with zipfile.ZipFile(file) as archive:
+            for info in archive.infolist():
+                if info.filename.endswith(".npy"):
+                    _require_room(path, info)
+                    name = info.filename.removesuffix(".npy")
+                    with archive.open(info) as member:
+                        shape, kind = _form(member, info.file_size)
+                    found[name] = StoredArray(shape, kind, partial(_values, path, name, kind))
     return found
 
 
-def _packed_array(path: Path, name: str, kind: np.dtype[Any]) -> Array:
-    with reading(path, _NUMPY), np.load(path, allow_pickle=False) as archive:
+def _form(file: IO[bytes], size: int) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of an array that can lie in so many bytes; NumPy would allocate any."""
+    head = io.BytesIO(file.read(_LONGEST_HEADER))
+    shape, _, kind = _HEADERS[npy.read_magic(head)](head)
+    if not 0 <= math.prod(shape) * kind.itemsize <= size:
+        raise ValueError(f"an array of shape {shape} cannot lie in {size} bytes")
+    return shape, kind
+
+
+def _values(path: Path, name: str | None, kind: np.dtype[Any]) -> Array:
+    """The array of a file, memory-mapped, or that of this name in an archive."""
+    with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"):
         if kind.hasobject:
             raise SepiError(_OBJECTS)
-        array: Array = archive[name]
+        stored = np.load(path, mmap_mode="r", allow_pickle=False)
+        array: Array = stored if name is None else stored[name]
         return array
 
 
