@@ -2,4 +2,7 @@
 
 from sepi.registry import Extension
 
-EXTENSION = Extension(readers=dict.fromkeys(("mosaic", "tiff-stack", "openlf"), f"{__name__}.readers"))
+_MODULES = {"matlab": "matlab", "eslf": "eslf"}
+_MODULES |= dict.fromkeys(("mosaic", "tiff-stack", "openlf"), "readers")
+
+EXTENSION = Extension(readers={word: f"{__name__}.{module}" for word, module in _MODULES.items()})

@@ -12,6 +12,7 @@ import re
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -245,7 +246,8 @@ def _values(path: Path, name: str | None, kind: np.dtype[Any]) -> Array:
         if kind.hasobject:
             raise SepiError(_OBJECTS)
         stored = np.load(path, mmap_mode="r", allow_pickle=False)
-        array: Array = stored if name is None else stored[name]
+        with nullcontext(stored) if name is None else stored:
+            array: Array = stored if name is None else stored[name]
         return array
 
 

@@ -19,7 +19,7 @@ from sepi.io.disparity_maps import is_disparity
 from sepi.io.files import DEFLATE_RATIO, naming
 from sepi.io.hdf5 import has_dataset
 from sepi.io.images import SUFFIXES, picture_header
-from sepi.io.readers import array_files, eslf, exported, hci, image_folder, matlab
+from sepi.io.readers import array_files, exported, hci, image_folder
 from sepi.io.readers.array_files import Arrays, hdf5_arrays, light_field_of, no_light_field
 from sepi.io.readers.arrays import is_likely, readings, with_white
 from sepi.io.readers.options import ReadOptions
@@ -91,6 +91,8 @@ def _alone(path: Path) -> tuple[Path]:
 _USUAL_SIDE = 512
 _USUAL_VIEWS = 81
 _RGB = 3
+# pixels a side under a lenslet
+_LENSLET = 14
 
 
 class Size(NamedTuple):
@@ -114,7 +116,7 @@ class Size(NamedTuple):
 
 def _size_of_lenslets(path: Path) -> Size:
     header = picture_header(path)
-    height, width = max(1, header.height // eslf.BLOCK[0]), max(1, header.width // eslf.BLOCK[1])
+    height, width = max(1, header.height // _LENSLET), max(1, header.width // _LENSLET)
     # all of the image is decoded
     values = header.height * header.width * header.pixel_bytes
     return Size(_USUAL_VIEWS, height, width, -(-values // (_USUAL_VIEWS * height * width)))
@@ -122,23 +124,24 @@ def _size_of_lenslets(path: Path) -> Size:
 
 def _size_of_array(arrays_in: Callable[[Path], Arrays], path: Path) -> Size:
     """Size of the views in the largest array that the file can hold, in the first order of its axes that is likely."""
-    sizes = {one.shape: one.dtype.itemsize for one in arrays_in(path).values() if is_likely(one.shape)}
+    forms = {(one.shape, one.dtype.itemsize) for one in arrays_in(path).values() if is_likely(one.shape)}
+    sizes = {form: math.prod(form[0]) * form[1] for form in forms}
     most = path.stat().st_size * DEFLATE_RATIO
-    held = {shape: math.prod(shape) * itemsize for shape, itemsize in sizes.items()}
-    shape = max((shape for shape, size in held.items() if 0 < size <= most), key=held.__getitem__, default=None)
-    if shape is None:
+    held = [form for form, size in sizes.items() if 0 < size <= most]
+    if not held:
         raise SepiError(f"{path}: holds no array of views")
+    shape, itemsize = max(held, key=sizes.__getitem__)
     axes = (readings(shape) or ["NHWC" if len(shape) == 4 else "TSHWC"])[0]
     size = dict(zip(axes, shape[len(shape) - len(axes) :], strict=True))
     views = size.get("N", 1) * size.get("T", 1) * size.get("S", 1)
-    return Size(views, size["H"], size["W"], sizes[shape] * size.get("C", 1))
+    return Size(views, size["H"], size["W"], itemsize * size.get("C", 1))
 
 
 # no digest check for many files: whoever reads the views checks the file
 _size_in_hdf5 = partial(_size_of_array, partial(hdf5_arrays, check=False))
 
 
-def _of_arrays(
+def format_of_arrays(
     name: str, description: str, matches: Callable[[Path], bool], arrays_in: Callable[[Path], Arrays], **more: Any
 ) -> Format:
     """Format of files of arrays, of which one is the light field."""
@@ -177,20 +180,20 @@ _OWN = {
         ("grid", "pattern", "follow_links"),
         loose=True,
     ),
-    "eslf": Format("Lytro lenslet image", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",)),
-    # before other kinds of HDF5: MATLAB's has a header or suffix of its own
-    "matlab": _of_arrays("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.arrays_in),
-    "numpy": _of_arrays("NumPy file", ".npy or .npz", array_files.matches_numpy, array_files.numpy_arrays),
+    "numpy": format_of_arrays("NumPy file", ".npy or .npz", array_files.matches_numpy, array_files.numpy_arrays),
+    # before other arrays, and after MATLAB's, which have a header or suffix of their own
     "hci-2013": Format(
         "HCI 2013 HDF5",
         "with LF (T, S, H, W, 3)",
         hci.matches_2013,
         hci.read_2013,
+        loose=True,
         truth_files=_alone,
         size_of=_size_in_hdf5,
     ),
-    # after the kinds whose arrays have fixed names
-    "hdf5": _of_arrays("HDF5 file", "with an array of all views", array_files.matches_hdf5, hdf5_arrays, loose=True),
+    "hdf5": format_of_arrays(
+        "HDF5 file", "with an array of all views", array_files.matches_hdf5, hdf5_arrays, loose=True
+    ),
     # last, since it takes files too damaged to tell
     "sepi": Format(
         "sepi HDF5",

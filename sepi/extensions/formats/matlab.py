@@ -34,6 +34,7 @@ from sepi.errors import SepiError
 from sepi.io.files import DEFLATE_RATIO, reading
 from sepi.io.readers.array_files import MATLAB_HDF5, Arrays, StoredArray, hdf5_arrays
 from sepi.io.readers.arrays import is_likely
+from sepi.io.readers.formats import format_of_arrays
 
 _HEADER = 128
 """Bytes of the file's header; the last four are version and byte order."""
@@ -225,3 +226,6 @@ def arrays_in(path: Path) -> Arrays:
 def _head(path: Path) -> bytes:
     with reading(path, _KIND), path.open("rb") as file:
         return file.read(_HEADER)
+
+
+FORMATS = {"matlab": format_of_arrays("MATLAB file", ".mat with an array such as LF", matches, arrays_in)}

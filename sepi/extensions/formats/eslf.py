@@ -19,6 +19,7 @@ import numpy as np
 from sepi.errors import SepiError
 from sepi.io.images import SUFFIXES, read_picture
 from sepi.io.readers.arrays import light_field_from_array
+from sepi.io.readers.formats import Format
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import MAX_VIEWS
 from sepi.lightfield import MIN_SIZE, LightField
@@ -76,3 +77,6 @@ def _dark_notes(light_field: LightField) -> list[str]:
     flags = " ".join(f"--exclude {t},{s}" for t, s in dark)
     views = "1 view is" if len(dark) == 1 else f"{len(dark)} views are"
     return [f"{views} darker than a fifth of the reference view; to leave out: {flags}"]
+
+
+FORMATS = {"eslf": Format("Lytro lenslet image", "NAME_eslf.png", matches, read, ("grid",))}
