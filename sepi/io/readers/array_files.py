@@ -24,10 +24,9 @@ from numpy.lib import format as npy
 
 from sepi.errors import SepiError, printable
 from sepi.io.files import DEFLATE_RATIO, reading
-from sepi.io.hdf5 import attribute, has_dataset, is_own, open_hdf5, read_dataset
+from sepi.io.hdf5 import has_dataset, is_own, open_hdf5, read_dataset
 from sepi.io.readers.arrays import Array, is_likely, light_field_from_array
 from sepi.io.readers.options import ReadOptions
-from sepi.io.readers.view_files import MAX_VIEWS
 from sepi.lightfield import LightField
 from sepi.validation import require_known
 
@@ -125,16 +124,16 @@ def _listed(arrays: Arrays) -> str:
     )
 
 
-MATLAB_HDF5 = b"MATLAB 7.3 MAT-file"
-"""First bytes of a MATLAB file of version 7.3."""
-
-_CLASS = "MATLAB_class"
-# MATLAB's classes of numbers; others are text, logical values, ...
-_NUMBERS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "single", "uint64", "int64", "double")
-_CELL, _MOST_CELLS = "cell", 8 * MAX_VIEWS
+def as_stored(path: Path, name: str, entry: Any) -> StoredArray | None:
+    """The array of an entry of an HDF5 file; None if that is not an array of numbers."""
+    if isinstance(entry, h5py.Dataset) and entry.shape is not None and entry.dtype.kind in "iuf":
+        return StoredArray(entry.shape, entry.dtype, partial(_hdf5_array, path, name))
+    return None
 
 
-def hdf5_arrays(path: Path, check: bool = True) -> Arrays:
+def hdf5_arrays(
+    path: Path, check: bool = True, stored: Callable[[Path, str, Any], StoredArray | None] = as_stored
+) -> Arrays:
     """Each array of numbers; arrays in groups only if none outside may be a light field.
 
     No values are read; ``check=False`` does not read the whole file for its digest.
@@ -143,10 +142,8 @@ def hdf5_arrays(path: Path, check: bool = True) -> Arrays:
     with open_hdf5(path, check=check) as file:
 
         def take(name: str, entry: object) -> None:
-            # '#refs#' holds the contents of cells
-            if not name.startswith("#") and (cells := _cells(entry)):
-                shape = *_outer(entry), *cells[0].shape[:: _turn(path, cells[0])]
-                found[name] = StoredArray(shape, cells[0].dtype, partial(_hdf5_array, path, name))
+            if (array := stored(path, name, entry)) is not None:
+                found[name] = array
 
         for name in file:
             take(name, file.get(name))
@@ -157,46 +154,7 @@ def hdf5_arrays(path: Path, check: bool = True) -> Arrays:
 
 def _hdf5_array(path: Path, name: str) -> Array:
     with open_hdf5(path) as file:
-        cells = _cells(file[name])
-        arrays = [read_dataset(path, cell).transpose([*range(cell.ndim)][:: _turn(path, cell)]) for cell in cells]
-        return arrays[0] if len(arrays) == 1 else np.stack(arrays).reshape(*_outer(file[name]), *arrays[0].shape)
-
-
-def _cells(entry: Any) -> list[h5py.Dataset]:
-    """The entry itself if it is an array of numbers, or the arrays of a cell array if all are alike; else empty."""
-    if not isinstance(entry, h5py.Dataset) or entry.shape is None:
-        return []
-    if entry.dtype != h5py.ref_dtype:
-        return [entry] if _is_numbers(entry) else []
-    if _class(entry) != _CELL or not entry.nbytes <= entry.id.get_storage_size() <= _MOST_CELLS:
-        return []
-    try:
-        cells = [entry.file[reference] for reference in entry[()].T.ravel()]
-    except ValueError:
-        # a null reference
-        return []
-    alike = all(map(_is_numbers, cells)) and len({(cell.shape, cell.dtype) for cell in cells}) == 1
-    return cells if alike else []
-
-
-def _outer(entry: Any) -> tuple[int, ...]:
-    """Axes of a cell array as MATLAB shows them, without those of size 1."""
-    return tuple(n for n in entry.shape[::-1] if n > 1) if entry.dtype == h5py.ref_dtype else ()
-
-
-def _turn(path: Path, dataset: h5py.Dataset) -> int:
-    """-1 if the axes are in reverse, as only MATLAB writes them; else 1."""
-    with path.open("rb") as file:
-        return -1 if _CLASS in dataset.attrs or file.read(len(MATLAB_HDF5)) == MATLAB_HDF5 else 1
-
-
-def _class(entry: h5py.Dataset) -> str:
-    return str(attribute(entry, _CLASS)) if _CLASS in entry.attrs else ""
-
-
-def _is_numbers(entry: Any) -> bool:
-    held = isinstance(entry, h5py.Dataset) and entry.shape is not None and entry.dtype.kind in "iuf"
-    return held and _class(entry) in ("", *_NUMBERS)
+        return read_dataset(path, file[name])
 
 
 _NUMPY = "NumPy file"
