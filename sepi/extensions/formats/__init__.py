@@ -2,7 +2,6 @@
 
 from sepi.registry import Extension
 
-_MODULES = {"matlab": "matlab", "eslf": "eslf"}
-_MODULES |= dict.fromkeys(("mosaic", "tiff-stack", "openlf"), "readers")
+_MODULES = {"matlab": "matlab", **dict.fromkeys(("eslf", "mosaic", "tiff-stack", "openlf"), "readers")}
 
 EXTENSION = Extension(readers={word: f"{__name__}.{module}" for word, module in _MODULES.items()})

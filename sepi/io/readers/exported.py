@@ -22,9 +22,9 @@ from sepi.io.disparity_maps import read_pfm, write_pfm
 from sepi.io.files import atomic_folder, naming, reading, remove_files, write_whole
 from sepi.io.hdf5 import Properties, has_dataset, is_own, read_light_field, write_light_field
 from sepi.io.images import SUFFIXES, read_picture, write_png
-from sepi.io.readers.arrays import rearrange
 from sepi.io.readers.options import ReadOptions, in_grid, unarranged
 from sepi.io.readers.view_files import read_grid
+from sepi.io.readers.view_grid import rearrange
 from sepi.io.result_files import require_target
 from sepi.lightfield import BoolMap, LightField
 from sepi.validation import require_known

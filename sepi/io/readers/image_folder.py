@@ -20,9 +20,9 @@ from sepi.errors import SepiError
 from sepi.io.files import name_of
 from sepi.io.images import SUFFIXES
 from sepi.io.readers import view_names
-from sepi.io.readers.camera_positions import off_grid, positions_from_cameras
 from sepi.io.readers.options import ReadOptions, is_position, unarranged
 from sepi.io.readers.view_files import MAX_VIEWS, files_in, has_rows, numbered, read_grid, view_files
+from sepi.io.readers.view_grid import off_grid, positions_from_cameras
 from sepi.io.readers.view_names import EXAMPLES, ViewNumbers, decimals_in, origin
 from sepi.lightfield import LightField
 
