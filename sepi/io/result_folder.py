@@ -243,7 +243,9 @@ def read_result(path: str | Path, view: _View | None = None) -> Result:
         if missing := {"disparity", "confidence"}.difference(maps):
             raise SepiError(f"damaged result of 'sepi depth': it has no {' and no '.join(sorted(missing))}")
         picture = hdf5.read_dataset(path, file["view" if place is ... else "picture"], place)
-        centre, rig = hdf5.attribute(file, "from_centre"), hdf5.read_rig(file)
+        names = ("scene", "camera", "from_centre", hdf5.RIG)
+        known = {name: hdf5.attribute(file, name) for name in names if name in file.attrs}
+        centre, rig = known["from_centre"], Rig.from_text(str(known[hdf5.RIG])) if hdf5.RIG in known else None
         if place is ...:
             unknown = (
                 hdf5.read_dataset(path, file[UNKNOWN]) > 0 if UNKNOWN in file else np.zeros(picture.shape[:2], bool)
@@ -252,11 +254,12 @@ def read_result(path: str | Path, view: _View | None = None) -> Result:
             unknown = (hdf5.read_dataset(path, file[EXTENDED], place) > 0) | (maps["confidence"] == 0)
             baseline = hdf5.read_dataset(path, file["baselines"])[place]
             centre, rig = centre + baseline, rig and rig.seen_from(baseline)
-        scene = str(hdf5.attribute(file, "scene")) if "scene" in file.attrs else ""
-        camera, (down, across) = hdf5.read_camera(file), map(float, centre)
+        camera = Camera(*map(float, known["camera"])) if "camera" in known else None
+        down, across = map(float, centre)
     shapes = {name: values.shape for name, values in (*maps.items(), (UNKNOWN, unknown))}
     if set(shapes.values()) != {picture.shape[:2]} or picture.shape[2:] not in ((1,), (3,)):
         raise SepiError(f"{path}: damaged: view {picture.shape} and maps {shapes} do not fit together")
+    scene = str(known.get("scene", ""))
     return Result(scene, picture, **maps, unknown=unknown, camera=camera, from_centre=(down, across), rig=rig)
 
 

@@ -36,7 +36,7 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError, printable
-from sepi.io.codecs import TIFF_SIGNATURES, directory_of, open_tiff, page_pixels, tiff_form
+from sepi.io.codecs import TIFF, TIFF_SIGNATURES, directory_of, open_tiff, page_pixels, tiff_form
 from sepi.io.files import DEFLATE_RATIO, naming, reading
 from sepi.io.hdf5 import has_dataset, number_of, open_hdf5, read_dataset
 from sepi.io.images import SUFFIXES, read_picture
@@ -130,7 +130,6 @@ def _dark_notes(light_field: LightField) -> list[str]:
     return [f"{views} darker than a fifth of the reference view; to leave out: {flags}"]
 
 
-_SUFFIXES = (".tif", ".tiff")
 _STACK = "TIFF stack"
 _RGB = 3
 # bytes that the pages of any file may take, however small the file
@@ -142,7 +141,7 @@ def matches_stack(path: Path) -> bool:
 
     Other TIFFs hold one image, perhaps with a thumbnail.
     """
-    if path.suffix.lower() not in _SUFFIXES or not path.is_file():
+    if path.suffix.lower() not in TIFF or not path.is_file():
         return False
     try:
         with reading(path, _STACK), path.open("rb") as file:

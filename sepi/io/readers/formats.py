@@ -82,11 +82,6 @@ _POSES = ("poses_bounds.npy", "cameras.json", "cameras_sphere.npz")
 _SOME = ("grid", "pattern", "axes", "variable", "images", "reference", "follow_links")
 
 
-def _alone(path: Path) -> tuple[Path]:
-    """The file itself, which may hold ground truth and masks."""
-    return (path,)
-
-
 # assumed where no header tells: a view of the benchmark
 _USUAL_SIDE = 512
 _USUAL_VIEWS = 81
@@ -188,7 +183,7 @@ _OWN = {
         hci.matches_2013,
         hci.read_2013,
         loose=True,
-        truth_files=_alone,
+        truth_files=lambda path: (path,),
         size_of=_size_in_hdf5,
     ),
     "hdf5": format_of_arrays(
@@ -202,7 +197,7 @@ _OWN = {
         exported.read_own,
         scales=False,
         loose=True,
-        truth_files=_alone,
+        truth_files=lambda path: (path,),
         size_of=_size_in_hdf5,
     ),
 }
