@@ -78,11 +78,9 @@ def read_error_bars_at(path: Path, view: View | None = None) -> StageMaps | None
         If the file is damaged.
     """
     path = all_views_file(path, view) or (path / RESULT if path.is_dir() else path)
-    if path.suffix.lower() not in (".h5", ".hdf5") or not path.is_file():
+    if not hdf5.has_dataset(path, "/", {"disparity", "confidence", *ERROR_BARS}.issubset, if_damaged=True):
         return None
     with hdf5.open_hdf5(path) as file:
-        if not {"disparity", "confidence", *ERROR_BARS} <= set(file):
-            return None
         maps = hdf5.float_maps(path, file, place_in(path, file, view))
     if maps["disparity"].ndim != 2:
         return None

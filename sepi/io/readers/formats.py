@@ -73,7 +73,7 @@ class Format(NamedTuple):
 
 
 # most light fields that a message names
-_LISTED = 5
+_LISTED = 3
 
 # poses of LLFF, Gaussian splatting and NeuS
 _POSES = ("poses_bounds.npy", "cameras.json", "cameras_sphere.npz")
@@ -251,10 +251,9 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
             f"{path}: {poses.name} has camera poses of a kind that is not read; expected transforms.json, a COLMAP "
             "model or a table of cameras; 'sepi calibrate' finds them anew, and a folder of a grid of views needs none"
         )
-    inner = list(islice(_inside(path), _LISTED + 1)) if path.is_dir() and not _is_result(path) else []
+    inner = list(islice(_inside(path), _LISTED)) if path.is_dir() and not _is_result(path) else []
     if inner:
-        named = f", such as {inner[0]}" if len(inner) == 1 else f": {', '.join(map(str, inner[:_LISTED]))}"
-        named += ", ..." if len(inner) > _LISTED else ""
+        named = f", such as {', '.join(map(str, inner))}"
         with suppress(OSError):
             named += "; if they are the rows of one, pass --format images" * has_rows(path, surely=False)
         raise SepiError(f"{path}: a folder of light fields; give one of them{named}")
