@@ -1,4 +1,4 @@
-"""Readers of formats that few light fields have."""
+"""Readers of formats of single programs and devices: MATLAB, lenslet pictures, mosaics, TIFF stacks, OpenLF."""
 
 from sepi.registry import Extension
 
