@@ -13,9 +13,9 @@ from sepi.errors import SepiError, warn
 from sepi.inspection.coded_views import told_of_coding
 from sepi.io.provenance import reading_record
 from sepi.io.readers.arrays import UnclearAxesError
-from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ReadOptions, in_grid, unarranged
+from sepi.io.readers.view_grid import with_row_spacing
 from sepi.lightfield import DisparityRange, LightField
 from sepi.process.memory import give_back_memory, take_blas_buffer
 from sepi.validation import described, require_type

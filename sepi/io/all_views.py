@@ -15,7 +15,7 @@ from sepi.errors import SepiError
 from sepi.io import hdf5
 from sepi.io.disparity_maps import read_disparity
 from sepi.io.provenance import RESULT, Origin, read_origin
-from sepi.io.result_folder import all_views_file, place_in, read_result, result_in
+from sepi.io.result_folder import all_views_file, place_in, read_result
 from sepi.lightfield import FloatMap, LightField
 from sepi.process.interrupts import interruptibly
 from sepi.stage import ERROR_BARS, StageMaps
@@ -78,11 +78,9 @@ def read_error_bars_at(path: Path, view: View | None = None) -> StageMaps | None
         If the file is damaged.
     """
     path = all_views_file(path, view) or (path / RESULT if path.is_dir() else path)
-    if path.suffix.lower() not in (".h5", ".hdf5") or not path.is_file():
+    if not hdf5.has_dataset(path, "/", {"disparity", "confidence", *ERROR_BARS}.issubset, if_damaged=True):
         return None
     with hdf5.open_hdf5(path) as file:
-        if not {"disparity", "confidence", *ERROR_BARS} <= set(file):
-            return None
         maps = hdf5.float_maps(path, file, place_in(path, file, view))
     if maps["disparity"].ndim != 2:
         return None
@@ -110,17 +108,11 @@ def surfaces_of(path: Path, name: str = "disparity") -> Callable[[View], FloatMa
     name : str
         ``"disparity"`` or ``"sigma"``.
     """
-    file_path = all_views_file(path, (0, 0))
-    if file_path is None:
+    if all_views_file(path, (0, 0)) is None or getattr(read_result(path), name) is None:
         return None
 
-    # check once, not for each view
-    with hdf5.open_hdf5(file_path) as file:
-        if name not in file:
-            return None
-
     def surface(view: View) -> FloatMap:
-        result = result_in(file_path, view, check=False)
+        result = read_result(path, view)
         return np.where(result.unknown, np.float32(np.nan), getattr(result, name))
 
     return surface

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from sepi.camera import Part
 from sepi.errors import SepiError
+from sepi.io.codecs import TIFF
 from sepi.io.files import reading, write_whole
 from sepi.io.hdf5 import has_dataset, open_hdf5, read_dataset
 from sepi.io.images import picture_header, png_texts, read_picture
@@ -102,11 +103,9 @@ def write_pfm(path: str | Path, values: FloatMap) -> None:
 
 _HDF5 = (".h5", ".hdf5")
 
-_TIFF = (".tif", ".tiff")
-
 _NUMPY = (".npy", ".npz")
 
-SUFFIXES: tuple[str, ...] = (".pfm", *_NUMPY, ".png", ".pgm", *_TIFF, *_HDF5)
+SUFFIXES: tuple[str, ...] = (".pfm", *_NUMPY, ".png", ".pgm", *TIFF, *_HDF5)
 """Suffixes of the files that are read, in lower case."""
 
 _DATASET = "disparity"
@@ -132,12 +131,13 @@ def is_disparity(path: Path) -> bool:
         return has_dataset(path, _DATASET)
     if suffix == ".png":
         return {_SCALE, _OFFSET} <= set(png_texts(path))
-    if suffix in _TIFF:
-        return _is_float_tiff(path)
-    if suffix in _NUMPY:
-        with suppress(SepiError):
+    with suppress(SepiError):
+        if suffix in TIFF:
+            header = picture_header(path)
+            return header.kind == "TIFF" and header.grey and header.pixel_bytes == 4
+        if suffix in _NUMPY:
             return all(len(one.shape) == 2 for one in numpy_arrays(path).values())
-    return suffix in SUFFIXES
+    return suffix in SUFFIXES and suffix not in TIFF
 
 
 def read_disparity(path: str | Path, *, scale: float | None = None, offset: float = 0.0) -> FloatMap:
@@ -241,7 +241,7 @@ def _stored(path: Path, scaled: bool) -> npt.NDArray[Any]:
     suffix = path.suffix.lower()
     if suffix == ".pfm":
         return read_pfm(path)
-    if suffix in (".png", ".pgm", *_TIFF):
+    if suffix in (".png", ".pgm", *TIFF):
         return _read_levels(path, scaled)
     if suffix in _NUMPY:
         arrays = numpy_arrays(path)
@@ -256,13 +256,6 @@ def _stored(path: Path, scaled: bool) -> npt.NDArray[Any]:
     if values.ndim != 2 or values.dtype.kind not in "fiu":
         raise SepiError(f"{path}: expected an array of numbers of shape (H, W), got {values.dtype} {values.shape}")
     return values
-
-
-def _is_float_tiff(path: Path) -> bool:
-    with suppress(SepiError):
-        header = picture_header(path)
-        return header.kind == "TIFF" and header.grey and header.pixel_bytes == 4
-    return False
 
 
 def _read_levels(path: Path, scaled: bool) -> npt.NDArray[Any]:

@@ -285,16 +285,6 @@ def read_light_field(path: Path) -> LightField:
         return LightField(**arrays, **known.fields(), ground_truth=ground_truth, masks=masks)
 
 
-def read_camera(file: h5py.File) -> Camera | None:
-    """Camera of a result; None if the file has none."""
-    return Camera(*map(float, attribute(file, "camera"))) if "camera" in file.attrs else None
-
-
-def read_rig(file: h5py.File) -> Rig | None:
-    """Rig of a result's view; None if the file has none."""
-    return Rig.from_text(str(attribute(file, RIG))) if RIG in file.attrs else None
-
-
 def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
     """Value of an attribute; text of fixed length becomes str.
 

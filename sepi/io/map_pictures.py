@@ -6,7 +6,6 @@ docs/reference/outputs.md describes them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +13,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.camera import Camera
-from sepi.io.disparity_maps import write_pfm
-from sepi.io.files import atomic_path
 from sepi.io.images import write_png
-from sepi.io.result_files import DEPTH_SIGMA, INTERVAL, SIGMA_PFM, SIGMA_PNG
 from sepi.lightfield import BoolMap, FloatMap, as_unit_float
-from sepi.stage import StageMaps
 from sepi.validation import require_map
 
 Picture = npt.NDArray[np.uint8]
@@ -111,57 +105,6 @@ _FONT = cv2.FONT_HERSHEY_SIMPLEX
 # pixels, at this height of the image; letters grow with the square root of the height
 _LEAST_HEIGHT, _BAR, _GAP, _LETTERS = 160, 14, 8, 0.4
 _TITLE = "px / view step"
-
-
-def bars_in_metres(maps: StageMaps, camera: Camera | None) -> dict[str, FloatMap]:
-    """Error bars of the depth by name; empty without a camera or without error bars of the disparity.
-
-    Parameters
-    ----------
-    maps : StageMaps
-    camera : Camera or None
-
-    Returns
-    -------
-    dict of str to ndarray, shape (H, W), float32
-        In metres: ``depth_sigma``, by the derivative of depth with respect to disparity; ``nearest`` and ``farthest``,
-        the depths of the bounds; ``farthest`` may be infinite.
-    """
-    if camera is None or maps.sigma is None or maps.low is None or maps.high is None:
-        return {}
-    sigma = camera.depth_sigma(maps.disparity, maps.sigma)
-    # larger disparities are nearer
-    return {"depth_sigma": sigma, "nearest": camera.depth(maps.high), "farthest": camera.depth(maps.low)}
-
-
-def write_error_bars(folder: Path, maps: StageMaps, metres: Mapping[str, FloatMap], unknown: BoolMap) -> None:
-    """Write the error bars of maps, if they have any; equal content gives equal bytes.
-
-    Parameters
-    ----------
-    folder : Path
-    maps : StageMaps
-    metres : mapping of str to ndarray
-        Error bars of the depth, from :func:`bars_in_metres`.
-    unknown : ndarray, shape (H, W), bool
-        Pixels for whose depth no view has evidence.
-
-    Raises
-    ------
-    SepiError
-        If they cannot be written.
-    """
-    if maps.sigma is None:
-        return
-    write_pfm(folder / SIGMA_PFM, maps.sigma)
-    write_png(folder / SIGMA_PNG, sigma_picture(maps.sigma, unknown))
-    bounds: dict[str, Any] = {"low": maps.low, "high": maps.high}
-    bounds |= {name: values for name, values in metres.items() if name != "depth_sigma"}
-    with atomic_path(folder / INTERVAL) as temporary, temporary.open("wb") as file:
-        # given a name, NumPy would append its own suffix; it stores no time
-        np.savez(file, **{name: values.astype("<f4") for name, values in bounds.items()})
-    if metres:
-        write_pfm(folder / DEPTH_SIGMA, metres["depth_sigma"])
 
 
 def sigma_picture(sigma: FloatMap, unknown: BoolMap | None = None) -> Picture:

@@ -31,7 +31,7 @@ import numpy.typing as npt
 from sepi.camera import Camera
 from sepi.camera.rig import WORLD, Rig
 from sepi.errors import SepiError
-from sepi.io.files import atomic_path, reading
+from sepi.io.files import atomic_path
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.validation import require_map, require_path, require_type
 
@@ -294,21 +294,3 @@ def write_ply(path: str | Path, cloud: PointCloud, comments: Sequence[str] | Non
     told = list(cloud.comments() if comments is None else comments)
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         PlyData([PlyElement.describe(points, "vertex")], byte_order="<", comments=told).write(file)
-
-
-def read_positions(path: Path) -> npt.NDArray[np.float64]:
-    """Coordinates (N, 3) of the points of a PLY file.
-
-    Raises
-    ------
-    SepiError
-        If it is damaged or has no points.
-    """
-    from plyfile import PlyData
-
-    with reading(path, "PLY file of points"):
-        try:
-            points = PlyData.read(path)["vertex"]
-        except MemoryError as error:
-            raise SepiError("damaged: it cannot hold as many points as its header says") from error
-        return np.column_stack([np.asarray(points[axis], np.float64) for axis in "xyz"])

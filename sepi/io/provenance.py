@@ -8,10 +8,10 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
-from importlib.metadata import PackageNotFoundError, distribution
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import NoneType
 from typing import Any
@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from sepi.camera import numbers_of
 from sepi.errors import SepiError
-from sepi.io.hdf5 import RIG, Attribute, attribute, open_hdf5, read_attributes, read_dataset
+from sepi.io.hdf5 import RIG, Attribute, attribute, has_dataset, open_hdf5, read_attributes, read_dataset
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.stage import Entry, StageMaps
@@ -142,11 +142,9 @@ def read_origin(path: Path) -> Origin | None:
         If the file is damaged or its record is not valid.
     """
     path = path / RESULT if path.is_dir() else path
-    if path.suffix not in (".h5", ".hdf5") or not path.is_file():
+    if not has_dataset(path, "/", lambda root: {"view_position", "grid"} <= set(root.attrs), if_damaged=True):
         return None
     with open_hdf5(path, "result of 'sepi depth'") as file:
-        if not {"view_position", "grid"} <= set(file.attrs):
-            return None
         known = {name: attribute(file, name) for name in _ORIGIN if name in file.attrs}
         (t, s), (rows, columns) = (map(int, known[name]) for name in ("view_position", "grid"))
         options, file_format = _reading(path, str(known.get("reading", "")))
@@ -206,14 +204,9 @@ def package_version() -> str:
 @functools.cache
 def version_of(name: str) -> str:
     """Version of a distribution; empty if it is not installed."""
-    try:
-        files = distribution(name)
-        text = files.read_text("METADATA") or files.read_text("PKG-INFO") or ""
-    except PackageNotFoundError:
-        return ""
-    # the first lines alone: to read the others takes a job as long as a small stage
-    told = re.search(r"^Version: (.+)$", text, re.MULTILINE)
-    return told[1] if told else ""
+    with suppress(PackageNotFoundError):
+        return version(name)
+    return ""
 
 
 def stage_attributes(light_field: LightField, history: Sequence[Entry]) -> dict[str, Attribute]:

@@ -26,14 +26,7 @@ RUNTIME = "runtime.txt"
 ALL_VIEWS = "all_views.h5"
 """Maps of all views, which the command writes on request (:mod:`sepi.io.all_views`)."""
 
-DEPTH = "depth.pfm"
-"""Depth in metres, if the camera is known."""
-
-ERROR_FILES = SIGMA_PFM, SIGMA_PNG, INTERVAL = "sigma.pfm", "sigma.png", "interval.npz"
-"""Error bars, if the maps have them."""
-
-DEPTH_SIGMA = "depth_sigma.pfm"
-"""Standard deviation of the depth in metres, if the camera is known and the maps have error bars."""
+_SOME = (RUNTIME, ALL_VIEWS, "depth.pfm", "depth_sigma.pfm", "sigma.pfm", "sigma.png", "interval.npz")
 
 AS_TAKEN = ("original_disparity", "original_depth", "original_sigma")
 """Maps at the pixels of the image as a calibrated camera took it; names end with ``_T_S`` for other views."""
@@ -101,9 +94,8 @@ def require_target(folder: Path) -> None:
 
 def is_results_name(name: str) -> bool:
     """Whether a result may have a file of this name."""
-    some = rf"mask_{MASK_NAME}\.png|({'|'.join(AS_TAKEN)})(_\d+_\d+)?\.pfm"
-    names = (*RESULT_FILES, DEPTH, RUNTIME, ALL_VIEWS, *ERROR_FILES, DEPTH_SIGMA)
-    return name in names or bool(re.fullmatch(some, name))
+    numbered = rf"mask_{MASK_NAME}\.png|({'|'.join(AS_TAKEN)})(_\d+_\d+)?\.pfm"
+    return name in RESULT_FILES or name in _SOME or bool(re.fullmatch(numbered, name))
 
 
 def names_as_taken(position: tuple[int, int] | None = None, *, with_sigma: bool = False) -> tuple[str, ...]:

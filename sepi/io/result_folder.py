@@ -5,9 +5,10 @@ docs/reference/outputs.md describes the files.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import NoneType
 from typing import Any
@@ -21,13 +22,12 @@ from sepi.camera.rig import Rig
 from sepi.errors import SepiError
 from sepi.io import hdf5, map_pictures
 from sepi.io.disparity_maps import write_pfm
-from sepi.io.files import atomic_folder, atomic_path, remove_files, write_whole
+from sepi.io.files import atomic_folder, remove_files, write_whole
 from sepi.io.images import write_png
 from sepi.io.point_cloud import point_cloud, write_ply
 from sepi.io.provenance import DIGEST, RESULT, result_attributes
 from sepi.io.result_files import (
     ALL_VIEWS,
-    DEPTH,
     RESULT_FILES,
     RUNTIME,
     UNKNOWN,
@@ -37,7 +37,7 @@ from sepi.io.result_files import (
 )
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.process.threads import available_cores
-from sepi.stage import StageMaps
+from sepi.stage import ERROR_BARS, HIGH, LOW, SIGMA, StageMaps
 from sepi.validation import described, is_finite, require_path, require_type
 
 _Attributes = Mapping[str, hdf5.Attribute]
@@ -232,19 +232,8 @@ def read_result(path: str | Path, view: _View | None = None) -> Result:
     (True, True)
     """
     path = require_path("result", path)
-    return result_in(all_views_file(path, view) or (path / RESULT if path.is_dir() else path), view)
-
-
-def all_views_file(path: Path, view: _View | None) -> Path | None:
-    """The file of maps of all views; None: the map of a result's own view, or of another program."""
-    path = path / ALL_VIEWS if path.is_dir() and view is not None else path
-    # reading reports a damaged file
-    return path if hdf5.has_dataset(path, EXTENDED, if_damaged=True) else None
-
-
-def result_in(path: Path, view: _View | None, check: bool = True) -> Result:
-    """Result of a view in a file; ``check=False`` does not read the whole file for its digest."""
-    with hdf5.open_hdf5(path, "result of 'sepi depth'", check) as file:
+    path = all_views_file(path, view) or (path / RESULT if path.is_dir() else path)
+    with hdf5.open_hdf5(path, "result of 'sepi depth'") as file:
         own = tuple(map(int, hdf5.attribute(file, "view_position")))
         place = place_in(path, file, view)
         if place is ... and view not in (None, own):
@@ -254,7 +243,9 @@ def result_in(path: Path, view: _View | None, check: bool = True) -> Result:
         if missing := {"disparity", "confidence"}.difference(maps):
             raise SepiError(f"damaged result of 'sepi depth': it has no {' and no '.join(sorted(missing))}")
         picture = hdf5.read_dataset(path, file["view" if place is ... else "picture"], place)
-        centre, rig = hdf5.attribute(file, "from_centre"), hdf5.read_rig(file)
+        names = ("scene", "camera", "from_centre", hdf5.RIG)
+        known = {name: hdf5.attribute(file, name) for name in names if name in file.attrs}
+        centre, rig = known["from_centre"], Rig.from_text(str(known[hdf5.RIG])) if hdf5.RIG in known else None
         if place is ...:
             unknown = (
                 hdf5.read_dataset(path, file[UNKNOWN]) > 0 if UNKNOWN in file else np.zeros(picture.shape[:2], bool)
@@ -263,12 +254,20 @@ def result_in(path: Path, view: _View | None, check: bool = True) -> Result:
             unknown = (hdf5.read_dataset(path, file[EXTENDED], place) > 0) | (maps["confidence"] == 0)
             baseline = hdf5.read_dataset(path, file["baselines"])[place]
             centre, rig = centre + baseline, rig and rig.seen_from(baseline)
-        scene = str(hdf5.attribute(file, "scene")) if "scene" in file.attrs else ""
-        camera, (down, across) = hdf5.read_camera(file), map(float, centre)
+        camera = Camera(*map(float, known["camera"])) if "camera" in known else None
+        down, across = map(float, centre)
     shapes = {name: values.shape for name, values in (*maps.items(), (UNKNOWN, unknown))}
     if set(shapes.values()) != {picture.shape[:2]} or picture.shape[2:] not in ((1,), (3,)):
         raise SepiError(f"{path}: damaged: view {picture.shape} and maps {shapes} do not fit together")
+    scene = str(known.get("scene", ""))
     return Result(scene, picture, **maps, unknown=unknown, camera=camera, from_centre=(down, across), rig=rig)
+
+
+def all_views_file(path: Path, view: _View | None) -> Path | None:
+    """The file of maps of all views; None: the map of a result's own view, or of another program."""
+    path = path / ALL_VIEWS if path.is_dir() and view is not None else path
+    # reading reports a damaged file
+    return path if hdf5.has_dataset(path, EXTENDED, if_damaged=True) else None
 
 
 def place_in(path: Path, file: h5py.File, view: _View | None) -> Any:
@@ -291,59 +290,58 @@ def _write_files(
     seconds: float | None,
     beside: _Names,
 ) -> _Names:
-    camera, view = light_field.camera, light_field.views[light_field.reference_position]
-    masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
-    more: dict[str, npt.NDArray[Any]] = {"view": view}
-    metres = map_pictures.bars_in_metres(maps, camera)
+    camera, disparity, sigma = light_field.camera, maps.disparity, maps.sigma
+    more: dict[str, npt.NDArray[Any]] = {"view": light_field.views[light_field.reference_position]}
     if camera is not None:
-        more |= {"depth": camera.depth(maps.disparity), **metres}
-    write_as_taken(folder, light_field, maps.disparity, sigma=maps.sigma)
-    unknown, digest = maps.mask(UNKNOWN), attributes.get(DIGEST)
+        more["depth"] = camera.depth(disparity)
+        if sigma is not None and maps.low is not None and maps.high is not None:
+            # larger disparities are nearer
+            more |= {"nearest": camera.depth(maps.high), "farthest": camera.depth(maps.low)}
+            more["depth_sigma"] = camera.depth_sigma(disparity, sigma)
+    writers, digest = _writers(light_field, maps, more, seconds), attributes.get(DIGEST)
+    taken = write_as_taken(folder, light_field, disparity, sigma=sigma)
     # images are packed outside Python's lock
     with ThreadPoolExecutor(min(4, available_cores())) as pool:
         # the digest of all views takes longest, and runs outside Python's lock
         told = pool.submit(result_attributes, light_field, maps, None if digest is None else str(digest))
-        written = [
-            pool.submit(map_pictures.write_16bit, folder / "disparity_16bit.png", maps.disparity),
-            pool.submit(map_pictures.write_error_bars, folder, maps, metres, unknown),
-            pool.submit(_write_pictures, folder, maps, masks, unknown),
-            pool.submit(_write_numbers, folder, light_field, maps, more.get("depth"), seconds),
-        ]
+        written = [pool.submit(write, folder / name) for name, write in writers.items()]
         with hdf5.create_hdf5(folder / RESULT) as file:
-            hdf5.put_maps(file, maps.updated(maps.disparity, maps.confidence, **more))
+            hdf5.put_maps(file, maps.updated(disparity, maps.confidence, **more))
             for one in written:
                 one.result()
+            names = (*RESULT_FILES[:-1], *sorted({*writers, *taken}.difference(RESULT_FILES)), RESULT)
             # a later result may replace these files: they are not a user's own
-            others = {path.name for path in folder.iterdir() if path.name[0] != "."}.difference(RESULT_FILES)
-            names = (*RESULT_FILES[:-1], *sorted(others), RESULT)
             files = {"files": " ".join(sorted((*names, *beside)))}
             file.attrs.update({**told.result(), **attributes, **files})
     return names
 
 
-def _write_pictures(folder: Path, maps: StageMaps, masks: Mapping[str, BoolMap], unknown: BoolMap) -> None:
-    write_png(folder / "disparity.png", map_pictures.colour_code(maps.disparity, unknown))
-    write_png(folder / "confidence.png", map_pictures.levels(maps.confidence))
-    for name, mask in masks.items():
-        write_png(folder / name, mask, _MASK_TEXT)
-
-
-def _write_numbers(
-    folder: Path, light_field: LightField, maps: StageMaps, depth: FloatMap | None, seconds: float | None
-) -> None:
-    if depth is not None:
-        write_pfm(folder / DEPTH, depth)
-    if seconds is not None:
-        write_whole(folder / RUNTIME, f"{seconds:.3f}\n")
-    write_pfm(folder / "disparity.pfm", maps.disparity)
-    with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
-        np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
-    view, unknown = light_field.views[light_field.reference_position], maps.mask(UNKNOWN)
+def _writers(
+    light_field: LightField, maps: StageMaps, more: Mapping[str, npt.NDArray[Any]], seconds: float | None
+) -> dict[str, Callable[[Path], None]]:
+    """What writes each file of a result beside ``result.h5``, by its name."""
+    disparity, unknown, sigma = maps.disparity, maps.mask(UNKNOWN), maps.sigma
     camera, centre, rig = light_field.camera, light_field.from_centre, light_field.reference_rig
-    cloud = point_cloud(
-        view, maps.disparity, camera=camera, from_centre=centre, unknown=unknown, rig=rig, sigma=maps.sigma
-    )
-    write_ply(folder / "points.ply", cloud)
+    shown: dict[str, Any] = {"camera": camera, "from_centre": centre, "unknown": unknown, "rig": rig, "sigma": sigma}
+    writers: dict[str, Callable[[Path], None]] = {
+        "disparity.npy": lambda path: np.save(path, disparity.astype("<f4"), allow_pickle=False),
+        "disparity_16bit.png": lambda path: map_pictures.write_16bit(path, disparity),
+        "disparity.png": lambda path: write_png(path, map_pictures.colour_code(disparity, unknown)),
+        "confidence.png": lambda path: write_png(path, map_pictures.levels(maps.confidence)),
+        "points.ply": lambda path: write_ply(path, point_cloud(more["view"], disparity, **shown)),
+    }
+    floats = {"disparity": disparity, **{name: maps.extra[name] for name in ERROR_BARS if name in maps.extra}, **more}
+    pfm = [name for name in ("disparity", SIGMA, "depth", "depth_sigma") if name in floats]
+    writers |= {f"{name}.pfm": partial(write_pfm, values=floats[name]) for name in pfm}
+    masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
+    writers |= {name: partial(write_png, pixels=mask, texts=_MASK_TEXT) for name, mask in masks.items()}
+    if sigma is not None:
+        bounds = {name: floats[name].astype("<f4") for name in (LOW, HIGH, "nearest", "farthest") if name in floats}
+        writers["sigma.png"] = lambda path: write_png(path, map_pictures.sigma_picture(sigma, unknown))
+        writers["interval.npz"] = lambda path: np.savez(path, allow_pickle=False, **bounds)
+    if seconds is not None:
+        writers[RUNTIME] = partial(write_whole, content=f"{seconds:.3f}\n")
+    return writers
 
 
 def write_as_taken(
@@ -352,7 +350,7 @@ def write_as_taken(
     disparity: FloatMap,
     position: _View | None = None,
     sigma: FloatMap | None = None,
-) -> None:
+) -> _Names:
     """Write the maps of a view at the pixels of the image as its calibrated camera took it; nothing without a rig.
 
     Parameters
@@ -365,13 +363,20 @@ def write_as_taken(
         Position of the view in the grid; default: the reference view.
     sigma : ndarray, shape (H, W), float32, optional
         Standard deviation of the disparity.
+
+    Returns
+    -------
+    tuple of str
+        Names of the files written.
     """
     if light_field.camera is None or light_field.rig is None:
-        return
+        return ()
     from sepi.camera.as_taken import as_taken
 
     t, s = position or light_field.reference_position
     down, across = (light_field.baselines[t, s] + light_field.from_centre).tolist()
     maps = as_taken(disparity, sigma, light_field.camera, light_field.rig, (t, s), (down, across))
-    for name, values in zip(names_as_taken(position, with_sigma=sigma is not None), maps, strict=True):
+    names = names_as_taken(position, with_sigma=sigma is not None)
+    for name, values in zip(names, maps, strict=True):
         write_pfm(folder / name, values)
+    return names

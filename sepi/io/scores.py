@@ -1,10 +1,10 @@
 """Score files of a scene's disparity maps, those of external methods among them.
 
-A score file has a group in ``maps`` for each map, with its ``name`` as an attribute. It holds ``scores``, JSON from
-protocol and region to scores, the signed error map ``error (H, W)``, and the masks ``regions/NAME (H, W)``, which all
-maps share and which are stored once. A map with error bars also has ``reliability (3, 10)``. If the scene has no ground
-truth, these groups are empty, and the root attribute ``ground_truth`` is False. The maps of external methods have
-attributes ``source``, ``problem`` and ``sha256``, too, and ``disparity (H, W)`` if there is no problem.
+A score file has a group in ``maps`` for each map, with its ``name`` as an attribute. It holds ``evaluation``, JSON of
+the fields of an :class:`Evaluation` that are no arrays, the signed error map ``error (H, W)``, and the masks
+``regions/NAME (H, W)``, which all maps share and which are stored once. A map with error bars also has ``reliability
+(3, 10)``, and that of an external method ``disparity (H, W)`` if there is no problem. If the scene has no ground truth,
+there are no scores and arrays, and the root attribute ``ground_truth`` is False.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from sepi.io.disparity_maps import SUFFIXES, map_file
 from sepi.io.hdf5 import Attribute, attribute, create_hdf5, members, open_hdf5, put, read_dataset
 from sepi.lightfield import BoolMap, FloatMap
 
-_MAPS, _SCORES = "maps", "scores"
-_RELIABILITY = "reliability"
+_MAPS, _TEXT = "maps", "evaluation"
+_MAPS_OF_ONE, _RELIABILITY = ("disparity", "error"), "reliability"
 _KIND = "score file (written by python -m sepi.evaluate or sepi.external)"
-_TOLD = ("source", "problem", "sha256")
+_AS_TEXT = ("scores", "region_sources", "source", "problem", "sha256")
 
 Scores = dict[str, float]
 """Score to value, for one protocol and region."""
@@ -144,37 +144,26 @@ def read_evaluations(
 
 def _put_evaluation(group: h5py.Group, evaluation: Evaluation, shared: Mapping[str, h5py.Dataset]) -> None:
     """Write an evaluation into an empty group; regions that are there already are linked."""
-    group.attrs.update({name: text for name in _TOLD if (text := getattr(evaluation, name))})
-    if evaluation.scores:
-        # as JSON, since thousands of attributes in groups would take seconds to read
-        put(group, _SCORES, np.frombuffer(json.dumps(evaluation.scores, sort_keys=True).encode(), np.uint8))
-    for name in ("disparity", "error"):
+    # as JSON, since thousands of attributes in groups would take seconds to read
+    told = json.dumps({name: getattr(evaluation, name) for name in _AS_TEXT}, sort_keys=True)
+    put(group, _TEXT, np.frombuffer(told.encode(), np.uint8))
+    for name in (*_MAPS_OF_ONE, _RELIABILITY):
         if (values := getattr(evaluation, name)) is not None:
             put(group, name, values)
-    if evaluation.reliability is not None:
-        put(group, _RELIABILITY, evaluation.reliability, axes="(pixels, said, found) said_tenth")
     for name, mask in sorted(evaluation.regions.items()):
         if name in shared:
             group[f"regions/{name}"] = shared[name]
         else:
-            put(group, f"regions/{name}", mask, source=evaluation.region_sources[name])
+            put(group, f"regions/{name}", mask)
 
 
 def _evaluation_in(path: Path, group: h5py.Group, with_maps: bool) -> Evaluation:
-    numbers = {name: read_dataset(path, group[name]) for name in (_SCORES, _RELIABILITY) if name in group}
-    scores = json.loads(numbers[_SCORES].tobytes()) if _SCORES in numbers else {}
+    told = json.loads(read_dataset(path, group[_TEXT]).tobytes())
+    names = (*_MAPS_OF_ONE * with_maps, _RELIABILITY)
+    arrays: dict[str, Any] = {name: read_dataset(path, group[name]) for name in names if name in group}
     regions = members(group.get("regions", {})) if with_maps else []
-    more: dict[str, Any] = {name: str(attribute(group, name)) for name in _TOLD if name in group.attrs}
-    for name in ("disparity", "error"):
-        if with_maps and name in group:
-            more[name] = read_dataset(path, group[name]).astype(np.float32)
-    return Evaluation(
-        scores={protocol: {region: dict(cell) for region, cell in of.items()} for protocol, of in scores.items()},
-        regions={name: read_dataset(path, mask).astype(bool) for name, mask in regions},
-        region_sources={name: str(attribute(mask, "source")) for name, mask in regions},
-        reliability=numbers.get(_RELIABILITY),
-        **more,
-    )
+    masks = {name: read_dataset(path, mask).astype(bool) for name, mask in regions}
+    return Evaluation(**told, regions=masks, **arrays)
 
 
 def without_nan(value: Any) -> Any:

@@ -51,7 +51,7 @@ _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
 
 
 # packages and modules of which a job runs one
-_READERS = ("eslf", "exported", "hci", "image_folder", "matlab")
+_READERS = ("exported", "hci", "image_folder")
 _ALTERNATIVES = ("scenes", *(f"io.readers.{name}" for name in _READERS))
 _HEADER = ".hpp"
 # arguments of calls that are texts for people

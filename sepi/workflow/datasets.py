@@ -107,7 +107,7 @@ class Scene:
         if self.module is not None:
             return self.module
         # ingest reports an unknown format
-        return format_of.__module__ if self._format is None else self._format.read.__module__
+        return format_of.__module__ if self._format is None else self._format.matches.__module__
 
     @property
     def truth(self) -> tuple[Path, ...]:

@@ -9,21 +9,9 @@ from clouds import H, W, cloud_of, light_field, read_back
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.point_cloud import PointCloud, point_cloud, read_positions, write_ply
+from sepi.io.point_cloud import PointCloud, point_cloud, write_ply
 
 CAMERA = Camera(scale=12.0, offset=3.0, focal_px=400.0)
-
-
-# --- what is read
-
-
-@pytest.mark.parametrize(
-    "lines", ["element vertex 0\nproperty float x", "element face 0\nproperty list uchar int at", "vertex 0"]
-)
-def test_what_is_no_ply_of_points_is_refused(tmp_path: Path, lines: str) -> None:
-    (tmp_path / "a.ply").write_text(f"ply\nformat ascii 1.0\n{lines}\nend_header\n")
-    with pytest.raises(SepiError, match=r"a\.ply: not a PLY file of points"):
-        read_positions(tmp_path / "a.ply")
 
 
 # --- positions

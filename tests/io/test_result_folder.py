@@ -419,7 +419,7 @@ def test_what_noise_puts_beyond_infinity_is_no_fault_of_the_camera(tmp_path: Pat
 def test_an_interrupt_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Half of the maps beside those of an earlier run would be of no light field."""
 
-    def stop(*_: object) -> None:
+    def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     light_field = render("dots", size=64, views=3)

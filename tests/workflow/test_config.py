@@ -196,10 +196,10 @@ class TestOwnLightFields:
     """Light fields of any format go through the workflow, too."""
 
     def test_flags_reach_ingest(self, tmp_path: Path) -> None:
-        (tmp_path / "lego.mat").write_bytes(bytes(3 * 81 * 100))
+        (tmp_path / "lego.npy").write_bytes(bytes(3 * 81 * 100))
         entry = {
-            "path": str(tmp_path / "lego.mat"),
-            "format": "matlab",
+            "path": str(tmp_path / "lego.npy"),
+            "format": "numpy",
             "grid": "9x9",
             "central": 5,
             "order": "flip-rows",
@@ -212,10 +212,10 @@ class TestOwnLightFields:
         }
         settings = load_settings({"light_fields": {"lego": entry}, "disparity_range": {"own/lego": [-1, 2]}})
         scene = settings.scene("own", "lego")
-        words = "--format matlab --grid 9x9 --central 5 --order flip-rows --view 2,3 --row-spacing 0.5 --white 1023.0"
+        words = "--format numpy --grid 9x9 --central 5 --order flip-rows --view 2,3 --row-spacing 0.5 --white 1023.0"
         words += " --crop-of 128x96+1+2"
         assert scene.flags == (*words.split(), "--exclude", "0,0", "--exclude", "4,4", "--follow-links")
-        assert scene.files == (tmp_path / "lego.mat",)
+        assert scene.files == (tmp_path / "lego.npy",)
         assert scene.disparity_range == (-1, 2)
         assert (scene.views, scene.height, scene.width) == (81, 10, 10)
 

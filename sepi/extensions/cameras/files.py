@@ -28,7 +28,6 @@ from sepi.camera.rig import FISHEYE, METRES, PINHOLE, Floats, Lens, Shot
 from sepi.errors import SepiError
 from sepi.extensions.cameras.model import UNITS_OF_MODEL, CameraModel, Picture, Pictures, mask_of
 from sepi.io.files import naming, reading
-from sepi.io.point_cloud import read_positions
 from sepi.validation import require_known
 from sepi.validation.models import AS_PAIR, CheckedModel, validated
 
@@ -185,6 +184,24 @@ def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
     if not inside or not (path.parent / cloud).is_file():
         return CameraModel(path, tuple(found), units=units)
     return CameraModel(path, tuple(found), read_positions(path.parent / cloud), units)
+
+
+def read_positions(path: Path) -> Floats:
+    """Coordinates (N, 3) of the points of a PLY file.
+
+    Raises
+    ------
+    SepiError
+        If it is damaged or has no points.
+    """
+    from plyfile import PlyData
+
+    with reading(path, "PLY file of points"):
+        try:
+            points = PlyData.read(path)["vertex"]
+        except MemoryError as error:
+            raise SepiError("damaged: it cannot hold as many points as its header says") from error
+        return np.column_stack([np.asarray(points[axis], np.float64) for axis in "xyz"])
 
 
 def _picture_of_frame(name: str, entry: Mapping[str, Any], pictures: Pictures) -> Picture:

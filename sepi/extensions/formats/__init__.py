@@ -1,5 +1,7 @@
-"""Readers of formats that few light fields have."""
+"""Readers of formats of single programs and devices: MATLAB, lenslet pictures, mosaics, TIFF stacks, OpenLF."""
 
 from sepi.registry import Extension
 
-EXTENSION = Extension(readers=dict.fromkeys(("mosaic", "tiff-stack", "openlf"), f"{__name__}.readers"))
+_MODULES = {"matlab": "matlab", **dict.fromkeys(("eslf", "mosaic", "tiff-stack", "openlf"), "readers")}
+
+EXTENSION = Extension(readers={word: f"{__name__}.{module}" for word, module in _MODULES.items()})

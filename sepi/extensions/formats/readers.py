@@ -1,4 +1,8 @@
-"""Readers of formats that few light fields have: mosaics and quilts, TIFF stacks, and OpenLF's HDF5 files.
+"""Readers of formats that few light fields have: pictures of all views, TIFF stacks, and OpenLF's HDF5 files.
+
+In decoded lenslet images of the Stanford Lytro Light Field Archive [3]_, a block of pixels lies under each lenslet, one
+of each sub-aperture image: the pixels ``(t, s)`` of all blocks are the view ``(t, s)``. Views near the corners of the
+grid are dark.
 
 A mosaic is one image of all views side by side. The name of a quilt of a Looking Glass display [1]_ gives its layout:
 ``_qs8x6a0.75`` means 8 columns, 6 rows and the aspect ratio of a view. Its views are a single row of cameras, from the
@@ -15,6 +19,8 @@ References
 ----------
 .. [1] "Quilts", https://docs.lookingglassfactory.com/keyconcepts/quilts
 .. [2] S. Wanner, "OpenLF", https://github.com/svenwanner/openlf
+.. [3] A. Raj, M. Lowney, R. Shah, G. Wetzstein, "Stanford Lytro Light Field Archive", 2016.
+       http://lightfields.stanford.edu/LF2016.html
 """
 
 import math
@@ -30,7 +36,7 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError, printable
-from sepi.io.codecs import TIFF_SIGNATURES, directory_of, open_tiff, page_pixels, tiff_form
+from sepi.io.codecs import TIFF, TIFF_SIGNATURES, directory_of, open_tiff, page_pixels, tiff_form
 from sepi.io.files import DEFLATE_RATIO, naming, reading
 from sepi.io.hdf5 import has_dataset, number_of, open_hdf5, read_dataset
 from sepi.io.images import SUFFIXES, read_picture
@@ -38,7 +44,7 @@ from sepi.io.readers.arrays import Array, light_field_from_array
 from sepi.io.readers.formats import Format
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import MAX_VIEWS
-from sepi.lightfield import LightField
+from sepi.lightfield import MIN_SIZE, LightField
 
 _QUILT = re.compile(r".*_qs([0-9]{1,4})x([0-9]{1,4})a[0-9.]+", re.IGNORECASE)
 
@@ -69,7 +75,61 @@ def read_mosaic(path: Path, options: ReadOptions) -> LightField:
     return replace(light_field, notes=(note, *light_field.notes))
 
 
-_SUFFIXES = (".tif", ".tiff")
+# rows and columns of pixels under a lenslet in images of the archive
+_BLOCK = (14, 14)
+
+_CENTRAL = 9
+_DARK = 0.2
+
+
+def matches_lenslets(path: Path) -> bool:
+    """Whether ``path`` is an image with ``eslf`` in its name."""
+    return "eslf" in path.name.lower() and path.suffix.lower() in SUFFIXES and path.is_file()
+
+
+def read_lenslets(path: Path, options: ReadOptions) -> LightField:
+    """Read the views of a lenslet image; by default the middle 9x9 of them.
+
+    Parameters
+    ----------
+    path : Path
+        Image of any supported kind.
+    options : ReadOptions
+        ``grid`` is the size of the block under a lenslet.
+    """
+    T, S = grid = options.grid or _BLOCK
+    if not 2 <= T * S <= MAX_VIEWS:
+        raise SepiError(f"{path}: --grid {T}x{S}: expected a grid of 2 to {MAX_VIEWS} views")
+    # default: 9 views a side or, in a smaller grid, the largest odd number
+    usual = (min(_CENTRAL, T, S) + 1) // 2 * 2 - 1
+    central = options.central or (usual if usual > 1 else None)
+    picture = read_picture(path, any_floats=options.white is not None)
+    height, width = picture.shape[0] // T, picture.shape[1] // S
+    if min(height, width) < MIN_SIZE:
+        raise SepiError(f"{path}: {T}x{S} views under each lenslet make views of {width}x{height} pixels; too small")
+    notes = []
+    if options.central is None and central is not None and (central, central) != grid:
+        notes.append(f"the {central}x{central} views in the middle of {T}x{S}; --central N takes another odd number")
+    cropped = picture.shape[0] - height * T, picture.shape[1] - width * S
+    if any(cropped):
+        notes.append(f"{cropped[0]} pixel rows and {cropped[1]} columns beyond the last whole lenslet were left out")
+    blocks = picture[: height * T, : width * S].reshape(height, T, width, S, -1)
+    light_field = light_field_from_array(blocks, path, replace(options, grid=None, central=central), axes="HTWSC")
+    return replace(light_field, notes=(*notes, *light_field.notes, *_dark_notes(light_field)))
+
+
+def _dark_notes(light_field: LightField) -> list[str]:
+    """Notes on the views that are much darker than the reference view."""
+    brightness = light_field.views.mean(axis=(2, 3, 4), dtype=np.float64)
+    limit = _DARK * brightness[light_field.reference_position]
+    dark = np.argwhere(light_field.present & (brightness < limit)).tolist()
+    if not dark:
+        return []
+    flags = " ".join(f"--exclude {t},{s}" for t, s in dark)
+    views = "1 view is" if len(dark) == 1 else f"{len(dark)} views are"
+    return [f"{views} darker than a fifth of the reference view; to leave out: {flags}"]
+
+
 _STACK = "TIFF stack"
 _RGB = 3
 # bytes that the pages of any file may take, however small the file
@@ -81,7 +141,7 @@ def matches_stack(path: Path) -> bool:
 
     Other TIFFs hold one image, perhaps with a thumbnail.
     """
-    if path.suffix.lower() not in _SUFFIXES or not path.is_file():
+    if path.suffix.lower() not in TIFF or not path.is_file():
         return False
     try:
         with reading(path, _STACK), path.open("rb") as file:
@@ -223,6 +283,7 @@ def _mosaic(path: Path, dataset: h5py.Dataset, shape: tuple[int, int], column: b
 
 
 FORMATS = {
+    "eslf": Format("Lytro lenslet image", "NAME_eslf.png", matches_lenslets, read_lenslets, ("grid",)),
     "mosaic": Format("mosaic of views", "NAME_qs8x6a0.75.png", matches_quilt, read_mosaic, ("grid",)),
     "tiff-stack": Format(
         "TIFF stack", "a page for each view", matches_stack, read_stack, ("grid",), size_of=size_of_stack

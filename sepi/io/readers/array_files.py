@@ -6,15 +6,17 @@ have any name, at the root or in groups.
 
 from __future__ import annotations
 
+import io
 import math
 import re
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -22,10 +24,9 @@ from numpy.lib import format as npy
 
 from sepi.errors import SepiError, printable
 from sepi.io.files import DEFLATE_RATIO, reading
-from sepi.io.hdf5 import attribute, has_dataset, is_own, open_hdf5, read_dataset
+from sepi.io.hdf5 import has_dataset, is_own, open_hdf5, read_dataset
 from sepi.io.readers.arrays import Array, is_likely, light_field_from_array
 from sepi.io.readers.options import ReadOptions
-from sepi.io.readers.view_files import MAX_VIEWS
 from sepi.lightfield import LightField
 from sepi.validation import require_known
 
@@ -123,16 +124,16 @@ def _listed(arrays: Arrays) -> str:
     )
 
 
-MATLAB_HDF5 = b"MATLAB 7.3 MAT-file"
-"""First bytes of a MATLAB file of version 7.3."""
-
-_CLASS = "MATLAB_class"
-# MATLAB's classes of numbers; others are text, logical values, ...
-_NUMBERS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "single", "uint64", "int64", "double")
-_CELL, _MOST_CELLS = "cell", 8 * MAX_VIEWS
+def as_stored(path: Path, name: str, entry: Any) -> StoredArray | None:
+    """The array of an entry of an HDF5 file; None if that is not an array of numbers."""
+    if isinstance(entry, h5py.Dataset) and entry.shape is not None and entry.dtype.kind in "iuf":
+        return StoredArray(entry.shape, entry.dtype, partial(_hdf5_array, path, name))
+    return None
 
 
-def hdf5_arrays(path: Path, check: bool = True) -> Arrays:
+def hdf5_arrays(
+    path: Path, check: bool = True, stored: Callable[[Path, str, Any], StoredArray | None] = as_stored
+) -> Arrays:
     """Each array of numbers; arrays in groups only if none outside may be a light field.
 
     No values are read; ``check=False`` does not read the whole file for its digest.
@@ -141,10 +142,8 @@ def hdf5_arrays(path: Path, check: bool = True) -> Arrays:
     with open_hdf5(path, check=check) as file:
 
         def take(name: str, entry: object) -> None:
-            # '#refs#' holds the contents of cells
-            if not name.startswith("#") and (cells := _cells(entry)):
-                shape = *_outer(entry), *cells[0].shape[:: _turn(path, cells[0])]
-                found[name] = StoredArray(shape, cells[0].dtype, partial(_hdf5_array, path, name))
+            if (array := stored(path, name, entry)) is not None:
+                found[name] = array
 
         for name in file:
             take(name, file.get(name))
@@ -155,51 +154,12 @@ def hdf5_arrays(path: Path, check: bool = True) -> Arrays:
 
 def _hdf5_array(path: Path, name: str) -> Array:
     with open_hdf5(path) as file:
-        cells = _cells(file[name])
-        arrays = [read_dataset(path, cell).transpose([*range(cell.ndim)][:: _turn(path, cell)]) for cell in cells]
-        return arrays[0] if len(arrays) == 1 else np.stack(arrays).reshape(*_outer(file[name]), *arrays[0].shape)
-
-
-def _cells(entry: Any) -> list[h5py.Dataset]:
-    """The entry itself if it is an array of numbers, or the arrays of a cell array if all are alike; else empty."""
-    if not isinstance(entry, h5py.Dataset) or entry.shape is None:
-        return []
-    if entry.dtype != h5py.ref_dtype:
-        return [entry] if _is_numbers(entry) else []
-    if _class(entry) != _CELL or not entry.nbytes <= entry.id.get_storage_size() <= _MOST_CELLS:
-        return []
-    try:
-        cells = [entry.file[reference] for reference in entry[()].T.ravel()]
-    except ValueError:
-        # a null reference
-        return []
-    alike = all(map(_is_numbers, cells)) and len({(cell.shape, cell.dtype) for cell in cells}) == 1
-    return cells if alike else []
-
-
-def _outer(entry: Any) -> tuple[int, ...]:
-    """Axes of a cell array as MATLAB shows them, without those of size 1."""
-    return tuple(n for n in entry.shape[::-1] if n > 1) if entry.dtype == h5py.ref_dtype else ()
-
-
-def _turn(path: Path, dataset: h5py.Dataset) -> int:
-    """-1 if the axes are in reverse, as only MATLAB writes them; else 1."""
-    with path.open("rb") as file:
-        return -1 if _CLASS in dataset.attrs or file.read(len(MATLAB_HDF5)) == MATLAB_HDF5 else 1
-
-
-def _class(entry: h5py.Dataset) -> str:
-    return str(attribute(entry, _CLASS)) if _CLASS in entry.attrs else ""
-
-
-def _is_numbers(entry: Any) -> bool:
-    held = isinstance(entry, h5py.Dataset) and entry.shape is not None and entry.dtype.kind in "iuf"
-    return held and _class(entry) in ("", *_NUMBERS)
+        return read_dataset(path, file[name])
 
 
 _NUMPY = "NumPy file"
-# first bytes of a ZIP archive with members, and of an empty one
-_ZIP_MAGICS = (b"PK\x03\x04", b"PK\x05\x06")
+# NumPy itself refuses longer ones
+_LONGEST_HEADER = 2**14
 _OBJECTS = "Python objects, which may be any program; save images as one array, numpy.stack(them)"
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
@@ -209,53 +169,43 @@ def matches_numpy(path: Path) -> bool:
     return path.is_file() and (path.suffix.lower() in (".npy", ".npz") or bool(numpy_arrays(path)))
 
 
-def read_numpy(path: Path, options: ReadOptions) -> LightField:
-    """Light field from the array of a NumPy file; of an archive, ``options.variable`` or the array that fits."""
-    return light_field_of(path, numpy_arrays(path), options)
-
-
-def _mapped_array(path: Path) -> Array:
-    """Array of a ``.npy`` file, memory-mapped: values are read when used."""
-    with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"):
-        with path.open("rb") as file:
-            start = file.read(12)
-            # NumPy allocates this length before it reads; two bytes in version 1, four in later ones
-            length = int.from_bytes(start[8:10] if start[6:7] == b"\x01" else start[8:12], "little")
-            if length > path.stat().st_size:
-                raise ValueError(f"a header of {length} bytes")
-            if b"'|O'" in file.read(length):
-                raise SepiError(_OBJECTS)
-        array: Array = np.load(path, mmap_mode="r", allow_pickle=False)
-        return array
-
-
 def numpy_arrays(path: Path) -> Arrays:
     """Each array by name; a ``.npy`` has the file's own name. No values are read."""
     found = {}
-    with reading(path, _NUMPY), path.open("rb") as file:
-        is_zipped = file.read(4) in _ZIP_MAGICS
-    if not is_zipped:
-        array = _mapped_array(path)
-        return {path.stem: StoredArray(array.shape, array.dtype, lambda: array)}
-    with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"), zipfile.ZipFile(path) as archive:
-        for info in archive.infolist():
-            if info.filename.endswith(".npy"):
-                _require_room(path, info)
-                with archive.open(info) as file:
-                    shape, _, kind = _HEADERS[npy.read_magic(file)](file)
-                # NumPy allocates this shape before it reads
-                if math.prod(shape) * kind.itemsize > info.file_size:
-                    raise ValueError(f"{info.filename} of shape {shape} cannot lie in {info.file_size} bytes")
-                name = info.filename.removesuffix(".npy")
-                found[name] = StoredArray(shape, kind, partial(_packed_array, path, name, kind))
+    with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"), path.open("rb") as file:
+        if not zipfile.is_zipfile(file) and file.seek(0) == 0:
+            shape, kind = _form(file, path.stat().st_size)
+            if kind.hasobject:
+                raise SepiError(_OBJECTS)
+            return {path.stem: StoredArray(shape, kind, partial(_values, path, None, kind))}
+        with zipfile.ZipFile(file) as archive:
+            for info in archive.infolist():
+                if info.filename.endswith(".npy"):
+                    _require_room(path, info)
+                    name = info.filename.removesuffix(".npy")
+                    with archive.open(info) as member:
+                        shape, kind = _form(member, info.file_size)
+                    found[name] = StoredArray(shape, kind, partial(_values, path, name, kind))
     return found
 
 
-def _packed_array(path: Path, name: str, kind: np.dtype[Any]) -> Array:
-    with reading(path, _NUMPY), np.load(path, allow_pickle=False) as archive:
+def _form(file: IO[bytes], size: int) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of an array that can lie in so many bytes; NumPy would allocate any."""
+    head = io.BytesIO(file.read(_LONGEST_HEADER))
+    shape, _, kind = _HEADERS[npy.read_magic(head)](head)
+    if not 0 <= math.prod(shape) * kind.itemsize <= size:
+        raise ValueError(f"an array of shape {shape} cannot lie in {size} bytes")
+    return shape, kind
+
+
+def _values(path: Path, name: str | None, kind: np.dtype[Any]) -> Array:
+    """The array of a file, memory-mapped, or that of this name in an archive."""
+    with reading(path, _NUMPY), warnings.catch_warnings(action="ignore"):
         if kind.hasobject:
             raise SepiError(_OBJECTS)
-        array: Array = archive[name]
+        stored = np.load(path, mmap_mode="r", allow_pickle=False)
+        with nullcontext(stored) if name is None else stored:
+            array: Array = stored if name is None else stored[name]
         return array
 
 
@@ -270,8 +220,3 @@ def matches_hdf5(path: Path) -> bool:
     """Whether ``path`` is an HDF5 file of another program, with an array that may be a light field."""
     others = has_dataset(path, "/", lambda root: not is_own(root))
     return others and any(is_likely(one.shape) for one in hdf5_arrays(path).values())
-
-
-def read_hdf5(path: Path, options: ReadOptions) -> LightField:
-    """Light field from the array ``options.variable``; default: the array that can be a light field."""
-    return light_field_of(path, hdf5_arrays(path), options)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import permutations
 from math import isqrt, prod
 from pathlib import Path
@@ -14,9 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.readers.camera_positions import reordered
 from sepi.io.readers.options import ReadOptions, unarranged
-from sepi.io.readers.view_grid import Numbers, arrange_numbers, position_of, taken
+from sepi.io.readers.view_grid import Numbers, arrange_numbers
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
 
 # integer types that values of other types may stand for, and the least maximum of floats that are not whole numbers:
@@ -214,20 +212,6 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     missing = [*_missing_notes("all zeros", black), *_missing_notes("NaN throughout", unknown)]
     notes = (*assumed, *channel_notes, *assumptions, *missing)
     return LightField(views, path.stem, source, present, view=options.view, notes=notes, arranged=arranged)
-
-
-def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
-    """Light field with its views arranged as the options ask; ground truth and masks stay with their view."""
-    numbers = arrange_numbers(light_field.source or light_field.name, light_field.grid, options)
-    T, S = light_field.grid
-    if np.array_equal(numbers, np.arange(T * S).reshape(T, S)):
-        return light_field
-    positions, row_spacing = reordered(light_field.positions, light_field.row_spacing, options.order, numbers)
-    truth: dict[str, Any] = {"view": options.view, "ground_truth": None, "masks": {}}
-    position = position_of(numbers, light_field.reference_position[0] * S + light_field.reference_position[1])
-    if position is not None and (light_field.view is not None or light_field.ground_truth is not None):
-        truth = {"view": position}
-    return replace(light_field, **taken(light_field, numbers), **truth, positions=positions, row_spacing=row_spacing)
 
 
 def with_white(views: Array, present: BoolMap, path: Path, white: float) -> Array:

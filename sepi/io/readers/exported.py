@@ -22,9 +22,9 @@ from sepi.io.disparity_maps import read_pfm, write_pfm
 from sepi.io.files import atomic_folder, naming, reading, remove_files, write_whole
 from sepi.io.hdf5 import Properties, has_dataset, is_own, read_light_field, write_light_field
 from sepi.io.images import SUFFIXES, read_picture, write_png
-from sepi.io.readers.arrays import rearrange
 from sepi.io.readers.options import ReadOptions, in_grid, unarranged
 from sepi.io.readers.view_files import read_grid
+from sepi.io.readers.view_grid import rearrange
 from sepi.io.result_files import require_target
 from sepi.lightfield import BoolMap, LightField
 from sepi.validation import require_known
@@ -48,6 +48,11 @@ class Manifest(Properties, defer_build=True):
     ground_truth: str | None = None
     masks: dict[str, str] = Field(default={})
 
+    def files(self) -> list[str]:
+        """Names of all files."""
+        rows = (*self.views, *(self.missing or ()), (self.ground_truth, *self.masks.values()))
+        return [name for row in rows for name in row if name is not None]
+
 
 def read_manifest(path: Path) -> Manifest:
     """Read ``light_field.json``.
@@ -67,8 +72,7 @@ def read_manifest(path: Path) -> Manifest:
         for key, rows in (("views", known.views), ("positions", known.positions), ("missing", known.missing)):
             if rows is not None and (columns == 0 or [len(row) for row in rows] != [columns] * len(known.views)):
                 raise SepiError(f"{key}: expected {len(known.views)} rows of {columns} values, as 'views' has")
-        named = [name for row in (*known.views, *(known.missing or ())) for name in row]
-        for name in filter(None, (*named, known.ground_truth, *known.masks.values())):
+        for name in known.files():
             if name != Path(name).name or name == ".." or "\0" in name:
                 raise SepiError(f"expected names of files in its own folder, got {name[:80]!r}")
     return known
@@ -127,7 +131,8 @@ HDF5 = (".h5", ".hdf5")
 # suffixes of other formats of light fields, and of maps
 _OTHERS = SUFFIXES | {".mat", ".npy", ".npz", ".pfm", ".json"}
 _TRUTH = "gt_disp_lowres.pfm"
-_VIEW = re.compile(r"row_\d+_col_\d+\.(png|tif)")
+# names of files that are written beside the manifest
+_WRITTEN = re.compile(rf"(missing_)?row_\d+_col_\d+\.(png|tif)|mask_.*\.png|{re.escape(_TRUTH)}")
 
 
 def require_room(path: Path, *, force: bool = False) -> None:
@@ -220,10 +225,7 @@ def _write_folder(folder: Path, light_field: LightField) -> set[str]:
 def _earlier_files(folder: Path) -> set[str]:
     """Files that an earlier export wrote; an edited manifest may name a user's own files."""
     with suppress(SepiError):
-        known = read_manifest(folder / MANIFEST)
-        masks = {file for name, file in known.masks.items() if file == f"mask_{name}.png"}
-        views = {name for row in known.views for name in row if name is not None and _VIEW.fullmatch(name)}
-        return {*views, *masks, *([_TRUTH] if known.ground_truth == _TRUTH else [])}
+        return set(filter(_WRITTEN.fullmatch, read_manifest(folder / MANIFEST).files()))
     return set()
 
 

@@ -6,10 +6,11 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 
@@ -18,8 +19,8 @@ from sepi.io.disparity_maps import is_disparity
 from sepi.io.files import DEFLATE_RATIO, naming
 from sepi.io.hdf5 import has_dataset
 from sepi.io.images import SUFFIXES, picture_header
-from sepi.io.readers import array_files, eslf, exported, hci, image_folder, matlab
-from sepi.io.readers.array_files import Arrays, hdf5_arrays, no_light_field
+from sepi.io.readers import array_files, exported, hci, image_folder
+from sepi.io.readers.array_files import Arrays, hdf5_arrays, light_field_of, no_light_field
 from sepi.io.readers.arrays import is_likely, readings, with_white
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import has_rows
@@ -72,20 +73,79 @@ class Format(NamedTuple):
 
 
 # most light fields that a message names
-_LISTED = 5
+_LISTED = 3
 
 # poses of LLFF, Gaussian splatting and NeuS
 _POSES = ("poses_bounds.npy", "cameras.json", "cameras_sphere.npz")
 
-
-_ARRAY_OPTIONS = ("grid", "axes", "variable")
 # options that only some formats use
 _SOME = ("grid", "pattern", "axes", "variable", "images", "reference", "follow_links")
 
 
-def _alone(path: Path) -> tuple[Path]:
-    """The file itself, which may hold ground truth and masks."""
-    return (path,)
+# assumed where no header tells: a view of the benchmark
+_USUAL_SIDE = 512
+_USUAL_VIEWS = 81
+_RGB = 3
+# pixels a side under a lenslet
+_LENSLET = 14
+
+
+class Size(NamedTuple):
+    """Size of a light field.
+
+    Attributes
+    ----------
+    views : int
+        Number of views.
+    height, width : int
+        Size of a view in pixels.
+    pixel_bytes : int
+        Bytes of a decoded pixel: 3 for RGB of 8 bit.
+    """
+
+    views: int
+    height: int
+    width: int
+    pixel_bytes: int = _RGB
+
+
+def _size_of_lenslets(path: Path) -> Size:
+    header = picture_header(path)
+    height, width = max(1, header.height // _LENSLET), max(1, header.width // _LENSLET)
+    # all of the image is decoded
+    values = header.height * header.width * header.pixel_bytes
+    return Size(_USUAL_VIEWS, height, width, -(-values // (_USUAL_VIEWS * height * width)))
+
+
+def _size_of_array(arrays_in: Callable[[Path], Arrays], path: Path) -> Size:
+    """Size of the views in the largest array that the file can hold, in the first order of its axes that is likely."""
+    forms = {(one.shape, one.dtype.itemsize) for one in arrays_in(path).values() if is_likely(one.shape)}
+    sizes = {form: math.prod(form[0]) * form[1] for form in forms}
+    most = path.stat().st_size * DEFLATE_RATIO
+    held = [form for form, size in sizes.items() if 0 < size <= most]
+    if not held:
+        raise SepiError(f"{path}: holds no array of views")
+    shape, itemsize = max(held, key=sizes.__getitem__)
+    axes = (readings(shape) or ["NHWC" if len(shape) == 4 else "TSHWC"])[0]
+    size = dict(zip(axes, shape[len(shape) - len(axes) :], strict=True))
+    views = size.get("N", 1) * size.get("T", 1) * size.get("S", 1)
+    return Size(views, size["H"], size["W"], itemsize * size.get("C", 1))
+
+
+# no digest check for many files: whoever reads the views checks the file
+_size_in_hdf5 = partial(_size_of_array, partial(hdf5_arrays, check=False))
+
+
+def format_of_arrays(
+    name: str, description: str, matches: Callable[[Path], bool], arrays_in: Callable[[Path], Arrays], **more: Any
+) -> Format:
+    """Format of files of arrays, of which one is the light field."""
+
+    def read(path: Path, options: ReadOptions) -> LightField:
+        return light_field_of(path, arrays_in(path), options)
+
+    size_of = partial(_size_of_array, arrays_in)
+    return Format(name, description, matches, read, ("grid", "axes", "variable"), size_of=size_of, **more)
 
 
 _OWN = {
@@ -115,19 +175,19 @@ _OWN = {
         ("grid", "pattern", "follow_links"),
         loose=True,
     ),
-    "eslf": Format("Lytro lenslet image", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",)),
-    # before other kinds of HDF5: MATLAB's has a header or suffix of its own
-    "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS),
-    "numpy": Format("NumPy file", ".npy or .npz", array_files.matches_numpy, array_files.read_numpy, _ARRAY_OPTIONS),
-    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci.matches_2013, hci.read_2013, truth_files=_alone),
-    # after the kinds whose arrays have fixed names
-    "hdf5": Format(
-        "HDF5 file",
-        "with an array of all views",
-        array_files.matches_hdf5,
-        array_files.read_hdf5,
-        _ARRAY_OPTIONS,
+    "numpy": format_of_arrays("NumPy file", ".npy or .npz", array_files.matches_numpy, array_files.numpy_arrays),
+    # before other arrays, and after MATLAB's, which have a header or suffix of their own
+    "hci-2013": Format(
+        "HCI 2013 HDF5",
+        "with LF (T, S, H, W, 3)",
+        hci.matches_2013,
+        hci.read_2013,
         loose=True,
+        truth_files=lambda path: (path,),
+        size_of=_size_in_hdf5,
+    ),
+    "hdf5": format_of_arrays(
+        "HDF5 file", "with an array of all views", array_files.matches_hdf5, hdf5_arrays, loose=True
     ),
     # last, since it takes files too damaged to tell
     "sepi": Format(
@@ -137,7 +197,8 @@ _OWN = {
         exported.read_own,
         scales=False,
         loose=True,
-        truth_files=_alone,
+        truth_files=lambda path: (path,),
+        size_of=_size_in_hdf5,
     ),
 }
 FORMATS: Known[Format] = Known("readers", _OWN, lambda name, module: import_module(module).FORMATS[name])
@@ -190,10 +251,9 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
             f"{path}: {poses.name} has camera poses of a kind that is not read; expected transforms.json, a COLMAP "
             "model or a table of cameras; 'sepi calibrate' finds them anew, and a folder of a grid of views needs none"
         )
-    inner = list(islice(_inside(path), _LISTED + 1)) if path.is_dir() and not _is_result(path) else []
+    inner = list(islice(_inside(path), _LISTED)) if path.is_dir() and not _is_result(path) else []
     if inner:
-        named = f", such as {inner[0]}" if len(inner) == 1 else f": {', '.join(map(str, inner[:_LISTED]))}"
-        named += ", ..." if len(inner) > _LISTED else ""
+        named = f", such as {', '.join(map(str, inner))}"
         with suppress(OSError):
             named += "; if they are the rows of one, pass --format images" * has_rows(path, surely=False)
         raise SepiError(f"{path}: a folder of light fields; give one of them{named}")
@@ -289,31 +349,6 @@ def _inside(folder: Path, depth: int = 1) -> Iterator[Path]:
                 yield from _inside(entry, depth - 1)
 
 
-# assumed where no header tells: a view of the benchmark
-_USUAL_SIDE = 512
-_USUAL_VIEWS = 81
-_RGB = 3
-
-
-class Size(NamedTuple):
-    """Size of a light field.
-
-    Attributes
-    ----------
-    views : int
-        Number of views.
-    height, width : int
-        Size of a view in pixels.
-    pixel_bytes : int
-        Bytes of a decoded pixel: 3 for RGB of 8 bit.
-    """
-
-    views: int
-    height: int
-    width: int
-    pixel_bytes: int = _RGB
-
-
 def size_of(files: Sequence[Path]) -> Size:
     """Size of the light field that these files hold together; no values are read.
 
@@ -322,7 +357,7 @@ def size_of(files: Sequence[Path]) -> Size:
     largest file is taken as uncompressed pixels. The reader reports damaged files.
     """
     pictures = [path for path in files if path.suffix.lower() in SUFFIXES]
-    try:
+    with suppress(SepiError):
         if len(pictures) > 1:
             header = picture_header(pictures[0])
             return Size(len(pictures), header.height, header.width, header.pixel_bytes)
@@ -330,45 +365,9 @@ def size_of(files: Sequence[Path]) -> Size:
         if known is not None and known.size_of is not None:
             return Size(*known.size_of(files[0]))
         if pictures:
-            return _of_lenslets(pictures[0])
-    except SepiError:
-        if len(pictures) > 1:
-            return Size(len(pictures), _USUAL_SIDE, _USUAL_SIDE)
-    arrays = [(shape, itemsize) for path in files if path not in pictures for shape, itemsize in _arrays(path)]
-    if arrays:
-        return _of_array(*max(arrays, key=lambda array: math.prod(array[0]) * array[1]))
+            return _size_of_lenslets(pictures[0])
+    if len(pictures) > 1:
+        return Size(len(pictures), _USUAL_SIDE, _USUAL_SIDE)
     values = max((path.stat().st_size for path in files), default=0)
     side = max(1, math.isqrt(values // (_RGB * _USUAL_VIEWS)))
     return Size(_USUAL_VIEWS, side, side)
-
-
-def _of_lenslets(path: Path) -> Size:
-    header = picture_header(path)
-    height, width = max(1, header.height // eslf.BLOCK[0]), max(1, header.width // eslf.BLOCK[1])
-    # all of the image is decoded
-    values = header.height * header.width * header.pixel_bytes
-    return Size(_USUAL_VIEWS, height, width, -(-values // (_USUAL_VIEWS * height * width)))
-
-
-def _of_array(shape: tuple[int, ...], itemsize: int) -> Size:
-    """Size of the views in an array of 4 or 5 axes, in the first order of its axes that is likely."""
-    axes = (readings(shape) or ["NHWC" if len(shape) == 4 else "TSHWC"])[0]
-    size = dict(zip(axes, shape[len(shape) - len(axes) :], strict=True))
-    views = size.get("N", 1) * size.get("T", 1) * size.get("S", 1)
-    return Size(views, size["H"], size["W"], itemsize * size.get("C", 1))
-
-
-def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
-    """Shape and bytes of a value of each array in a file that may be a light field, and that the file can hold."""
-    arrays: Arrays = {}
-    with suppress(SepiError):
-        if _matches(_OWN["numpy"], path):
-            arrays = array_files.numpy_arrays(path)
-        elif _matches(_OWN["matlab"], path):
-            arrays = matlab.arrays_in(path)
-        else:
-            # no digest check for many files: whoever reads the views checks the file
-            arrays = hdf5_arrays(path, check=False)
-    most = path.stat().st_size * DEFLATE_RATIO
-    sized = [(one.shape, one.dtype.itemsize) for one in arrays.values() if is_likely(one.shape)]
-    return [(shape, itemsize) for shape, itemsize in sized if 0 < math.prod(shape) * itemsize <= most]

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import configparser
 import math
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -41,6 +40,7 @@ from sepi.io.readers.arrays import light_field_from_array
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import read_grid
 from sepi.io.readers.view_grid import arrange_numbers, cut_like_views, position_of
+from sepi.io.readers.view_names import parse_view_numbers, require_different
 from sepi.lightfield import DisparityRange, FloatMap, LightField, Truth
 from sepi.validation.models import validated
 
@@ -51,7 +51,6 @@ TRUTH = "gt_disp_lowres.pfm"
 
 _CAMERA = ("focal_length_mm", "baseline_mm", "focus_distance_m", "sensor_size_mm")
 
-_VIEW = re.compile(r"input_Cam(\d{1,6})\.png")
 # masks that scores need: any fault in them is an error; other masks are left out if they do not fit
 _EVALUATED = ("occluded", "textureless")
 
@@ -177,18 +176,14 @@ def _truth_of(folder: Path, shape: tuple[int, int], part: Part | None) -> Truth:
 
 def _numbered_views(folder: Path) -> dict[int, Path]:
     """Files of the views by number."""
-    views: dict[int, Path] = {}
-    for path in sorted(folder.glob("input_Cam*.png")):
-        match = _VIEW.fullmatch(path.name)
-        if match is None:
-            raise SepiError(f"{path}: expected a name like input_Cam007.png")
-        number = int(match[1])
-        if number in views:
-            raise SepiError(f"{path}: view {number} is given twice, also as {views[number].name}")
-        views[number] = path
-    if not views:
+    names = [path.name for path in folder.glob("input_Cam*.png")]
+    if not names:
         raise SepiError(f"{folder}: no views (expected input_Cam000.png, input_Cam001.png, ...)")
-    return views
+    named = parse_view_numbers(str(folder), names, "input_Cam{number}.png")
+    if named.unmatched:
+        raise SepiError(f"{folder / named.unmatched[0]}: expected a name like input_Cam007.png")
+    require_different(folder, named)
+    return {number: folder / name for name, (number,) in named.numbers.items()}
 
 
 def _parameters_of(folder: Path) -> _Parameters:

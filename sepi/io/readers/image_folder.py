@@ -20,10 +20,10 @@ from sepi.errors import SepiError
 from sepi.io.files import name_of
 from sepi.io.images import SUFFIXES
 from sepi.io.readers import view_names
-from sepi.io.readers.camera_positions import off_grid, positions_from_cameras
 from sepi.io.readers.options import ReadOptions, is_position, unarranged
 from sepi.io.readers.view_files import MAX_VIEWS, files_in, has_rows, numbered, read_grid, view_files
-from sepi.io.readers.view_names import EXAMPLES, ViewNumbers, decimals_in, origin
+from sepi.io.readers.view_grid import off_grid, positions_from_cameras
+from sepi.io.readers.view_names import EXAMPLES, ViewNumbers, decimals_in, origin, require_different
 from sepi.lightfield import LightField
 
 _POSITIONS_PER_PICTURE = 100
@@ -57,7 +57,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     named = _named(path, [name for name in files if name not in excluded], options)
     if len(named.numbers) < 2:
         raise SepiError(f"{path}: only one view, {next(iter(named.numbers))}; depth needs at least two")
-    _require_different(path, named)
+    require_different(path, named)
     others = {name: values for name in sorted(excluded) if (values := named.numbers_of(name)) is not None}
     layout = _widened(path, named, others, options)
     if not layout.arranged:
@@ -235,11 +235,3 @@ def _left_out(names: Sequence[str]) -> list[str]:
     number = len(names)
     what, were = ("1 image whose name is", "was") if number == 1 else (f"{number} images whose names are", "were")
     return [f"{what} unlike the views' {were} left out: {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}"]
-
-
-def _require_different(path: Path, named: ViewNumbers) -> None:
-    seen: dict[tuple[int, ...], str] = {}
-    for name, numbers in named.numbers.items():
-        if seen.setdefault(numbers, name) != name:
-            where = ", ".join(map(str, numbers))
-            raise SepiError(f"{path / name}: view {where} is given twice, also as {seen[numbers]}")

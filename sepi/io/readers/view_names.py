@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from os.path import commonprefix
+from pathlib import Path
 from typing import TypeVar
 
 from sepi.errors import SepiError
@@ -159,6 +160,15 @@ def pair_view_numbers(names: Iterable[str]) -> ViewNumbers | None:
     return ViewNumbers({name: (0, at) for at, name in enumerate(pairs[0])}, lambda _: None, others, said=True)
 
 
+def require_different(folder: Path, named: ViewNumbers) -> None:
+    """Raise if two views have the same numbers."""
+    seen: dict[Values, str] = {}
+    for name, numbers in named.numbers.items():
+        if seen.setdefault(numbers, name) != name:
+            where = ", ".join(map(str, numbers))
+            raise SepiError(f"{folder / name}: view {where} is given twice, also as {seen[numbers]}")
+
+
 def decimals_in(names: Sequence[str]) -> list[tuple[float, ...]]:
     """Decimal numbers in each name; empty if names differ in how many they have."""
     stems = (name.rpartition(".")[0] for name in names)
@@ -220,6 +230,8 @@ class _NameGroup:
         beside = self._no_places(varying)
         # numbers that count other things than places are ignored
         kept = [at for at in varying if at not in beside]
+        # numbers that are different in each name: they count or date the images
+        single = [at for at in kept if self._count([at]) == len(self.names)]
         words = " and ".join(f"'{self._words[at] or self._texts[at]}'" for at in beside)
         why = f"the numbers after {words} count no views; choose one value of each"
         if self._count(kept) == self._count(varying):
@@ -230,8 +242,6 @@ class _NameGroup:
                 )
             if len(kept) == 1:
                 return tuple(kept), self._is_count(kept[0])
-            # numbers that are different in each name: they count or date the images
-            single = [at for at in kept if self._count([at]) == len(self.names)]
             places = [at for at in kept if at not in single]
             if len(places) == 2 and (not single or self._fills(*places)):
                 return tuple(places), True
@@ -240,7 +250,6 @@ class _NameGroup:
                 return tuple(running), True
             if single and not running:
                 return tuple(kept), False
-        single = [at for at in kept if self._count([at]) == len(self.names)]
         columns = tuple(single[:1]) or self.row_first(tuple(kept[-2:]))[0]
         suggestion = self.pattern(columns, fixed=not single)
         raise SepiError(f"{source}: {why} ({self.names[0]}); try --pattern, such as '{suggestion}'")

@@ -1,12 +1,15 @@
 """Cameras of the views, and maps seen by them: they must see what the light field shows."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
 
 from sepi.camera import Camera
+from sepi.errors import SepiError
+from sepi.extensions.cameras.files import read_positions
 from sepi.extensions.cameras.posed_views import PosedViews, nominal_camera
 from sepi.lightfield import LightField
 from sepi.matching.carried_map import carried_map
@@ -142,3 +145,12 @@ def test_pictures_are_8_bit_colour_whatever_the_views_are(kind: type) -> None:
     picture = posed.picture(posed.reference)
     assert picture.dtype == np.uint8
     np.testing.assert_array_equal(picture, np.repeat(levels[1, 2], 3, axis=2))
+
+
+@pytest.mark.parametrize(
+    "lines", ["element vertex 0\nproperty float x", "element face 0\nproperty list uchar int at", "vertex 0"]
+)
+def test_what_is_no_ply_of_points_is_refused(tmp_path: Path, lines: str) -> None:
+    (tmp_path / "a.ply").write_text(f"ply\nformat ascii 1.0\n{lines}\nend_header\n")
+    with pytest.raises(SepiError, match=r"a\.ply: not a PLY file of points"):
+        read_positions(tmp_path / "a.ply")

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sepi.io.readers.arrays import rearrange
-from sepi.io.readers.camera_positions import off_grid, positions_from_cameras, with_row_spacing
 from sepi.io.readers.options import ORDERS, ReadOptions
+from sepi.io.readers.view_grid import off_grid, positions_from_cameras, rearrange, with_row_spacing
 from sepi.lightfield import LightField
 
 RNG = np.random.default_rng(3)

@@ -32,10 +32,11 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import DEFLATE_RATIO, reading
-from sepi.io.readers.array_files import MATLAB_HDF5, Arrays, StoredArray, hdf5_arrays, light_field_of
-from sepi.io.readers.arrays import is_likely
-from sepi.io.readers.options import ReadOptions
-from sepi.lightfield import LightField
+from sepi.io.hdf5 import attribute, open_hdf5, read_dataset
+from sepi.io.readers.array_files import Arrays, StoredArray, hdf5_arrays
+from sepi.io.readers.arrays import Array, is_likely
+from sepi.io.readers.formats import format_of_arrays
+from sepi.io.readers.view_files import MAX_VIEWS
 
 _HEADER = 128
 """Bytes of the file's header; the last four are version and byte order."""
@@ -200,6 +201,67 @@ def _text(part: _Part) -> str:
     return bytes(part.data).decode("latin-1")
 
 
+_HDF5_MAGIC = b"MATLAB 7.3 MAT-file"
+_CLASS = "MATLAB_class"
+# MATLAB's classes of numbers; others are text, logical values, ...
+_NUMBERS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "single", "uint64", "int64", "double")
+_CELL, _MOST_CELLS = "cell", 8 * MAX_VIEWS
+
+
+def _as_shown(path: Path, name: str, entry: Any) -> StoredArray | None:
+    """The array of an entry of version 7.3 as MATLAB shows it, which may be a cell array of arrays that are alike."""
+    # '#refs#' holds the contents of cells
+    cells = [] if name.startswith("#") else _cells(entry)
+    if not cells:
+        return None
+    shape = *_outer(entry), *cells[0].shape[:: _turn(path, cells[0])]
+    return StoredArray(shape, cells[0].dtype, partial(_hdf5_array, path, name))
+
+
+def _hdf5_array(path: Path, name: str) -> Array:
+    with open_hdf5(path) as file:
+        cells = _cells(file[name])
+        arrays = [read_dataset(path, cell).transpose([*range(cell.ndim)][:: _turn(path, cell)]) for cell in cells]
+        return arrays[0] if len(arrays) == 1 else np.stack(arrays).reshape(*_outer(file[name]), *arrays[0].shape)
+
+
+def _cells(entry: Any) -> list[h5py.Dataset]:
+    """The entry itself if it is an array of numbers, or the arrays of a cell array if all are alike; else empty."""
+    if not isinstance(entry, h5py.Dataset) or entry.shape is None:
+        return []
+    if entry.dtype != h5py.ref_dtype:
+        return [entry] if _is_numbers(entry) else []
+    if _class(entry) != _CELL or not entry.nbytes <= entry.id.get_storage_size() <= _MOST_CELLS:
+        return []
+    try:
+        cells = [entry.file[reference] for reference in entry[()].T.ravel()]
+    except ValueError:
+        # a null reference
+        return []
+    alike = all(map(_is_numbers, cells)) and len({(cell.shape, cell.dtype) for cell in cells}) == 1
+    return cells if alike else []
+
+
+def _outer(entry: Any) -> tuple[int, ...]:
+    """Axes of a cell array as MATLAB shows them, without those of size 1."""
+    return tuple(n for n in entry.shape[::-1] if n > 1) if entry.dtype == h5py.ref_dtype else ()
+
+
+def _turn(path: Path, dataset: h5py.Dataset) -> int:
+    """-1 if the axes are in reverse, as only MATLAB writes them; else 1."""
+    with path.open("rb") as file:
+        return -1 if _CLASS in dataset.attrs or file.read(len(_HDF5_MAGIC)) == _HDF5_MAGIC else 1
+
+
+def _class(entry: h5py.Dataset) -> str:
+    return str(attribute(entry, _CLASS)) if _CLASS in entry.attrs else ""
+
+
+def _is_numbers(entry: Any) -> bool:
+    held = isinstance(entry, h5py.Dataset) and entry.shape is not None and entry.dtype.kind in "iuf"
+    return held and _class(entry) in ("", *_NUMBERS)
+
+
 _KIND = "MATLAB file"
 
 
@@ -208,12 +270,7 @@ def matches(path: Path) -> bool:
     if path.suffix.lower() == ".mat" or not path.is_file():
         return path.is_file()
     head = _head(path)
-    return head[-4:] in _ORDERS or head.startswith(MATLAB_HDF5)
-
-
-def read(path: Path, options: ReadOptions) -> LightField:
-    """Light field from the array ``options.variable``; default: the array that can be a light field."""
-    return light_field_of(path, arrays_in(path), options)
+    return head[-4:] in _ORDERS or head.startswith(_HDF5_MAGIC)
 
 
 def arrays_in(path: Path) -> Arrays:
@@ -224,11 +281,14 @@ def arrays_in(path: Path) -> Arrays:
         with reading(path, _KIND):
             return _arrays_of_version_5(path)
     if h5py.is_hdf5(path):
-        return hdf5_arrays(path)
-    what = "is damaged" if head.startswith(MATLAB_HDF5) else "is not a MATLAB file of version 5 or 7.3"
+        return hdf5_arrays(path, stored=_as_shown)
+    what = "is damaged" if head.startswith(_HDF5_MAGIC) else "is not a MATLAB file of version 5 or 7.3"
     raise SepiError(f"{path}: {what}; save it in MATLAB with -v7 or -v7.3")
 
 
 def _head(path: Path) -> bytes:
     with reading(path, _KIND), path.open("rb") as file:
         return file.read(_HEADER)
+
+
+FORMATS = {"matlab": format_of_arrays("MATLAB file", ".mat with an array such as LF", matches, arrays_in)}
