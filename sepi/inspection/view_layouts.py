@@ -239,7 +239,9 @@ def _tried(views: Views, reach: int, factor: int) -> Trial | None:
     cost, disparity = found
     mean = cost.mean(axis=0)
     best, following = mean.argsort(kind="stable")[:2]
-    gap, errors = _difference(cost[:, best], cost[:, following])
+    difference = cost[:, following] - cost[:, best]
+    gap = float(difference.mean())
+    errors = gap * math.sqrt(len(cost)) / max(float(difference.std()), 1e-6)
     sizes = abs(factor * disparity[cost[:, best] < MATCHED, best])
     extent = factor * round(MOVEMENT / SAMPLING) * SAMPLING / float(abs(offsets).max())
     largest = float(np.quantile(sizes, 1 - AT_END)) if sizes.size else extent
@@ -248,7 +250,7 @@ def _tried(views: Views, reach: int, factor: int) -> Trial | None:
         best=layouts[best],
         gap=gap,
         errors=errors,
-        clear=is_clear(cost[:, best], cost[:, following]),
+        clear=bool(mean[following] >= _CLEAR_RATIO * mean[best]) and errors >= _CLEAR_ERRORS,
         largest_disparity=views.factor * largest,
         within=largest < 0.95 * extent,
     )
@@ -298,18 +300,6 @@ def matched(
     cost, disparity = np.empty((2, len(points), len(offsets)), np.float32)
     kernels.layout_costs(detail, others, positions, candidates, points, _PATCH_RADIUS, cost, disparity)
     return cost, disparity
-
-
-def is_clear(cost: FloatMap, other: FloatMap) -> bool:
-    """Whether the costs of points (P,) under one layout are clearly lower than under another."""
-    return bool(other.mean() >= _CLEAR_RATIO * cost.mean()) and _difference(cost, other)[1] >= _CLEAR_ERRORS
-
-
-def _difference(cost: FloatMap, other: FloatMap) -> tuple[float, float]:
-    """By how much the other's mean is above the first's, and how many standard errors that is."""
-    difference = other - cost
-    gap = float(difference.mean())
-    return gap, gap * math.sqrt(len(cost)) / max(float(difference.std()), 1e-6)
 
 
 def ring(baselines: list[Baseline], reach: int) -> list[Baseline]:
