@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from typing import NamedTuple
 
@@ -21,7 +20,6 @@ from sepi.image.noise import noise_level
 from sepi.io.readers.options import ORDERS
 from sepi.kernels import view_order as kernels
 from sepi.lightfield import FloatMap, LightField, as_unit_float
-from sepi.process.threads import threads_used
 
 REACH = 8
 """Views up to this many rows or columns away are looked at."""
@@ -109,19 +107,10 @@ class Views:
 
         Lenses darken and blur the views towards the edge of the grid, so that hardly more than noise is left.
         """
-        self.details(baselines)
         own, *lights = np.array([self._light(baseline) for baseline in ((0, 0), *baselines)])
         least = own * (_LEAST_BRIGHTNESS, _LEAST_CONTRAST)
         kept = [baseline for baseline, light in zip(baselines, lights, strict=True) if (light >= least).all()]
         return kept if 2 * len(kept) >= min(len(baselines), 4) else baselines
-
-    def details(self, baselines: list[Baseline]) -> list[FloatMap]:
-        """:meth:`detail` of several views."""
-        # which all are compared with: not to be made by each thread
-        self.detail((0, 0))
-        # OpenCV works outside Python's lock, on one thread for pictures as small as these
-        with ThreadPoolExecutor(threads_used()) as pool:
-            return list(pool.map(self.detail, baselines))
 
     def _light(self, baseline: Baseline) -> tuple[float, float]:
         """Mean and contrast of a view as it is."""
@@ -182,28 +171,26 @@ class Trial(NamedTuple):
     """Whether the search goes beyond the scene's disparities."""
 
 
-def best_trial(views: Views) -> Trial | None:
-    """The first trial that is clear and whose search is wide enough, or else the clearest; None if there is nothing."""
-    tried = []
+def best_trial(views: Views) -> tuple[Trial | None, bool]:
+    """The first trial that is clear and whose search is wide enough, or else the clearest; None if there is nothing.
+
+    And whether none is clear because views that show texture beyond their noise match badly under every order, at any
+    distance: where nothing moves between them, they match under all.
+    """
+    tried, bad = [], []
     for reach, factor in search_distances(views):
         trial = _tried(views, reach, factor)
+        if factor == 1:
+            bad.append(trial is not None and min(trial.costs.values()) >= MATCHED)
         if trial is None:
             continue
         if trial.clear and trial.within:
-            return trial
+            return trial, False
         tried.append(trial)
-    return max(tried, key=lambda trial: trial.errors, default=None)
-
-
-def fit_in_none(views: Views) -> bool:
-    """Whether views that show texture beyond their noise match badly under every order, at any distance.
-
-    For views of which no trial is clear: where nothing moves between them, they match under all.
-    """
-    if views.detail((0, 0), 1).std() < _LEAST_TEXTURE * noise_level(views.reference_view):
-        return False
-    trials = [_tried(views, reach, factor) for reach, factor in search_distances(views) if factor == 1]
-    return all(trial is not None and min(trial.costs.values()) >= MATCHED for trial in trials)
+    best = max(tried, key=lambda trial: trial.errors, default=None)
+    if best is None or best.clear or not all(bad):
+        return best, False
+    return best, bool(views.detail((0, 0)).std() >= _LEAST_TEXTURE * noise_level(views.reference_view))
 
 
 def baselines_under(order: str, baselines: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
