@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from copy import copy
 from typing import NamedTuple
 
 import cv2
@@ -67,7 +66,7 @@ class Views:
 
     def __init__(self, light_field: LightField, most_pixels: int = _MOST_PIXELS) -> None:
         self._views = light_field.rgb_views
-        self.factor = _reduction(light_field, most_pixels)
+        self.factor = max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / most_pixels)))
         self._grey: dict[tuple[int, int, int], FloatMap] = {}
         self._detail: dict[tuple[int, int, int], FloatMap] = {}
         positions = np.argwhere(light_field.present)
@@ -78,25 +77,16 @@ class Views:
         ]
         height, width = light_field.shape
         self.shape = (height // self.factor, width // self.factor)
-        self._positions = light_field.baselines
-
-    def again(self, light_field: LightField, most_pixels: int = _MOST_PIXELS) -> Views:
-        """The views of the same light field, or of one that only has them at other positions: what is made stays."""
-        if self.factor != _reduction(light_field, most_pixels):
-            return Views(light_field, most_pixels)
-        again = copy(self)
-        again._positions = light_field.baselines
-        return again
 
     @property
     def reference_view(self) -> FloatMap:
         """The view in the middle as it is, (H, W, 3) float32."""
         return as_unit_float(self._views[self.middle])
 
-    def in_steps(self, baselines: list[Baseline]) -> npt.NDArray[np.float64]:
-        """Baselines in view steps, shape (V, 2)."""
+    def in_steps(self, light_field: LightField, baselines: list[Baseline]) -> npt.NDArray[np.float64]:
+        """Baselines in view steps, shape (V, 2), of the light field with its views where they are known to be."""
         t, s = (np.array(baselines, np.int64).reshape(-1, 2) + self.middle).T
-        return np.asarray(self._positions[t, s] - self._positions[self.middle], np.float64)
+        return np.asarray(light_field.baselines[t, s] - light_field.baselines[self.middle], np.float64)
 
     def is_too_small(self, factor: int) -> bool:
         """Whether the views tell nothing, reduced by a further factor."""
@@ -147,11 +137,6 @@ class Views:
         return self._detail[key]
 
 
-def _reduction(light_field: LightField, most_pixels: int) -> int:
-    """The whole factor by which pictures are reduced to at most so many pixels."""
-    return max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / most_pixels)))
-
-
 class Trial(NamedTuple):
     """Layouts compared by the views at one distance: those orders of the views that differ by more than the sign."""
 
@@ -171,7 +156,7 @@ class Trial(NamedTuple):
     """Whether the search goes beyond the scene's disparities."""
 
 
-def best_trial(views: Views) -> tuple[Trial | None, bool]:
+def best_trial(light_field: LightField, views: Views) -> tuple[Trial | None, bool]:
     """The first trial that is clear and whose search is wide enough, or else the clearest; None if there is nothing.
 
     And whether none is clear because views that show texture beyond their noise match badly under every order, at any
@@ -179,7 +164,7 @@ def best_trial(views: Views) -> tuple[Trial | None, bool]:
     """
     tried, bad = [], []
     for reach, factor in search_distances(views):
-        trial = _tried(views, reach, factor)
+        trial = _tried(light_field, views, reach, factor)
         if factor == 1:
             bad.append(trial is not None and min(trial.costs.values()) >= MATCHED)
         if trial is None:
@@ -214,10 +199,10 @@ def search_distances(views: Views) -> Iterator[tuple[int, int]]:
         yield most_distant, 1
 
 
-def _tried(views: Views, reach: int, factor: int) -> Trial | None:
+def _tried(light_field: LightField, views: Views, reach: int, factor: int) -> Trial | None:
     """Compare the layouts by the views about ``reach`` rows or columns away; None where they say nothing."""
     baselines = views.worth_matching(ring(views.baselines, reach))
-    layouts, offsets = _layouts(views.in_steps(baselines))
+    layouts, offsets = _layouts(views.in_steps(light_field, baselines))
     if len(layouts) < 2 or views.is_too_small(factor):
         return None
     found = matched(views, (0, 0), baselines, factor, offsets)

@@ -180,8 +180,8 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views |
     """
     require_light_field(light_field)
     require_known("order", [read_in], ORDERS)
-    views = views.again(light_field) if views else Views(light_field)
-    trial, fits_none = best_trial(views)
+    views = views or Views(light_field)
+    trial, fits_none = best_trial(light_field, views)
     if trial is None:
         return OrderCheck(dict.fromkeys(ORDERS, 1.0), read_in, clear=False, sign_clear=False, read_in=read_in)
     costs = dict(trial.costs)
