@@ -10,7 +10,11 @@ from types import NoneType
 import numpy as np
 
 from sepi.errors import SepiError, warn
+from sepi.inspection import view_order
+from sepi.inspection.arrangement import arrange, settle_row_spacing
+from sepi.inspection.array_axes import fitting_axes
 from sepi.inspection.coded_views import told_of_coding
+from sepi.inspection.view_layouts import Views
 from sepi.io.provenance import reading_record
 from sepi.io.readers.arrays import UnclearAxesError
 from sepi.io.readers.formats import format_of, read
@@ -98,19 +102,13 @@ def read_light_field(
         if with_depths is not None:
             light_field = with_depths(path, light_field, options, given)
     if not light_field.arranged:
-        from sepi.inspection.arrangement import arrange
-
         light_field = arrange(light_field, in_grid(options))
     _require_contrast(path, light_field)
     if check_order:
-        from sepi.inspection.view_layouts import Views
-
         views = Views(light_field)
     if options.row_spacing is not None:
         light_field = with_row_spacing(light_field, options.row_spacing)
     elif check_order:
-        from sepi.inspection.arrangement import settle_row_spacing
-
         light_field = settle_row_spacing(light_field, views)
     record = reading_record(options, file_format)
     if record:
@@ -122,9 +120,6 @@ def read_light_field(
         light_field = replace(light_field, notes=(*light_field.notes, coded))
     found = [_depth_warning(light_field)]
     if check_order:
-        from sepi.inspection import view_order
-        from sepi.inspection.view_order import odd_views
-
         checked = view_order.check_order(light_field, options.order, views)
         del views
         give_back_memory()
@@ -133,7 +128,7 @@ def read_light_field(
                 f"{path}: the views fit the poses only if turned over; expected poses of cameras that look along their "
                 "z axis, with y down, and rotations from the world to the camera (OpenCV, COLMAP)"
             )
-        found += [*odd_views(light_field), checked.warning()]
+        found += [*view_order.odd_views(light_field), checked.warning()]
         if light_field.rig is None and (note := checked.note()):
             others = (note for note in light_field.notes if not note.startswith(view_order.SIGN_OPEN))
             light_field = replace(light_field, notes=(*others, note))
@@ -144,8 +139,6 @@ def read_light_field(
 
 def _with_axes(path: Path, options: ReadOptions, file_format: str | None, unclear: UnclearAxesError) -> LightField:
     """An array with ambiguous axes, read with those for which its views fit together."""
-    from sepi.inspection.array_axes import fitting_axes
-
     tried = {axes: read(path, replace(unarranged(options), axes=axes), file_format) for axes in unclear.readings}
     axes = fitting_axes(tried)
     if axes is None:

@@ -124,18 +124,13 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
         with suppress(SepiError):
             sharp = share_too_sharp(comparable(settle_range(light_field)))
     if as_json:
+        facts = asdict(found)
         known = {
             **_described(light_field),
-            "costs": {order: float(cost) for order, cost in found.fits.items()},
-            "best": found.best,
-            "clear": bool(found.clear),
-            "sign_clear": bool(found.sign_clear),
-            "read_in": found.read_in,
-            "regions": found.regions,
-            "agreeing": found.agreeing,
+            "costs": facts.pop("fits"),
+            **facts,
             "verdict": found.verdict(),
             "warning": found.warning(),
-            "fits_none": bool(found.fits_none),
             "odd_views": odd,
             "too_sharp": sharp,
         }

@@ -4,8 +4,8 @@ Names that only count the views do not tell the number of rows and columns, whet
 column, whether the camera ran back and forth, or whether the views fill the grid: crosses are common. Each arrangement
 of that many views is tried; in the right one, neighbours match everywhere.
 
-A camera gantry may use different vertical and horizontal steps. Points of one view are matched with views above, below
-and beside it, for each spacing and layout tried: in the right one, all views agree on one disparity for each point.
+A camera gantry may use different vertical and horizontal steps. Points of one view are matched with views above and
+below it, and with those beside it: their movements along columns and rows of views tell the ratio of the steps.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError, warn
 from sepi.inspection import view_layouts
-from sepi.inspection.view_layouts import AT_END, FEWEST_POINTS, MATCHED, MOVEMENT, Baseline, Views, is_clear, matched
+from sepi.inspection.view_layouts import AT_END, FEWEST_POINTS, MATCHED, MOVEMENT, Views, matched
 from sepi.inspection.view_order import odd_views
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_grid import arrange_numbers, taken
@@ -212,20 +212,13 @@ def _placed(light_field: LightField, way: Arrangement, options: ReadOptions, not
     return replace(light_field, view=options.view, arranged=True, notes=notes, **taken(light_field, order))
 
 
-# Spacings tried, and how many between one and its double
-_MOST = 4.0
-_PER_OCTAVE = 4
-# Number of points to distinguish spacings, and to measure the one found
-_POINTS_TO_TELL, _POINTS_TO_CHOOSE = 80, 150
-# Layouts up to the sign
-_LAYOUTS = ("as-given", "flip-rows", "transpose", "transpose-flip-rows")
-# Movement in the farthest view, pixels: spacing where movements are compared, and the most when the spacing is measured
+# Reductions of the pictures, and distances of views, in which movements are searched
+_REDUCTIONS, _REACHES = (1, 2, 4, 8), (8, 4, 2, 1)
+# Spacing of the movements that are compared, pixels in the farthest view
 _FINE_SAMPLING = 0.1
-_MOST_MOVEMENT = 80.0
-# Rounds of measuring, and spacings to each side of the last round's best
-_ROUNDS = 2
-_EACH_SIDE = 4
-# Smaller differences are not reported: they are within the measurement error
+# A spacing is clear if movements differ from those of equal spacing by this multiple of what they differ from its own
+_CLEARLY = 3.0
+# Smaller differences from one are not reported: they are within the measurement error
 _LEAST_CHANGE = 0.04
 # Spacings within this factor of one need a second test: interpolation smooths noise, and decoded lenslet pictures are
 # shifted by a few hundredths of a pixel; either can favour a spacing that is a tenth off
@@ -248,16 +241,6 @@ def settle_row_spacing(light_field: LightField, views: Views | None = None) -> L
     return replace(light_field, row_spacing=spacing, notes=(*light_field.notes, note))
 
 
-class _Trial(NamedTuple):
-    """Best spacing from the views at one distance."""
-
-    spacing: float
-    order: str
-    baselines: list[Baseline]
-    movement: float
-    clear: bool
-
-
 def estimate_row_spacing(views: Views) -> float | None:
     """Distance of rows in view steps, if another than that of columns fits clearly better.
 
@@ -272,95 +255,81 @@ def estimate_row_spacing(views: Views) -> float | None:
         For the order in which the light field was read. None if rows are as far apart as columns, there is only one
         row or column, or the spacing is unclear.
     """
-    for reach, factor in view_layouts.search_distances(views):
-        trial = _tried(views, reach, factor)
-        if trial is not None:
-            measured = _measured(views, trial) if trial.clear else 1.0
-            if abs(math.log(measured)) < _LEAST_CHANGE:
-                return None
-            near = abs(math.log(measured)) < math.log(_DOUBTED)
-            return None if near and not _is_seen_in_movements(views, trial, measured) else measured
+    for factor in _REDUCTIONS:
+        rows, columns = (_movements(views, axis, factor) for axis in (0, 1))
+        # rows and columns of views each move points along their own axis of the pictures
+        if rows is None or columns is None or rows.axis == columns.axis:
+            continue
+        both = rows.matched & columns.matched & (columns.steps != 0)
+        if both.sum() < FEWEST_POINTS:
+            continue
+        down, across = rows.steps[both], columns.steps[both]
+        # of the points that move most
+        ratio = float(np.median((down / across)[abs(across) >= np.median(abs(across))]))
+        sign, off = math.copysign(1, ratio), abs(down - ratio * across)
+        if _CLEARLY * np.median(off) >= np.median(abs(down - sign * across)):
+            return None
+        kept = off <= 2 * np.median(off)
+        spacing = float(abs(down[kept]).sum() / abs(across[kept]).sum())
+        if not spacing or abs(math.log(spacing)) < _LEAST_CHANGE:
+            return None
+        near = abs(math.log(spacing)) < math.log(_DOUBTED)
+        return None if near and not _is_slope(sign * down, across, spacing) else spacing
     return None
 
 
-def _tried(views: Views, reach: int, factor: int) -> _Trial | None:
-    """The best spacing from views at this distance; None if unclear.
+class _Movements(NamedTuple):
+    """How points of the middle view move along its column or row of views.
 
-    It is clear if it fits clearly better than equal spacing in any layout.
+    Along the pictures' ``axis``, by ``steps`` (P,) pixels of :class:`Views` from view to view, which are known of the
+    ``matched`` points.
     """
-    baselines = views.worth_matching(view_layouts.ring(views.baselines, reach))
-    if not any(t for t, _ in baselines) or not any(s for _, s in baselines) or views.is_too_small(factor):
-        return None
-    count = round(_PER_OCTAVE * math.log2(_MOST))
-    spacings = [2 ** (n / _PER_OCTAVE) for n in range(-count, count + 1)]
-    # most light fields are in order, and their rows as far apart as their columns: a few hypotheses tell
-    hypotheses = [(_LAYOUTS[0], spacing) for spacing in (0.5, 1.0, 2.0)]
-    found = matched(views, (0, 0), baselines, factor, _offsets(baselines, hypotheses), MOVEMENT, _POINTS_TO_TELL)
-    if found is None or not all(is_clear(found[0][:, 1], found[0][:, other]) for other in (0, 2)):
-        hypotheses = [(order, spacing) for order in _LAYOUTS for spacing in spacings]
-    else:
-        hypotheses = [(_LAYOUTS[0], spacing) for spacing in spacings]
-    found = matched(views, (0, 0), baselines, factor, _offsets(baselines, hypotheses), MOVEMENT, _POINTS_TO_CHOOSE)
-    if found is None:
-        return None
-    cost, movement = found
-    mean = cost.mean(axis=0)
-    best = int(mean.argmin())
-    usual = min((n for n, (_, spacing) in enumerate(hypotheses) if spacing == 1), key=lambda n: mean[n])
-    moved = abs(movement[cost[:, best] < MATCHED, best])
-    if moved.size < FEWEST_POINTS or np.quantile(moved, 1 - AT_END) > 0.95 * MOVEMENT:
-        return None
-    order, spacing = hypotheses[best]
-    return _Trial(spacing, order, baselines, factor * float(moved.max()), is_clear(cost[:, best], cost[:, usual]))
+
+    axis: int
+    steps: npt.NDArray[np.floating]
+    matched: npt.NDArray[np.bool_]
 
 
-def _measured(views: Views, trial: _Trial) -> float:
-    """The spacing of a trial, to about a hundredth."""
-    spacing, width = trial.spacing, 1 / _PER_OCTAVE
-    for _ in range(_ROUNDS):
-        tried = [spacing * 2 ** (width * n / _EACH_SIDE) for n in range(-_EACH_SIDE, _EACH_SIDE + 1)]
-        offsets = _offsets(trial.baselines, [(trial.order, one) for one in tried])
-        found = matched(views, (0, 0), trial.baselines, 1, offsets, min(trial.movement + 1, _MOST_MOVEMENT))
+def _movements(views: Views, axis: int, factor: int) -> _Movements | None:
+    """Movements along the column (axis 0) or row (1) of the middle view, in the farthest views that the search reaches.
+
+    None where nothing can be matched.
+    """
+    line = [baseline for baseline in views.baselines if baseline[1 - axis] == 0]
+    for reach in _REACHES:
+        baselines = views.worth_matching(view_layouts.ring(line, reach))
+        if not baselines or views.is_too_small(factor):
+            continue
+        steps = np.array([baseline[axis] for baseline in baselines], np.float64)
+        farthest = abs(steps).max()
+        offsets = np.stack([steps[:, None] * one / farthest for one in np.eye(2)])
+        found = matched(views, (0, 0), baselines, factor, offsets)
         if found is None:
-            return spacing
-        spacing = tried[int(found[0].mean(axis=0).argmin())]
-        width /= _EACH_SIDE
-    return spacing
+            continue
+        best = int(found[0].mean(axis=0).argmin())
+        moved = abs(found[1][found[0][:, best] < MATCHED, best])
+        if moved.size < FEWEST_POINTS or np.quantile(moved, 1 - AT_END) > 0.95 * MOVEMENT:
+            continue
+        farther = factor * float(moved.max()) + 1
+        found = matched(views, (0, 0), baselines, 1, offsets[[best]], farther, sampling=_FINE_SAMPLING)
+        if found is not None:
+            return _Movements(best, found[1][:, 0] / farthest, found[0][:, 0] < MATCHED)
+    return None
 
 
-def _is_seen_in_movements(views: Views, trial: _Trial, spacing: float) -> bool:
-    """Whether the ratio of points' movements along columns of views to those along rows is that, surely not one.
+def _is_slope(down: npt.NDArray[np.floating], across: npt.NDArray[np.floating], spacing: float) -> bool:
+    """Whether a line through the movements has this slope, surely not one.
 
-    A line through both movements may miss the origin, so that a shift of all views does not count.
+    It may miss the origin, so that a shift of all views does not count.
     """
     # here, since it takes a while to load, and hardly any light field needs it
     from scipy.stats import theilslopes
 
-    movements, fits = [], []
-    for axis in (0, 1):
-        along = [baseline for baseline in trial.baselines if baseline[1 - axis] == 0]
-        if not along:
-            return False
-        offsets = _offsets(along, [(trial.order, 1.0)])
-        found = matched(views, (0, 0), along, 1, offsets, trial.movement + 1, sampling=_FINE_SAMPLING)
-        if found is None:
-            return False
-        cost, moved = found
-        movements.append(moved[:, 0] / max(abs(baseline[axis]) for baseline in along))
-        fits.append(cost[:, 0] < MATCHED)
-    both = fits[0] & fits[1]
-    if both.sum() < FEWEST_POINTS or not np.ptp(movements[1][both]):
+    if not np.ptp(across):
         return False
     # where nearly all movements are the same its interval is none, and no number is nearer than that
     with np.errstate(invalid="ignore"):
-        line = theilslopes(movements[0][both], movements[1][both])
+        line = theilslopes(down, across)
     # all of the slope's interval of confidence is nearer to the spacing than to one
     middle = math.sqrt(spacing)
     return bool(line.low_slope > middle if spacing > 1 else line.low_slope > 0 and line.high_slope < middle)
-
-
-def _offsets(baselines: list[Baseline], hypotheses: list[tuple[str, float]]) -> npt.NDArray[np.float64]:
-    """Baselines (L, V, 2) under each order and spacing, in units of the longest: all search the same movement."""
-    on_grid = np.array(baselines, np.float64)
-    laid = [view_layouts.baselines_under(order, on_grid * (spacing, 1)) for order, spacing in hypotheses]
-    return np.stack([offsets / abs(offsets).max() for offsets in laid])

@@ -104,14 +104,17 @@ def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views:
     ``views`` are those of the trial, whose best layout is assumed; the sign is that of the layout's first order. There
     is no evidence without views on opposite sides, or with hardly any contrast.
     """
-    views = views.again(light_field, _MOST_PIXELS)
+    finer = Views(light_field, _MOST_PIXELS)
+    views = views if views.factor == finer.factor else finer
     order = next(iter(trial.best))
     largest = trial.largest_disparity / views.factor
     reach, directions = _directions(views, largest)
     rows = np.ones(views.shape[0], bool)
     if look is Look.GLANCE:
         # points move along rows and stay in their band
-        directions = [d for d in directions if not baselines_under(order, views.in_steps(_at(d, reach)))[:, 0].any()]
+        directions = [
+            d for d in directions if not baselines_under(order, views.in_steps(light_field, _at(d, reach)))[:, 0].any()
+        ]
         rows = np.arange(views.shape[0]) // _BAND_ROWS % _BANDS == _BANDS // 2
     # in units of the picture's own contrast
     scale = np.float32(1 / max(float(views.plain((0, 0)).std()), 1e-6))
@@ -124,7 +127,7 @@ def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views:
         for direction in directions
     }
     pictures = {at: views.plain(at)[rows] * scale for side in [[(0, 0)], *sides.values()] for at in side}
-    positions = {at: baselines_under(order, views.in_steps([at]))[0].astype(np.float32) for at in pictures}
+    positions = {at: baselines_under(order, views.in_steps(light_field, [at]))[0].astype(np.float32) for at in pictures}
     movement = min(_MOST_MOVEMENT, math.ceil(1.15 * largest * reach) + 1)
     sampling = 1 / reach
     disparity, trusted = _disparity(

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from copy import copy
 from typing import NamedTuple
 
 import cv2
@@ -21,7 +19,6 @@ from sepi.image.noise import noise_level
 from sepi.io.readers.options import ORDERS
 from sepi.kernels import view_order as kernels
 from sepi.lightfield import FloatMap, LightField, as_unit_float
-from sepi.process.threads import threads_used
 
 REACH = 8
 """Views up to this many rows or columns away are looked at."""
@@ -69,7 +66,7 @@ class Views:
 
     def __init__(self, light_field: LightField, most_pixels: int = _MOST_PIXELS) -> None:
         self._views = light_field.rgb_views
-        self.factor = _reduction(light_field, most_pixels)
+        self.factor = max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / most_pixels)))
         self._grey: dict[tuple[int, int, int], FloatMap] = {}
         self._detail: dict[tuple[int, int, int], FloatMap] = {}
         positions = np.argwhere(light_field.present)
@@ -80,25 +77,16 @@ class Views:
         ]
         height, width = light_field.shape
         self.shape = (height // self.factor, width // self.factor)
-        self._positions = light_field.baselines
-
-    def again(self, light_field: LightField, most_pixels: int = _MOST_PIXELS) -> Views:
-        """The views of the same light field, or of one that only has them at other positions: what is made stays."""
-        if self.factor != _reduction(light_field, most_pixels):
-            return Views(light_field, most_pixels)
-        again = copy(self)
-        again._positions = light_field.baselines
-        return again
 
     @property
     def reference_view(self) -> FloatMap:
         """The view in the middle as it is, (H, W, 3) float32."""
         return as_unit_float(self._views[self.middle])
 
-    def in_steps(self, baselines: list[Baseline]) -> npt.NDArray[np.float64]:
-        """Baselines in view steps, shape (V, 2)."""
+    def in_steps(self, light_field: LightField, baselines: list[Baseline]) -> npt.NDArray[np.float64]:
+        """Baselines in view steps, shape (V, 2), of the light field with its views where they are known to be."""
         t, s = (np.array(baselines, np.int64).reshape(-1, 2) + self.middle).T
-        return np.asarray(self._positions[t, s] - self._positions[self.middle], np.float64)
+        return np.asarray(light_field.baselines[t, s] - light_field.baselines[self.middle], np.float64)
 
     def is_too_small(self, factor: int) -> bool:
         """Whether the views tell nothing, reduced by a further factor."""
@@ -109,19 +97,10 @@ class Views:
 
         Lenses darken and blur the views towards the edge of the grid, so that hardly more than noise is left.
         """
-        self.details(baselines)
         own, *lights = np.array([self._light(baseline) for baseline in ((0, 0), *baselines)])
         least = own * (_LEAST_BRIGHTNESS, _LEAST_CONTRAST)
         kept = [baseline for baseline, light in zip(baselines, lights, strict=True) if (light >= least).all()]
         return kept if 2 * len(kept) >= min(len(baselines), 4) else baselines
-
-    def details(self, baselines: list[Baseline]) -> list[FloatMap]:
-        """:meth:`detail` of several views."""
-        # which all are compared with: not to be made by each thread
-        self.detail((0, 0))
-        # OpenCV works outside Python's lock, on one thread for pictures as small as these
-        with ThreadPoolExecutor(threads_used()) as pool:
-            return list(pool.map(self.detail, baselines))
 
     def _light(self, baseline: Baseline) -> tuple[float, float]:
         """Mean and contrast of a view as it is."""
@@ -158,11 +137,6 @@ class Views:
         return self._detail[key]
 
 
-def _reduction(light_field: LightField, most_pixels: int) -> int:
-    """The whole factor by which pictures are reduced to at most so many pixels."""
-    return max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / most_pixels)))
-
-
 class Trial(NamedTuple):
     """Layouts compared by the views at one distance: those orders of the views that differ by more than the sign."""
 
@@ -182,28 +156,26 @@ class Trial(NamedTuple):
     """Whether the search goes beyond the scene's disparities."""
 
 
-def best_trial(views: Views) -> Trial | None:
-    """The first trial that is clear and whose search is wide enough, or else the clearest; None if there is nothing."""
-    tried = []
+def best_trial(light_field: LightField, views: Views) -> tuple[Trial | None, bool]:
+    """The first trial that is clear and whose search is wide enough, or else the clearest; None if there is nothing.
+
+    And whether none is clear because views that show texture beyond their noise match badly under every order, at any
+    distance: where nothing moves between them, they match under all.
+    """
+    tried, bad = [], []
     for reach, factor in search_distances(views):
-        trial = _tried(views, reach, factor)
+        trial = _tried(light_field, views, reach, factor)
+        if factor == 1:
+            bad.append(trial is not None and min(trial.costs.values()) >= MATCHED)
         if trial is None:
             continue
         if trial.clear and trial.within:
-            return trial
+            return trial, False
         tried.append(trial)
-    return max(tried, key=lambda trial: trial.errors, default=None)
-
-
-def fit_in_none(views: Views) -> bool:
-    """Whether views that show texture beyond their noise match badly under every order, at any distance.
-
-    For views of which no trial is clear: where nothing moves between them, they match under all.
-    """
-    if views.detail((0, 0), 1).std() < _LEAST_TEXTURE * noise_level(views.reference_view):
-        return False
-    trials = [_tried(views, reach, factor) for reach, factor in search_distances(views) if factor == 1]
-    return all(trial is not None and min(trial.costs.values()) >= MATCHED for trial in trials)
+    best = max(tried, key=lambda trial: trial.errors, default=None)
+    if best is None or best.clear or not all(bad):
+        return best, False
+    return best, bool(views.detail((0, 0)).std() >= _LEAST_TEXTURE * noise_level(views.reference_view))
 
 
 def baselines_under(order: str, baselines: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -227,10 +199,10 @@ def search_distances(views: Views) -> Iterator[tuple[int, int]]:
         yield most_distant, 1
 
 
-def _tried(views: Views, reach: int, factor: int) -> Trial | None:
+def _tried(light_field: LightField, views: Views, reach: int, factor: int) -> Trial | None:
     """Compare the layouts by the views about ``reach`` rows or columns away; None where they say nothing."""
     baselines = views.worth_matching(ring(views.baselines, reach))
-    layouts, offsets = _layouts(views.in_steps(baselines))
+    layouts, offsets = _layouts(views.in_steps(light_field, baselines))
     if len(layouts) < 2 or views.is_too_small(factor):
         return None
     found = matched(views, (0, 0), baselines, factor, offsets)
@@ -239,7 +211,9 @@ def _tried(views: Views, reach: int, factor: int) -> Trial | None:
     cost, disparity = found
     mean = cost.mean(axis=0)
     best, following = mean.argsort(kind="stable")[:2]
-    gap, errors = _difference(cost[:, best], cost[:, following])
+    difference = cost[:, following] - cost[:, best]
+    gap = float(difference.mean())
+    errors = gap * math.sqrt(len(cost)) / max(float(difference.std()), 1e-6)
     sizes = abs(factor * disparity[cost[:, best] < MATCHED, best])
     extent = factor * round(MOVEMENT / SAMPLING) * SAMPLING / float(abs(offsets).max())
     largest = float(np.quantile(sizes, 1 - AT_END)) if sizes.size else extent
@@ -248,7 +222,7 @@ def _tried(views: Views, reach: int, factor: int) -> Trial | None:
         best=layouts[best],
         gap=gap,
         errors=errors,
-        clear=is_clear(cost[:, best], cost[:, following]),
+        clear=bool(mean[following] >= _CLEAR_RATIO * mean[best]) and errors >= _CLEAR_ERRORS,
         largest_disparity=views.factor * largest,
         within=largest < 0.95 * extent,
     )
@@ -298,18 +272,6 @@ def matched(
     cost, disparity = np.empty((2, len(points), len(offsets)), np.float32)
     kernels.layout_costs(detail, others, positions, candidates, points, _PATCH_RADIUS, cost, disparity)
     return cost, disparity
-
-
-def is_clear(cost: FloatMap, other: FloatMap) -> bool:
-    """Whether the costs of points (P,) under one layout are clearly lower than under another."""
-    return bool(other.mean() >= _CLEAR_RATIO * cost.mean()) and _difference(cost, other)[1] >= _CLEAR_ERRORS
-
-
-def _difference(cost: FloatMap, other: FloatMap) -> tuple[float, float]:
-    """By how much the other's mean is above the first's, and how many standard errors that is."""
-    difference = other - cost
-    gap = float(difference.mean())
-    return gap, gap * math.sqrt(len(cost)) / max(float(difference.std()), 1e-6)
 
 
 def ring(baselines: list[Baseline], reach: int) -> list[Baseline]:

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from sepi.errors import one_line
 from sepi.inspection.disparity_sign import Evidence, Look, occlusion_evidence
-from sepi.inspection.view_layouts import Trial, Views, baselines_under, best_trial, fit_in_none
+from sepi.inspection.view_layouts import Trial, Views, baselines_under, best_trial
 from sepi.io.readers.options import AS_GIVEN, ORDERS
 from sepi.lightfield import FloatMap, LightField, require_light_field
 from sepi.validation import require_known
@@ -180,11 +180,10 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views |
     """
     require_light_field(light_field)
     require_known("order", [read_in], ORDERS)
-    views = views.again(light_field) if views else Views(light_field)
-    trial = best_trial(views)
+    views = views or Views(light_field)
+    trial, fits_none = best_trial(light_field, views)
     if trial is None:
         return OrderCheck(dict.fromkeys(ORDERS, 1.0), read_in, clear=False, sign_clear=False, read_in=read_in)
-    fits_none = not trial.clear and fit_in_none(views)
     costs = dict(trial.costs)
     sign_clear, evidence = False, Evidence(0.0, 0.0, 0, 0)
     if trial.clear:
@@ -272,7 +271,7 @@ def odd_views(light_field: LightField) -> list[str]:
     views = Views(light_field, _MOST_PIXELS)
     baselines = [(0, 0), *views.baselines]
     places = np.array(baselines, np.int64) + np.array(views.middle, np.int64)
-    small = views.details(baselines)
+    small = [views.detail(baseline) for baseline in baselines]
     looks = [picture.tobytes() for picture in small]
     times = Counter(looks)
     found = {

@@ -34,7 +34,12 @@ thread_count: Callable[[], int] = _native.thread_count
 set_thread_count: Callable[[int], None] = _native.set_thread_count
 """Have each loop use so many threads."""
 
-# a container or a scheduler may give a process fewer cores than the machine has
-set_thread_count(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+
+def available_cores() -> int:
+    """Number of cores that this process may use, which a container or a scheduler may limit."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+set_thread_count(available_cores())
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_native.forget_threads)

@@ -247,7 +247,7 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     from sepi.process.workspace import Workspace
     from sepi.registry import stage_choices
     from sepi.stage import entry
-    from sepi.validation import require_known
+    from sepi.validation import require_known, require_type, value_of
     from sepi.validation.models import validated
 
     choices = stage_choices(stage, own)
@@ -273,7 +273,9 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
         use_threads(threads)
         require_known("--choice", [choice], choices)
         chosen = choices[choice]
-        settings = validated(chosen.parameters, _json_object(parameters), f"{stage}.{choice}")
+        given = value_of(parameters)
+        require_type("--parameters", given, dict, "a JSON object such as '{}'")
+        settings = validated(chosen.parameters, given, f"{stage}.{choice}")
         light_field = read_light_field(light_field_path)
         maps = None if previous is None else read_stage(previous)
         if maps is not None and maps.disparity.shape != light_field.shape:
@@ -289,13 +291,3 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
             write_timing(timing, started, threads, parameters=settings.model_dump(mode="json"))
 
     return command
-
-
-def _json_object(text: str) -> dict[str, Any]:
-    import json
-
-    with suppress(ValueError, RecursionError):
-        value = json.loads(text)
-        if isinstance(value, dict):
-            return value
-    raise SepiError(f"--parameters: expected a JSON object such as '{{}}', got {text!r}")

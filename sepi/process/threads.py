@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from numbers import Integral
+
+import cv2
 
 from sepi import kernels
 from sepi.errors import SepiError
 from sepi.validation import require_type
 
+available_cores = kernels.available_cores
+"""Number of cores that this process may use, which a container or a scheduler may limit."""
 
-def available_cores() -> int:
-    """Number of cores that this process may use, which a container or a scheduler may limit."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def threads_used() -> int:
-    """Number of threads of a compiled loop, as set by :func:`use_threads`; default: one for each core."""
-    return kernels.thread_count()
+threads_used = kernels.thread_count
+"""Number of threads of a compiled loop, as set by :func:`use_threads`; default: one for each core."""
 
 
 def use_threads(count: int) -> None:
@@ -39,8 +35,8 @@ def use_threads(count: int) -> None:
     Programs with several processes for many light fields give each process one thread:
 
     >>> from sepi.process.threads import use_threads
-    >>> use_threads(1)
     >>> import cv2
+    >>> use_threads(1)
     >>> cv2.getNumThreads()
     1
     """
@@ -49,8 +45,4 @@ def use_threads(count: int) -> None:
         raise SepiError(f"threads: expected a whole number from 1 on, got {count}")
     count = min(int(count), available_cores())
     kernels.set_thread_count(count)
-    if "cv2" in sys.modules:
-        sys.modules["cv2"].setNumThreads(count)
-    else:
-        # OpenCV reads this when loaded
-        os.environ["OPENCV_FOR_THREADS_NUM"] = str(count)
+    cv2.setNumThreads(count)

@@ -17,9 +17,7 @@ from sepi.validation import require_path
 
 # A fictitious camera with the benchmark's numbers. A disparity of d pixels is a depth of 36.57 / (d + 8.605) metres,
 # finite for all disparities of the scenes; the baseline scales with the image to preserve this.
-FOCAL_LENGTH_MM = 100.0
-SENSOR_SIZE_MM = 35.0
-FOCUS_DISTANCE_M = 4.25
+CAMERA = {"focal_length_mm": 100.0, "sensor_size_mm": 35.0, "focus_distance_m": 4.25}
 BASELINE_MM_AT_512 = 25.0
 
 
@@ -87,13 +85,7 @@ def _settings(light_field: LightField, camera: Mapping[str, float] | None) -> Ra
     height, width = light_field.shape
     rows, columns = light_field.grid
     known = light_field.require_disparity_range()
-    if camera is None:
-        camera = {
-            "focal_length_mm": FOCAL_LENGTH_MM,
-            "sensor_size_mm": SENSOR_SIZE_MM,
-            "baseline_mm": BASELINE_MM_AT_512 * 512 / max(width, height),
-            "focus_distance_m": FOCUS_DISTANCE_M,
-        }
+    camera = camera or {**CAMERA, "baseline_mm": BASELINE_MM_AT_512 * 512 / max(width, height)}
     settings = RawConfigParser()
     settings.read_dict(
         {
