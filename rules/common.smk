@@ -1,6 +1,5 @@
 # Shared by all rules: the checked configuration, and the names, threads and memory that follow from it.
 
-import atexit
 import hashlib
 import json
 import os
@@ -17,7 +16,7 @@ from sepi.registry import added, extensions
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of, compared_methods
 from sepi.report.plan import PARTS, Plan
 from sepi.validation import require_known
-from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, keep, remember, stage_modules
+from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, stage_modules
 from sepi.workflow.config import load_settings
 from sepi.workflow.needs import stage_needs
 from sepi.workflow.result_paths import RESULTS, key_of, scene_files
@@ -27,10 +26,6 @@ FOLDER = os.path.dirname(str(workflow.current_basedir))
 IS_MODULE = os.path.realpath(FOLDER) != os.path.realpath(workflow.basedir)
 # puts a module's `prefix` before paths
 MODIFIER = workflow.modifier.path_modifier
-
-# code digests cached by the previous start
-remember(Path(".snakemake").absolute())
-atexit.register(keep, Path(".snakemake").absolute())
 
 # Jobs use the Python that runs Snakemake, even if its environment is not activated, and the package that the digests
 # describe; jobs of a workflow that uses this one as a module keep theirs. Jobs end with Snakemake, since later writes
