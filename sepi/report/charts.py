@@ -15,6 +15,7 @@ from sepi.report.comparison import mean_by_region
 from sepi.report.drawing import new_figure, save, save_sentence
 from sepi.report.properties import variants_with_bars
 from sepi.report.runs import Runs, count_note, datasets_of, own_key
+from sepi.report.table import shown
 from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 INTERVAL = 90
@@ -128,18 +129,15 @@ def write_bars(folder: Path, name: str, groups: Mapping[str, pd.DataFrame]) -> N
     for axis in axes[len(groups) :]:
         axis.set_axis_off()
     for axis, (title, group) in zip(axes, groups.items(), strict=False):
-        positions = np.arange(len(group))
-        for shift, key, colour in ((-0.2, "ours", _OURS), (0.2, "published", _PUBLISHED)):
-            values = group[key].to_numpy()
-            if not np.isnan(values).all():
-                bars = axis.barh(positions + shift, values, 0.38, color=colour)
-                axis.bar_label(bars, ["" if np.isnan(value) else f"{value:.2f}" for value in values], fontsize=6)
         names = [f"{variant} ({note})" if note else variant for variant, note in group["note"].items()]
-        axis.set_yticks(positions, names, fontsize=7)
+        figures = group[["ours", "published"]].set_axis(names)
+        figures.plot.barh(ax=axis, color=[_OURS, _PUBLISHED], width=0.78, legend=False, ylabel="")
+        for bars, texts in zip(axis.containers, shown(figures).T.to_numpy(), strict=True):
+            axis.bar_label(bars, texts, fontsize=6)
         axis.invert_yaxis()
         axis.margins(x=0.15)
         axis.set_title(title, fontsize=8, parse_math=False)
-        axis.tick_params(axis="x", labelsize=7)
+        axis.tick_params(labelsize=7)
         axis.set_xlabel("MSE x100", fontsize=7)
     labels = {"this code, scenes available": _OURS, "the paper, all its scenes": _PUBLISHED}
     handles = [Patch(color=colour, label=label) for label, colour in labels.items()]
@@ -151,17 +149,9 @@ def write_times(folder: Path, name: str, rows: pd.DataFrame) -> None:
     """Write stacked seconds of the stages beside their peak memory, a bar per scene and variant."""
     figure = new_figure(9, 1.2 + 0.3 * len(rows))
     time, memory = figure.subplots(1, 2, sharey=True)
-    positions = np.arange(len(rows))
-    left = np.zeros(len(rows))
-    stages = list(rows["seconds"])
-    for number, stage in enumerate(stages):
-        seconds, peaks = (rows[score, stage].to_numpy() for score in ("seconds", "peak_memory_mb"))
-        colour = _STAGES[number % len(_STAGES)]
-        time.barh(positions, seconds, 0.7, left=left, color=colour, label=stage)
-        shift = (number + 0.5) / len(stages) - 0.5
-        memory.barh(positions + 0.7 * shift, peaks, 0.6 / len(stages), color=colour)
-        left += seconds
-    time.set_yticks(positions, list(map(", ".join, rows.index)), fontsize=7, parse_math=False)
+    named = rows.set_axis(list(map(", ".join, rows.index)))
+    named["seconds"].plot.barh(ax=time, stacked=True, color=_STAGES, width=0.7, fontsize=7, ylabel="")
+    named["peak_memory_mb"].plot.barh(ax=memory, color=_STAGES, width=0.7, fontsize=7, legend=False, ylabel="")
     time.invert_yaxis()
     time.set_xlabel("seconds", fontsize=8)
     memory.set_xlabel("peak memory / MB", fontsize=8)
