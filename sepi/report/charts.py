@@ -38,8 +38,7 @@ def write_error_bars(folder: Path, name: str, runs: Runs) -> None:
     diagram.plot([0, 1], [0, 1], color="0.6", linestyle="--", linewidth=1)
     held.axvline(INTERVAL, color="0.6", linestyle="--", linewidth=1)
     rows = np.arange(len(pairs))
-    for number, variant in enumerate(variants):
-        colour, marker = _COLOURS[number % len(_COLOURS)], _MARKERS[number % len(_MARKERS)]
+    for number, (variant, colour, marker) in enumerate(zip(variants, _COLOURS, _MARKERS, strict=False)):
         right = runs.reliability(variant, pairs)
         enough = right.enough
         label = f"{variant}, largest gap {right.gap:.1f} %"

@@ -45,7 +45,6 @@ _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
 # packages and modules of which a job runs one
 _READERS = ("eslf", "exported", "hci", "image_folder", "matlab")
 _ALTERNATIVES = ("scenes", *(f"io.readers.{name}" for name in _READERS))
-_HEADER = ".hpp"
 # arguments of calls that are texts for people
 _TOLD = ("help", "description")
 
@@ -119,10 +118,8 @@ def _root_of(package: str, root: Path) -> Path:
 
 @cache
 def _file_of(module: str, root: Path) -> Path | None:
-    *above, name = module.removesuffix(_HEADER).split(".")
+    *above, name = module.split(".")
     folder = _root_of(module.partition(".")[0], root).joinpath(*above)
-    if module.endswith(_HEADER):
-        return folder / f"{name}{_HEADER}"
     # kernels lie beside their callers, and are imported from one package
     below = ("*", "extensions/*") if folder.name == "kernels" else ()
     kernels = (path for inner in below for path in folder.parent.glob(f"{inner}/kernels/{name}.cpp"))
@@ -136,10 +133,7 @@ def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
     if file is None:
         raise ModuleNotFoundError(f"no module {module} in {root}")
     if file.suffix != ".py":
-        # without comments and layout
-        text = re.sub(r"//[^\n]*|/\*.*?\*/", " ", file.read_text(encoding="utf-8"), flags=re.DOTALL)
-        headers = re.findall(r'^#include "(.+)\.hpp"', text, re.MULTILINE)
-        return _digest(" ".join(text.split())), frozenset(_header(name, file, root) for name in headers)
+        return _digest(_kernel_text(file, root / file.relative_to(root).parts[0])), frozenset()
     tree = ast.parse(file.read_bytes())
     tree.body = [node for node in tree.body if not (isinstance(node, ast.If) and ast.unparse(node.test) in _NOT_RUN)]
     named: list[tuple[int, str, list[str]]] = []
@@ -183,8 +177,10 @@ def _imported(level: int, base: str, names: list[str], package: str, root: Path)
         yield inner if _file_of(inner, root) else base
 
 
-def _header(name: str, file: Path, root: Path) -> str:
-    """Module name of a header that ``file`` includes by this name: beside it, or elsewhere in the package."""
-    near = file.parent / f"{name}{_HEADER}"
-    place = near if near.is_file() else root / file.relative_to(root).parts[0] / f"{name}{_HEADER}"
-    return ".".join(place.relative_to(root).with_suffix("").parts) + _HEADER
+def _kernel_text(file: Path, package: Path) -> str:
+    """A C++ source without comments and layout, and after it the headers of its package that it includes."""
+    text = re.sub(r"//[^\n]*|/\*.*?\*/", " ", file.read_text(encoding="utf-8"), flags=re.DOTALL)
+    headers = re.findall(r'^#include "(.+)"', text, re.MULTILINE)
+    # a header lies beside the source, or elsewhere in the package
+    places = (file.parent / name if (file.parent / name).is_file() else package / name for name in headers)
+    return " ".join([*text.split(), *(_kernel_text(place, package) for place in places)])
