@@ -3,6 +3,7 @@
 
 import os
 import sys
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,28 +11,15 @@ from pathlib import Path
 # version of the package that these rules need
 VERSION = "0.1.0"
 
-
-def package_problem(folder):
-    """Problem of the installed package for a workflow in this folder, in one line; empty if there is none."""
-    found = find_spec("sepi")
-    if found is None:
-        return f"the Python package is not installed where Snakemake runs; pip install sepi=={VERSION}"
-    try:
-        installed = version("sepi")
-    except PackageNotFoundError:
-        # a source tree that is not installed has no version
-        return ""
-    beside = found.origin is not None and Path(found.origin).parents[1] == Path(folder)
-    if beside or installed == VERSION:
-        return ""
-    return (
-        f"the workflow in {folder} is of version {VERSION}, the installed package of version {installed}; "
-        f"pip install sepi=={VERSION}, or take version {installed} of the workflow"
-    )
-
-
 # jobs that read the rules belong to a run that has checked this
 if "SEPI_WORKFLOW_PROCESS" not in os.environ:
-    PROBLEM = package_problem(os.path.dirname(str(workflow.current_basedir)))
-    if PROBLEM:
-        sys.exit(f"sepi: {PROBLEM}")
+    PACKAGE, CHECKOUT = find_spec("sepi"), os.path.dirname(str(workflow.current_basedir))
+    if PACKAGE is None:
+        sys.exit(f"sepi: the Python package is not installed where Snakemake runs; pip install sepi=={VERSION}")
+    # a source tree that is not installed has no version
+    with suppress(PackageNotFoundError):
+        if version("sepi") != VERSION and Path(str(PACKAGE.origin)).parents[1] != Path(CHECKOUT):
+            sys.exit(
+                f"sepi: the workflow in {CHECKOUT} is of version {VERSION}, the installed package of version "
+                f"{version('sepi')}; pip install sepi=={VERSION}, or take version {version('sepi')} of the workflow"
+            )

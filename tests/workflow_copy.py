@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -20,7 +19,6 @@ import yaml
 from snakemake_runs import run_snakemake
 
 from sepi.variants import STAGES
-from sepi.workflow.code_digest import code_digest, keep
 
 REPOSITORY = Path(__file__).parents[1]
 SIZE = 64
@@ -36,7 +34,6 @@ TINY = {
 
 # in place of what renames a finished file: as many seconds later as the environment says, and not while a file is there
 SLOW_WRITING = """import os, time
-        # not what Snakemake itself keeps of the code
         is_result = path.suffix == ".h5"
         time.sleep(is_result * float(os.environ.get("SLEEP", "0")))
         while is_result and os.path.exists(os.environ.get("HOLD", "")):
@@ -57,7 +54,6 @@ class Workflow:
     def words(self, *targets: str, flags: tuple[str, ...] = ()) -> list[str]:
         """What Snakemake is called with for this configuration."""
         self.folder.mkdir(exist_ok=True)
-        with_code_read(self.folder)
         config = self.folder / "config.yaml"
         config.write_text(yaml.safe_dump(self.config, sort_keys=False))
         return ["--snakefile", str(self.tree / "Snakefile"), "--configfile", str(config), *flags, "--", *targets]
@@ -143,21 +139,6 @@ class Workflow:
     def with_config(self, **values: Any) -> "Workflow":
         """The same workflow with other values of some keys."""
         return replace(self, config=self.config | values)
-
-
-@cache
-def _read_code() -> None:
-    files = (path.relative_to(REPOSITORY).with_suffix("") for path in (REPOSITORY / "sepi").rglob("*.py"))
-    code_digest(*(".".join(file.parts) for file in files if file.name != "__init__"))
-
-
-def with_code_read(folder: Path) -> None:
-    """Have in a folder what an earlier run there would have kept of the package's code, which takes long to read."""
-    _read_code()
-    (folder / ".snakemake").mkdir(exist_ok=True)
-    # of another folder's starts
-    with mock.patch.dict("sepi.workflow.code_digest._before", clear=True):
-        keep(folder / ".snakemake")
 
 
 def planned(stdout: str) -> dict[str, int]:

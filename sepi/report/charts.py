@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -16,6 +15,7 @@ from sepi.report.comparison import mean_by_region
 from sepi.report.drawing import new_figure, save, save_sentence
 from sepi.report.properties import variants_with_bars
 from sepi.report.runs import Runs, count_note, datasets_of, own_key
+from sepi.report.table import shown
 from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 INTERVAL = 90
@@ -38,8 +38,7 @@ def write_error_bars(folder: Path, name: str, runs: Runs) -> None:
     diagram.plot([0, 1], [0, 1], color="0.6", linestyle="--", linewidth=1)
     held.axvline(INTERVAL, color="0.6", linestyle="--", linewidth=1)
     rows = np.arange(len(pairs))
-    for number, variant in enumerate(variants):
-        colour, marker = _COLOURS[number % len(_COLOURS)], _MARKERS[number % len(_MARKERS)]
+    for number, (variant, colour, marker) in enumerate(zip(variants, _COLOURS, _MARKERS, strict=False)):
         right = runs.reliability(variant, pairs)
         enough = right.enough
         label = f"{variant}, largest gap {right.gap:.1f} %"
@@ -68,52 +67,36 @@ _OURS, _PUBLISHED = "#4a7fae", "#b9bfc5"
 _STAGES = ("#3b5b92", "#2a8c8c", "#7ab648", "#d9b430", "#b25d2c", "#7d4f9e")
 
 
-class BarGroup(NamedTuple):
-    """Bars of MSE x100 with one scale.
+def ablation_bars(runs: Runs) -> dict[str, pd.DataFrame]:
+    """Average MSE x100 of each listed variant beside the published one, by the name of a dataset and a region.
 
-    Attributes
-    ----------
-    dataset, region : str
-        Dataset and region of the figures.
-    scenes : int
-        Number of scenes in our averages.
-    over : str
-        Text on these scenes; empty if there is one or none.
-    figures : DataFrame
+    Returns
+    -------
+    dict of str to DataFrame
         Rows variants; ``ours`` and ``published``, NaN if not available, and a ``note`` if ours is over fewer scenes
-        than the group's.
+        than the others.
     """
-
-    dataset: str
-    region: str
-    scenes: int
-    over: str
-    figures: pd.DataFrame
-
-
-def ablation_bars(runs: Runs) -> list[BarGroup]:
-    """Average MSE x100 of each listed variant beside the published one, a group per dataset and region."""
-    groups = []
+    groups = {}
     variants = list(runs.plan.variants)
     for dataset, region in itertools.product(datasets_of(runs.plan), REGIONS):
         means, counts = (found.loc[region] for found in mean_by_region(runs, dataset, variants))
         theirs = published.table4()[region].reindex([(dataset, variant) for variant in variants]).to_numpy()
         most, available = int(counts.max()), len(runs.scored(dataset))
-        notes = [count_note([int(count)], most) for count in counts]
         over = f"{most} scenes" if most == available else f"{most} of {available} scenes"
-        title = "whole map" if region == WHOLE_MAP else region
-        figures = pd.DataFrame({"ours": means, "published": theirs, "note": notes}, variants)
-        groups.append(BarGroup(dataset, title, most, over if most and available > 1 else "", figures))
-    return [group for group in groups if group.figures[["ours", "published"]].notna().any(axis=None)]
+        average = f", average of {over}" if most > 1 else f", {over}" if most and available > 1 else ""
+        title = f"{dataset}, {'whole map' if region == WHOLE_MAP else region}{average if most else ', published only'}"
+        notes = [count_note([int(count)], most) for count in counts]
+        groups[title] = pd.DataFrame({"ours": means, "published": theirs, "note": notes}, variants)
+    return {title: bars for title, bars in groups.items() if bars[["ours", "published"]].notna().any(axis=None)}
 
 
-def part_bars(parts: Runs) -> list[BarGroup]:
-    """MSE x100 of the variants in the ablation of ``best``, a group per scene."""
-    variants, groups = list(parts.plan.variants), []
+def part_bars(parts: Runs) -> dict[str, pd.DataFrame]:
+    """MSE x100 of the variants in the ablation of ``best``, by scene, as :func:`ablation_bars`."""
+    variants, groups = list(parts.plan.variants), {}
     for dataset, scene in parts.scored_pairs:
         errors = parts.of("mse100", dataset).loc[scene, [*map(own_key, variants)]].to_numpy()
-        figures = pd.DataFrame({"ours": errors, "published": np.nan, "note": ""}, variants)
-        groups.append(BarGroup(f"{dataset}/{scene}", "whole map", 1, "", figures))
+        bars = pd.DataFrame({"ours": errors, "published": np.nan, "note": ""}, variants)
+        groups[f"{dataset}/{scene}, whole map"] = bars
     return groups
 
 
@@ -132,32 +115,28 @@ def stage_times(runs: Runs) -> pd.DataFrame:
     return found.set_axis(pd.MultiIndex.from_arrays([scenes, variants]))
 
 
-def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
+def write_bars(folder: Path, name: str, groups: Mapping[str, pd.DataFrame]) -> None:
     """Write bars for each group of :func:`ablation_bars`; without groups, a sentence."""
     if not groups:
         save_sentence(folder, name, "no scene with ground truth")
         return
     columns = min(3, len(groups))
     lines = -(-len(groups) // columns)
-    height = 0.9 + 0.32 * max(len(group.figures) for group in groups)
+    height = 0.9 + 0.32 * max(map(len, groups.values()))
     figure = new_figure(4.2 * columns, height * lines)
     axes = figure.subplots(lines, columns, squeeze=False).ravel()
     for axis in axes[len(groups) :]:
         axis.set_axis_off()
-    for axis, group in zip(axes, groups, strict=False):
-        positions = np.arange(len(group.figures))
-        for shift, key, colour in ((-0.2, "ours", _OURS), (0.2, "published", _PUBLISHED)):
-            values = group.figures[key].to_numpy()
-            if not np.isnan(values).all():
-                bars = axis.barh(positions + shift, values, 0.38, color=colour)
-                axis.bar_label(bars, ["" if np.isnan(value) else f"{value:.2f}" for value in values], fontsize=6)
-        names = [f"{variant} ({note})" if note else variant for variant, note in group.figures["note"].items()]
-        axis.set_yticks(positions, names, fontsize=7)
+    for axis, (title, group) in zip(axes, groups.items(), strict=False):
+        names = [f"{variant} ({note})" if note else variant for variant, note in group["note"].items()]
+        figures = group[["ours", "published"]].set_axis(names)
+        figures.plot.barh(ax=axis, color=[_OURS, _PUBLISHED], width=0.78, legend=False, ylabel="")
+        for bars, texts in zip(axis.containers, shown(figures).T.to_numpy(), strict=True):
+            axis.bar_label(bars, texts, fontsize=6)
         axis.invert_yaxis()
         axis.margins(x=0.15)
-        count = f", {group.over}" if group.over else ""
-        axis.set_title(f"{group.dataset}, {group.region}{count}", fontsize=8, parse_math=False)
-        axis.tick_params(axis="x", labelsize=7)
+        axis.set_title(title, fontsize=8, parse_math=False)
+        axis.tick_params(labelsize=7)
         axis.set_xlabel("MSE x100", fontsize=7)
     labels = {"this code, scenes available": _OURS, "the paper, all its scenes": _PUBLISHED}
     handles = [Patch(color=colour, label=label) for label, colour in labels.items()]
@@ -169,17 +148,9 @@ def write_times(folder: Path, name: str, rows: pd.DataFrame) -> None:
     """Write stacked seconds of the stages beside their peak memory, a bar per scene and variant."""
     figure = new_figure(9, 1.2 + 0.3 * len(rows))
     time, memory = figure.subplots(1, 2, sharey=True)
-    positions = np.arange(len(rows))
-    left = np.zeros(len(rows))
-    stages = list(rows["seconds"])
-    for number, stage in enumerate(stages):
-        seconds, peaks = (rows[score, stage].to_numpy() for score in ("seconds", "peak_memory_mb"))
-        colour = _STAGES[number % len(_STAGES)]
-        time.barh(positions, seconds, 0.7, left=left, color=colour, label=stage)
-        shift = (number + 0.5) / len(stages) - 0.5
-        memory.barh(positions + 0.7 * shift, peaks, 0.6 / len(stages), color=colour)
-        left += seconds
-    time.set_yticks(positions, list(map(", ".join, rows.index)), fontsize=7, parse_math=False)
+    named = rows.set_axis(list(map(", ".join, rows.index)))
+    named["seconds"].plot.barh(ax=time, stacked=True, color=_STAGES, width=0.7, fontsize=7, ylabel="")
+    named["peak_memory_mb"].plot.barh(ax=memory, color=_STAGES, width=0.7, fontsize=7, legend=False, ylabel="")
     time.invert_yaxis()
     time.set_xlabel("seconds", fontsize=8)
     memory.set_xlabel("peak memory / MB", fontsize=8)

@@ -117,22 +117,17 @@ def _dataset_section(
     figures[ratios.index] = figures[[own_key(name) for name in ratios]].to_numpy() / divided.to_numpy()
     told = {name: runs.problems(dataset, [scene]) for name, scene in zip(names, scenes, strict=True)}
     problems = shown(pd.DataFrame(told).T.reindex_like(figures))
-    texts = _texts(figures, known["kind"], 2).where(problems == "", problems)
-    is_shown = known.index.isin(runs.external_of(dataset).index) | ours | (~external & (texts != "").any())
+    is_shown = known.index.isin(runs.external_of(dataset).index) | ours | (~external & figures.notna().any())
     there = known[is_shown]
     heads = {"scene": Head("scene", Kind.TEXT)}
     heads |= {str(key): Head(row["head"], row["kind"]) for key, row in there.iterrows()}
-    marks = ranks(texts[there.index[there["learning"] == "none"]].T).T
-    texts.insert(0, "scene", texts.index)
-    rows = _texts(figures, known["kind"], 4).where(problems == "", problems).reset_index(names="scene")
-    rows.insert(0, "dataset", dataset)
-    rows.insert(2, "row", kinds)
-    return rows, section(dataset_title(dataset), heads, texts, marks, pd.concat(notes), kinds)
-
-
-def _texts(figures: pd.DataFrame, kinds: pd.Series, decimals: int) -> pd.DataFrame:
-    """Figures as texts, published ones with the two decimals that the paper prints."""
-    return shown(figures, decimals).assign(**shown(figures.loc[:, kinds == Kind.PUBLISHED]))
+    # published figures with the two decimals that the paper prints
+    printed = shown(figures.loc[:, known["kind"] == Kind.PUBLISHED])
+    cells = figures.astype(object).assign(**printed).where(problems == "", problems)
+    marks = ranks(cells[there.index[there["learning"] == "none"]].T).T
+    cells = cells.assign(dataset=dataset, scene=cells.index, row=kinds)
+    rows = cells[["dataset", "scene", "row", *known.index]]
+    return rows, section(dataset_title(dataset), heads, cells, marks, pd.concat(notes), kinds)
 
 
 def region_table(runs: Runs) -> Table:
@@ -162,9 +157,8 @@ def region_table(runs: Runs) -> Table:
         theirs = filter(None, map(partial(published.paper_scene, dataset), scenes))
         compares = not of_paper or sorted(of_paper) == sorted(theirs)
         ranked[column] = (known["learning"] == "none") & (compares | ~here)
-    texts = shown(figures)
-    named = texts.assign(name=known["head"])
-    rows = pd.concat([shown(figures[here], 4).replace("n/a", ""), texts[~here]]).loc[known.index].join(counts)
+    cells = figures.where(here, shown(figures), axis=0)
+    rows = cells.replace("n/a", "").join(counts)
     rows = known[["learning"]].join(rows[[name for pair in zip(figures, counts, strict=True) for name in pair]])
     available = "; ".join(f"{dataset}: {', '.join(runs.scored(dataset)) or 'none'}" for dataset in datasets)
     return Table(
@@ -174,7 +168,7 @@ def region_table(runs: Runs) -> Table:
         "where none or fewer are named. "
         f"{REGIONS_NOTE} {LEARNED_NOTE}" + (f" {EXTERNAL_NOTE}" if plan.external else ""),
         rows.reset_index(names="method"),
-        [section("", heads, named, ranks(texts.where(ranked, "")), notes, list(known["kind"]))],
+        [section("", heads, cells.assign(name=known["head"]), ranks(cells.where(ranked)), notes, list(known["kind"]))],
         "Marked: best and second best in a column, of the published methods that are not learned, and of this code "
         "where it ran on every scene that the published averages are over",
     )

@@ -39,14 +39,12 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
         stages[plan.stages[-1]] = with_unknown(light_field, stages[plan.stages[-1]])
     keys = {variant: plan.stage_key(variant, plan.stages[-1]) for variant in maps}
     scored = read_evaluations(plan.scores_file(dataset, scene), list(keys.values()))
-    external = read_evaluations(plan.files(dataset, scene).external) if plan.external else {}
     return SceneResults(
         light_field=light_field,
         maps=maps,
         evaluations={variant: scored[key] for variant, key in keys.items()},
         detailed=plan.detailed,
-        external={name: (one.disparity, one) for name, one in external.items() if one.disparity is not None},
-        problems={method: found.problem for method, found in external.items() if found.disparity is None},
+        external=read_evaluations(plan.files(dataset, scene).external) if plan.external else {},
     )
 
 

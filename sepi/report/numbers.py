@@ -35,13 +35,12 @@ def pooled_q25(plan: Plan) -> Iterator[tuple[str, str, str, float]]:
     for scene in plan.scenes[DATASET]:
         levels.setdefault(level_of(scene), []).append(scene)
     for level, scenes in levels.items():
-        for variant in plan.compared:
-            key = plan.stage_key(variant, plan.stages[-1])
-            of_scenes = (read_evaluations(plan.scores_file(DATASET, scene), [key])[key] for scene in scenes)
-            yield from ((level, variant, *quarter) for quarter in _quarters(of_scenes))
-        maps = [read_evaluations(plan.files(DATASET, scene).external) for scene in scenes] if plan.external else []
-        for method in plan.external:
-            yield from ((level, method, *quarter) for quarter in _quarters(found[method] for found in maps))
+        for method in (*plan.compared, *plan.external):
+            is_own = method in plan.variants
+            key = plan.stage_key(method, plan.stages[-1]) if is_own else method
+            files = (plan.scores_file(DATASET, one) if is_own else plan.files(DATASET, one).external for one in scenes)
+            quarters = _quarters(read_evaluations(file, [key])[key] for file in files)
+            yield from ((level, method, *quarter) for quarter in quarters)
 
 
 def level_of(scene: str) -> str:

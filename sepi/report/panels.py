@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -84,18 +85,15 @@ class SceneResults:
         Evaluation of each variant's final map.
     detailed : list of str
         Variants whose stages are all on the page.
-    external : mapping of str to (ndarray (H, W), Evaluation)
-        External methods' maps.
-    problems : mapping of str to str
-        External methods without a map, and the reason.
+    external : mapping of str to Evaluation
+        External methods' maps, or their problems.
     """
 
     light_field: LightField
     maps: Mapping[str, Mapping[str, StageMaps]]
     evaluations: Mapping[str, Evaluation]
     detailed: list[str]
-    external: Mapping[str, tuple[FloatMap, Evaluation]] = field(default_factory=dict)
-    problems: Mapping[str, str] = field(default_factory=dict)
+    external: Mapping[str, Evaluation] = field(default_factory=dict)
 
     def final(self, variant: str) -> StageMaps:
         """The maps after the last stage."""
@@ -109,11 +107,14 @@ class SceneResults:
 
 def panels_of(results: SceneResults) -> list[Panel]:
     """All panels of a scene, in the order of the page; errors and changes need ground truth."""
+    stages = [list(_stage_panels(results, variant)) for variant in results.variants]
+    external = list(_external_panels(results))
     return [
         *_scene_panels(results),
-        *(panel for variant in results.variants for panel in _stage_panels(results, variant)),
-        *_error_panels(results),
-        *_external_panels(results),
+        *itertools.chain(*stages),
+        *_error_panels(results, "Signed errors", [panels[-1] for panels in stages]),
+        *external,
+        *_error_panels(results, "Errors of external methods", external),
         *_change_panels(results),
         *(panel for variant in results.variants for panel in _detail_panels(results, variant)),
     ]
@@ -165,23 +166,20 @@ def _stage_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
         )
 
 
-def _error_panels(results: SceneResults) -> Iterator[Panel]:
-    ground_truth = results.light_field.ground_truth
-    for variant in results.variants if ground_truth is not None else ():
-        key, title, note = f"{variant}/error", f"{variant}: error", note_of(results.evaluations[variant])
-        found = results.final(variant)
-        sure = found.confidence if variant in results.detailed else None
-        yield Panel(key, title, "Signed errors", "error", found.disparity, ground_truth, confidence=sure, note=note)
-
-
 def _external_panels(results: SceneResults) -> Iterator[Panel]:
+    for method, found in results.external.items():
+        if found.disparity is not None:
+            key, title, note = f"external/{method}/disparity", f"{method} (external)", note_of(found)
+            yield Panel(key, title, "External methods", "disparity", found.disparity, note=note)
+
+
+def _error_panels(results: SceneResults, group: str, finals: Iterable[Panel]) -> Iterator[Panel]:
+    """Panels of the errors of final maps, beside these."""
     ground_truth = results.light_field.ground_truth
-    for method, (disparity, evaluation) in results.external.items():
-        key, title, note = f"external/{method}/disparity", f"{method} (external)", note_of(evaluation)
-        yield Panel(key, title, "External methods", "disparity", disparity, note=note)
-    for method, (disparity, evaluation) in results.external.items() if ground_truth is not None else ():
-        key, title, note = f"external/{method}/error", f"{method} (external): error", note_of(evaluation)
-        yield Panel(key, title, "Errors of external methods", "error", disparity, minus=ground_truth, note=note)
+    for found in finals if ground_truth is not None else ():
+        key, title = f"{found.key.rpartition('/')[0]}/error", f"{found.title.removesuffix(': final')}: error"
+        sure, note = found.confidence, found.note
+        yield Panel(key, title, group, "error", found.values, ground_truth, confidence=sure, note=note)
 
 
 def _change_panels(results: SceneResults) -> Iterator[Panel]:

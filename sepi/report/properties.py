@@ -86,11 +86,11 @@ def _table(
             told = runs.problems(DATASET, [one for one in alike if not by_scene or scenes[one].world == column])
             problems[column] = problems[column].mask(told[known.index] != "", told)
         spreads = of_seeds.std().where((problems == "") & means.notna())
-        texts, precise = (shown(means, n, "" if by_scene else "n/a").where(problems == "", problems) for n in (2, 4))
-        rows.append(precise.join(spreads.add_suffix("_sd")).assign(noise=noise, seeds=len(seeds), method=known["name"]))
+        cells = means.astype(object).where(means.notna(), "" if by_scene else "n/a").where(problems == "", problems)
+        rows.append(cells.join(spreads.add_suffix("_sd")).assign(noise=noise, seeds=len(seeds), method=known["name"]))
         over = f", {len(seeds)} seeds: mean (± standard deviation)" if len(seeds) > 1 else ""
-        cells, marks = texts.assign(method=known["head"]), ranks(texts[known["learning"] != ""])
-        notes = shown(spreads).map(lambda text: text and f"± {text}")
+        marks, notes = ranks(cells[known["learning"] != ""]), shown(spreads).map(lambda text: text and f"± {text}")
+        cells = cells.assign(method=known["head"])
         sections.append(section(f"Noise {noise}{over}", heads, cells, marks, notes, list(known["kind"])))
     # one seed has no spread
     table = pd.concat(rows)[["noise", "seeds", "method", *titles, *(f"{key}_sd" for key in titles)]]

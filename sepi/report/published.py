@@ -42,7 +42,7 @@ def methods() -> pd.DataFrame:
         in the paper; ``learning``: ``"none"``, ``"supervised"`` or ``"unsupervised"``; ``variant``: the one that
         computes it, if any; ``label``: authors and name for a table's header.
     """
-    found = _read("methods", index="key").fillna("")
+    found = _read("methods", "key").fillna("")
     named = found["authors"] + " (" + found["name"] + ")"
     return found.assign(label=named.where(found["name"] != "", found["authors"]))
 
@@ -52,38 +52,33 @@ def counterpart(variant: str) -> str:
     return next((str(key) for key, name in methods()["variant"].items() if name == variant), PAPERS_METHOD)
 
 
-@cache
 def table1() -> pd.DataFrame:
     """Table 1: 100 x MSE over the whole map; rows ``(dataset, scene)``, then the averages as printed, columns methods.
 
     A method trained on a scene has no figure for it.
     """
-    return _read("table1_mse", index=["dataset", "scene"])
+    return _read("table1_mse", "dataset", "scene")
 
 
-@cache
 def table2() -> pd.DataFrame:
     """Table 2: Q25 x 100 over the whole map, as :func:`table1`."""
-    return _read("table2_q25", index=["dataset", "scene"])
+    return _read("table2_q25", "dataset", "scene")
 
 
-@cache
 def table3() -> pd.DataFrame:
     """Table 3: 100 x MSE; rows methods, columns ``(dataset, region)``."""
-    found = _read("table3_regions", index="method")
+    found = _read("table3_regions", "method")
     return found.set_axis(pd.MultiIndex.from_tuples([tuple(name.rsplit("_", 1)) for name in found.columns]), axis=1)
 
 
-@cache
 def table4() -> pd.DataFrame:
     """Table 4: 100 x MSE; rows ``(dataset, variant)``, columns regions. Wang's occlusion stage is from the text."""
-    return _read("table4_ablation", index=["dataset", "variant"])
+    return _read("table4_ablation", "dataset", "variant")
 
 
-@cache
 def runtime() -> dict[str, float]:
     """Seconds per stage and ``"total"``, for 512 x 512 pixels and 9 x 9 views on one core of an Intel Core i7-8700."""
-    return {str(stage): float(took) for stage, took in _read("runtime", index="stage")["seconds"].items()}
+    return {str(stage): float(took) for stage, took in _read("runtime", "stage")["seconds"].items()}
 
 
 def scenes(dataset: str) -> list[str]:
@@ -108,5 +103,6 @@ def paper_scene(dataset: str, scene: str) -> str | None:
     return named.get(scene.lower(), _ARCHIVE_NAMES.get((dataset, scene.lower())))
 
 
-def _read(name: str, index: str | list[str]) -> pd.DataFrame:
-    return pd.read_csv(PUBLISHED / f"{name}.csv", comment="#", index_col=index)
+@cache
+def _read(name: str, *index: str) -> pd.DataFrame:
+    return pd.read_csv(PUBLISHED / f"{name}.csv", comment="#").set_index([*index])

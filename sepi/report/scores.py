@@ -71,10 +71,8 @@ def _score_heads(runs: Runs, scores: Iterable[str]) -> dict[str, Head]:
 def _by_scene(runs: Runs, heads: Mapping[str, Head], ranked: Iterable[str] = ()) -> tuple[pd.DataFrame, list[Section]]:
     """Rows of the compared variants, and a section for each scene with marks in some columns."""
     rows = [_variant_rows(runs, pair)[["dataset", "scene", *heads]] for pair in runs.scored_pairs]
-    sections = []
-    for pair, found in zip(runs.scored_pairs, rows, strict=True):
-        texts = shown(found, missing="n/a")
-        sections.append(section("/".join(pair), heads, texts, ranks(texts[[*ranked]])))
+    pairs = zip(runs.scored_pairs, rows, strict=True)
+    sections = [section("/".join(pair), heads, of, ranks(of[[*ranked]]), missing="n/a") for pair, of in pairs]
     return pd.concat(rows or [pd.DataFrame(columns=["dataset", "scene", *heads])]), sections
 
 
@@ -119,7 +117,7 @@ def edge_table(runs: Runs) -> Table:
         for region in (WHOLE_MAP, DISCONTINUITIES)
     )
     rows = whole[["dataset", "scene", "variant"]].join(edge_budget(whole, there))[whole["pixels"].notna()]
-    texts = shown(rows, missing="n/a").assign(scene=rows["dataset"] + "/" + rows["scene"])
+    cells = rows.assign(scene=rows["dataset"] + "/" + rows["scene"])
     stages = whole["stage"][rows.index]
     return Table(
         "Depth discontinuities",
@@ -129,7 +127,7 @@ def edge_table(runs: Runs) -> Table:
         "background's pixels there, those whose estimate is nearer than the middle between both surfaces; thinning: of "
         "the foreground's, those whose estimate is more distant.",
         rows[["dataset", *_EDGES]],
-        [section("", _EDGES, texts, rows=list(stages.where(stages == EXTERNAL, "")))],
+        [section("", _EDGES, cells, rows=list(stages.where(stages == EXTERNAL, "")), missing="n/a")],
     )
 
 
@@ -176,30 +174,32 @@ def stage_table(runs: Runs) -> Table:
     index = [(*pair, *one, protocol, region) for pair, protocol, one, region in order]
     rows = runs.maps.reindex(pd.MultiIndex.from_tuples(index, names=KEYS))[[*scores, *COUNTS]].reset_index()
     rows = rows.astype(dict.fromkeys(COUNTS, "Int64"))
-    texts = shown(rows, missing="n/a")
     missing = rows["pixels"].isna()
-    texts.loc[missing, [*scores]] = ""
-    texts["after"] = (texts["stage"] + " (" + texts["choice"] + ")").where(texts["choice"] != "", texts["stage"])
+    rows[[*scores]] = rows[[*scores]].astype(object).mask(missing, "")
+    after = (rows["stage"] + " (" + rows["choice"] + ")").where(rows["choice"] != "", rows["stage"])
+    cells = rows.assign(after=after)
     for region in _PARTS:
-        texts.loc[texts["region"] == WHOLE_MAP, region] = texts.loc[texts["region"] == region, "mse100"].to_numpy()
+        cells.loc[cells["region"] == WHOLE_MAP, region] = cells.loc[cells["region"] == region, "mse100"].to_numpy()
     problems = [runs.problem(row.dataset, [row.scene], row.variant) for row in rows[missing].itertuples()]
-    texts.loc[missing, "mse100"] = problems
+    for of in (rows, cells):
+        of.loc[missing, "mse100"] = problems
     heads = {"variant": Head("variant", Kind.TEXT), "after": Head("after stage", Kind.TEXT)}
     heads |= {score: Head(head) for score, head in scores.items()}
     heads |= {region: Head(f"{SCORES['mse100']}, {region}") for region in _PARTS}
     sections = []
-    for (dataset, scene, protocol), found in texts.groupby(["dataset", "scene", "protocol"], sort=False):
+    for (dataset, scene, protocol), found in cells.groupby(["dataset", "scene", "protocol"], sort=False):
         here = (found["stage"] != EXTERNAL) | found["variant"].isin(runs.external_of(dataset)["name"])
         found = found[(found["region"] == WHOLE_MAP) & here]
         heading = f"{dataset}/{scene}, protocol {protocol} (border {PROTOCOLS[protocol]})"
-        sections.append(section(heading, heads, found, rows=list(found["stage"].where(found["stage"] == EXTERNAL, ""))))
+        kinds = list(found["stage"].where(found["stage"] == EXTERNAL, ""))
+        sections.append(section(heading, heads, found, rows=kinds, missing="n/a"))
     return Table(
         "Scores after each stage",
         "Whole map unless a region is named; both protocols. A non-finite estimate counts as bad; how many there are, "
         "and every score in the regions, is in the CSV file. Scenes without ground truth have no scores. "
         + ("Maps of other methods stand below ours as stage `external`. " if plan.external else "")
         + REGIONS_NOTE,
-        rows.assign(mse100=rows["mse100"].astype(object).mask(missing, texts["mse100"])),
+        rows,
         sections,
     )
 

@@ -101,14 +101,18 @@ def section(
     marks: pd.DataFrame | None = None,
     notes: pd.DataFrame | None = None,
     rows: Sequence[str] = (),
+    missing: str = "",
 ) -> Section:
-    """A section of those columns of ``cells`` that have heads; marks and notes after the texts where there are any."""
+    """A section of those columns of ``cells`` that have heads; marks and notes after the texts where there are any.
 
-    def like(given: pd.DataFrame | None) -> pd.DataFrame:
+    Figures have two decimals, and NaN is ``missing``.
+    """
+
+    def like(given: pd.DataFrame | None, missing: str = "") -> pd.DataFrame:
         found = pd.DataFrame() if given is None else given
-        return shown(found.reindex(index=cells.index, columns=[*heads])).reset_index(drop=True)
+        return shown(found.reindex(index=cells.index, columns=[*heads]), missing=missing).reset_index(drop=True)
 
-    texts, noted = like(cells), like(notes)
+    texts, noted = like(cells, missing), like(notes)
     texts = texts.where(noted == "", texts + " (" + noted + ")")
     return Section(heading, [*heads.values()], texts, like(marks), rows or [""] * len(texts))
 
@@ -124,13 +128,13 @@ def shown(figures: pd.DataFrame, decimals: int = 2, missing: str = "") -> pd.Dat
     return figures.astype(object).map(text)
 
 
-def ranks(texts: pd.DataFrame) -> pd.DataFrame:
+def ranks(cells: pd.DataFrame) -> pd.DataFrame:
     """Marks of the least and the second least figure in each column; equal figures have equal marks.
 
     Figures are compared as printed; words and empty cells do not count, and a figure alone has no mark.
     """
-    figures = texts.apply(pd.to_numeric, errors="coerce")
-    places = figures.rank(method="dense").loc[:, figures.count() > 1].reindex(columns=texts.columns)
+    figures = shown(cells).apply(pd.to_numeric, errors="coerce")
+    places = figures.rank(method="dense").loc[:, figures.count() > 1].reindex(columns=cells.columns)
     return places.map(lambda place: {1: BEST, 2: SECOND}.get(place, ""))
 
 

@@ -18,26 +18,18 @@ It does not cover:
 - other libraries: a new version of NumPy reruns nothing.
 
 No stage imports another stage, so a change in one does not change the digests of others.
-
-Reading all code takes most of a second, a fifth of a start of Snakemake. The result for each source is cached in
-Snakemake's folder, keyed by the content of the source, so a change is noticed whatever the time stamp.
 """
 
 from __future__ import annotations
 
 import ast
 import hashlib
-import json
 import re
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from sepi.errors import SepiError
-from sepi.io.files import write_whole
 
 if TYPE_CHECKING:
     from sepi.stage import Choice
@@ -53,20 +45,8 @@ _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
 # packages and modules of which a job runs one
 _READERS = ("exported", "hci", "image_folder")
 _ALTERNATIVES = ("scenes", *(f"io.readers.{name}" for name in _READERS))
-_HEADER = ".hpp"
 # arguments of calls that are texts for people
 _TOLD = ("help", "description")
-
-# result for a source: digest of its code; level, module and names of its imports, as written
-_Code = tuple[str, list[tuple[int, str, list[str]]]]
-
-# cache file in Snakemake's folder
-_KEPT = "sepi_code.json"
-# another version of this module may give other results
-_OWN = Path(__file__).read_bytes()
-# key of a source to its file and its result, from previous starts and from this one
-_before: dict[str, tuple[str, *_Code]] = {}
-_read: dict[str, tuple[str, *_Code]] = {}
 
 
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
@@ -101,10 +81,12 @@ def code_digest(*modules: str, root: Path = ROOT) -> str:
     ModuleNotFoundError
         If there is no such module below ``root``.
     """
-    total = hashlib.sha256()
-    for name in sorted(imported_modules(*modules, root=root)):
-        total.update(f"{name}\n{_code_and_imports(name, root)[0]}\n".encode())
-    return total.hexdigest()[:16]
+    names = sorted(imported_modules(*modules, root=root))
+    return _digest("".join(f"{name}\n{_code_and_imports(name, root)[0]}\n" for name in names))[:16]
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def imported_modules(*modules: str, root: Path = ROOT) -> set[str]:
@@ -136,10 +118,8 @@ def _root_of(package: str, root: Path) -> Path:
 
 @cache
 def _file_of(module: str, root: Path) -> Path | None:
-    *above, name = module.removesuffix(_HEADER).split(".")
+    *above, name = module.split(".")
     folder = _root_of(module.partition(".")[0], root).joinpath(*above)
-    if module.endswith(_HEADER):
-        return folder / f"{name}{_HEADER}"
     # kernels lie beside their callers, and are imported from one package
     below = ("*", "extensions/*") if folder.name == "kernels" else ()
     kernels = (path for inner in below for path in folder.parent.glob(f"{inner}/kernels/{name}.cpp"))
@@ -152,36 +132,18 @@ def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
     file = _file_of(module, root)
     if file is None:
         raise ModuleNotFoundError(f"no module {module} in {root}")
-    source = file.read_bytes()
-    key = hashlib.sha256(b"\0".join((_OWN, file.suffix.encode(), source))).hexdigest()
-    if key not in _read:
-        read = _python_code if file.suffix == ".py" else _kernel_code
-        _read[key] = _before.get(key) or (str(file), *read(source))
-    _, code, named = _read[key]
     if file.suffix != ".py":
-        return code, frozenset(_header(name, file, root) for _, name, _ in named)
-    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-    imports = {name for level, base, names in named for name in _imported(level, base, names, package, root)}
-    return code, frozenset(imports)
-
-
-def _kernel_code(source: bytes) -> _Code:
-    """Digest of a C++ source without comments and layout, and the headers of this package that it includes."""
-    text = re.sub(r"//[^\n]*|/\*.*?\*/", " ", source.decode(), flags=re.DOTALL)
-    headers = re.findall(r'^#include "(.+)\.hpp"', text, re.MULTILINE)
-    return hashlib.sha256(" ".join(text.split()).encode()).hexdigest(), [(0, name, []) for name in headers]
-
-
-def _python_code(source: bytes) -> _Code:
-    """Digest of a source's syntax tree without docstrings, and its imports."""
-    tree = ast.parse(source)
+        return _digest(_kernel_text(file, root / file.relative_to(root).parts[0])), frozenset()
+    tree = ast.parse(file.read_bytes())
     tree.body = [node for node in tree.body if not (isinstance(node, ast.If) and ast.unparse(node.test) in _NOT_RUN)]
     named: list[tuple[int, str, list[str]]] = []
-    return hashlib.sha256(_dumped(tree, named).encode()).hexdigest(), named
+    code = _digest(_dumped(tree, named))
+    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+    return code, frozenset(name for one in named for name in _imported(*one, package, root))
 
 
 def _dumped(node: Any, named: list[tuple[int, str, list[str]]]) -> str:
-    """Syntax tree as text; imports are added to ``named``.
+    """Syntax tree as text; level, module and names of its imports are added to ``named``.
 
     Empty fields are left out, since versions of Python differ in them; ``ast.dump`` differs in more.
     """
@@ -215,27 +177,10 @@ def _imported(level: int, base: str, names: list[str], package: str, root: Path)
         yield inner if _file_of(inner, root) else base
 
 
-def _header(name: str, file: Path, root: Path) -> str:
-    """Module name of a header that ``file`` includes by this name: beside it, or elsewhere in the package."""
-    near = file.parent / f"{name}{_HEADER}"
-    place = near if near.is_file() else root / file.relative_to(root).parts[0] / f"{name}{_HEADER}"
-    return ".".join(place.relative_to(root).with_suffix("").parts) + _HEADER
-
-
-def remember(folder: Path) -> None:
-    """Load the results that previous starts kept in a folder, if they are readable."""
-    with suppress(OSError, ValueError, TypeError, AttributeError):
-        kept = json.loads((folder / _KEPT).read_text(encoding="utf-8"))
-        _before.update({key: (file, code, named) for key, (file, code, named) in kept.items()})
-
-
-def keep(folder: Path) -> None:
-    """Keep the results of this start, and those of previous starts for other files that still exist.
-
-    They only save time, so nothing is kept if the folder is not writable.
-    """
-    files = {file for file, _, _ in _read.values()}
-    kept = {key: code for key, code in _before.items() if code[0] not in files and Path(code[0]).is_file()} | _read
-    if folder.is_dir() and kept != _before:
-        with suppress(OSError, SepiError):
-            write_whole(folder / _KEPT, json.dumps(kept))
+def _kernel_text(file: Path, package: Path) -> str:
+    """A C++ source without comments and layout, and after it the headers of its package that it includes."""
+    text = re.sub(r"//[^\n]*|/\*.*?\*/", " ", file.read_text(encoding="utf-8"), flags=re.DOTALL)
+    headers = re.findall(r'^#include "(.+)"', text, re.MULTILINE)
+    # a header lies beside the source, or elsewhere in the package
+    places = (file.parent / name if (file.parent / name).is_file() else package / name for name in headers)
+    return " ".join([*text.split(), *(_kernel_text(place, package) for place in places)])

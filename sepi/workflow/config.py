@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import re
@@ -34,7 +35,6 @@ _RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view",
 _BUILTIN_VIEWS = 81
 # keys whose values stay text even if they look like numbers
 _TEXTS = ("path", "truth", "images", "reference", "pattern", "variable", "include", "exclude")
-_WORDS = {"true": True, "false": False, "null": None}
 
 
 class Builtin(CheckedModel):
@@ -209,12 +209,10 @@ def _with_numbers(value: Any, top: bool = True) -> Any:
         return [_with_numbers(inner, False) for inner in value]
     if top or not isinstance(value, str):
         return value
-    if value in _WORDS:
-        return _WORDS[value]
-    for kind in (int, float):
+    for read in (json.loads, float):
         with suppress(ValueError):
-            number = kind(value)
-            return number if math.isfinite(number) else value
+            found = read(value)
+            return value if isinstance(found, float) and not math.isfinite(found) else found
     return value
 
 

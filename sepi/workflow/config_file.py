@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import click
@@ -39,7 +39,7 @@ def default_yaml() -> str:
         lines += _comment(field, "")
         default = field.get_default(call_default_factory=True)
         if isinstance(default, BaseModel):
-            lines += [f"{key}:", *_without_effect(_fields(type(default), "  ", default.model_dump()))]
+            lines += [f"{key}:", *_without_effect(_fields(default, "  "))]
         elif key == "variants":
             lines += ["variants:", *_without_effect(f"  {name}: {_flow(entry)}" for name, entry in default.items())]
         elif key == "stages":
@@ -59,19 +59,18 @@ def _stage_lines() -> list[str]:
     for stage, choices in STAGES.items():
         lines.append(f"  {stage}:")
         for name, choice in choices.items():
-            values = choice.parameters().model_dump()
-            lines.append(f"    {name}:" if values else f"    {name}: {{}}")
-            for field, value in values.items():
-                comment = _comment(choice.parameters.model_fields[field], "      ")
-                # parameters of several choices are explained at the first
-                lines += [*(comment if comment[0] not in lines else []), f"      {field}: {_flow(value)}"]
+            lines.append(f"    {name}:" if choice.parameters.model_fields else f"    {name}: {{}}")
+            # parameters of several choices are explained at the first
+            lines += _fields(choice.parameters(), "      ", lines)
     return lines
 
 
-def _fields(model: type[BaseModel], indent: str, values: Mapping[str, Any]) -> list[str]:
+def _fields(values: BaseModel, indent: str, before: Sequence[str] = ()) -> list[str]:
+    """Each field with its value, below what it means unless that is among the lines before."""
     lines = []
-    for name, value in values.items():
-        lines += [*_comment(model.model_fields[name], indent), f"{indent}{name}: {_flow(value)}"]
+    for name, value in values.model_dump().items():
+        comment = _comment(type(values).model_fields[name], indent)
+        lines += [*([] if comment[0] in before else comment), f"{indent}{name}: {_flow(value)}"]
     return lines
 
 

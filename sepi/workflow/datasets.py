@@ -45,7 +45,7 @@ _SLOWER = 4
 # bytes of a pixel of 8-bit colours
 _RGB = 3
 # levels of folders: root/scene, root/category/scene, and one more
-_DEPTH = 3
+_LEVELS = 3
 
 
 @dataclass(frozen=True)
@@ -217,11 +217,17 @@ def scenes_in(
         If the folder does not exist or has no scene, a pattern matches none, none is left, two scenes have one name, or
         a name is not valid.
     """
-    find, expected = _FINDERS[dataset]
+    is_archive = dataset == "hci_2013"
     # os.path: a name that is too long is no error there
-    if not (os.path.isdir(root) or (os.path.isfile(root) and dataset == "hci_2013")):
+    if not (os.path.isdir(root) or (os.path.isfile(root) and is_archive)):
         raise SepiError(f"{where}: no folder '{root}'")
-    scenes = list(find(root.resolve()))
+    if is_archive:
+        expected = f"HDF5 files with a dataset {hci.VIEWS_2013}"
+        scenes = [_archive_scene(dataset, path) for path in _places(root.resolve(), hci.matches_2013, _LEVELS + 1)]
+    else:
+        expected = f"folders with {VIEW_PATTERN}"
+        folders = _places(root.resolve(), lambda path: any(path.glob(VIEW_PATTERN)), _LEVELS)
+        scenes = [_benchmark_scene(dataset, folder.name, folder) for folder in folders]
     if not scenes:
         raise SepiError(f"{where}: no scene in '{root}' (expected {expected})")
     for key, patterns in (("include", include), ("exclude", exclude)):
@@ -289,32 +295,21 @@ def _require_plain(name: str, where: str) -> None:
         raise SepiError(f"{where}: a scene is named with letters, digits and _ . + -, at most {LONGEST_NAME}: '{name}'")
 
 
-def _benchmark_scenes(folder: Path, depth: int = _DEPTH) -> Iterator[Scene]:
-    if any(folder.glob(VIEW_PATTERN)):
-        yield _benchmark_scene("hci", folder.name, folder)
-    elif depth:
-        for inner in sorted(folder.iterdir()):
-            if inner.is_dir() and not inner.name.startswith("."):
-                yield from _benchmark_scenes(inner, depth - 1)
-
-
 def _benchmark_scene(dataset: str, name: str, folder: Path, flags: tuple[str, ...] = ()) -> Scene:
     views = sorted(folder.glob(VIEW_PATTERN))
     return Scene(dataset, name, folder, (*views, *folder.glob(hci.PARAMETERS)), *size_of(views), flags=flags)
 
 
-def _archive_scenes(path: Path, depth: int = _DEPTH + 1) -> Iterator[Scene]:
-    if path.is_dir() and depth:
+def _archive_scene(dataset: str, path: Path) -> Scene:
+    name = path.parent.name if path.stem.lower() == "lf" else path.stem
+    return Scene(dataset, name, path, (path,), *size_of((path,)))
+
+
+def _places(path: Path, is_scene: Callable[[Path], bool], levels: int) -> Iterator[Path]:
+    """Scenes below a folder, or the path itself if it is one."""
+    if is_scene(path):
+        yield path
+    elif path.is_dir() and levels:
         for inner in sorted(path.iterdir()):
             if not inner.name.startswith("."):
-                yield from _archive_scenes(inner, depth - 1)
-    elif hci.matches_2013(path):
-        name = path.parent.name if path.stem.lower() == "lf" else path.stem
-        yield Scene("hci_2013", name, path, (path,), *size_of((path,)))
-
-
-# dataset to the function that finds its scenes below a folder, and the kind of files that it expects
-_FINDERS: dict[str, tuple[Callable[[Path], Iterator[Scene]], str]] = {
-    "hci": (_benchmark_scenes, f"folders with {VIEW_PATTERN}"),
-    "hci_2013": (_archive_scenes, f"HDF5 files with a dataset {hci.VIEWS_2013}"),
-}
+                yield from _places(inner, is_scene, levels - 1)

@@ -1,10 +1,5 @@
 """The digest of a stage's code: too coarse, and a changed comment costs hours; too fine, and results are stale."""
 
-import inspect
-import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -128,59 +123,14 @@ def test_a_compared_method_is_run_again_for_its_own_code_alone(method: str) -> N
     assert not compared & (set(compared_methods()) - {method})
 
 
-RULES = Path(inspect.getfile(stage_modules))
-
-
-def digest_at_a_start(tree: Path, kept: Path, *modules: str, rules: Path = RULES) -> str:
-    """Digest that a new process finds by a version of the rules, with what those before it kept in a folder."""
-    program = (
-        "import runpy, sys\nfrom pathlib import Path\nrules = runpy.run_path(sys.argv[1])\n"
-        "tree, kept = map(Path, sys.argv[2:4])\nrules['remember'](kept)\n"
-        "print(rules['code_digest'](*sys.argv[4:], root=tree))\nrules['keep'](kept)"
-    )
-    words = [sys.executable, "-c", program, str(rules), str(tree), str(kept), *modules]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    return subprocess.run(words, env=environment, capture_output=True, text=True, check=True).stdout.strip()
-
-
-def test_another_versions_rules_read_all_anew(tree: Path, tmp_path: Path) -> None:
-    """What an earlier one kept would leave stale maps."""
-    other = tmp_path / "code_digest.py"
-    other.write_text(RULES.read_text().replace("return repr(node.value)", "return str(node.value)"))
-    before = digest_at_a_start(tree, tmp_path, "pkg.one")
-    assert digest_at_a_start(tree, tmp_path, "pkg.one", rules=other) != before
-
-
-def test_a_start_reads_what_changed_since_the_one_before(tree: Path, tmp_path: Path) -> None:
-    """Stale digests would leave stale maps; a file that somebody damaged must stop nobody, nor grow for ever."""
-    folder, shared = tmp_path / "kept", tree / "pkg/shared.py"
-    folder.mkdir()
-    file = folder / "sepi_code.json"
-    before = digest_at_a_start(tree, folder, "pkg.one", "pkg.two")
-    number = len(json.loads(file.read_text()))
-    # an older time, and the same size
-    shared.write_text("value = 3\n")
-    os.utime(shared, (0, 0))
-    changed = digest_at_a_start(tree, folder, "pkg.one", "pkg.two")
-    assert changed != before
-    assert len(json.loads(file.read_text())) == number
-    # a start that reads less forgets only what is gone
-    (tree / "pkg/two.py").unlink()
-    digest_at_a_start(tree, folder, "pkg.shared")
-    assert len(json.loads(file.read_text())) == number - 1
-    for unusable in ("[]", "{", "[1]"):
-        file.write_text(unusable)
-        assert digest_at_a_start(tree, folder, "pkg.one") == code_digest("pkg.one", root=tree)
-    digest_at_a_start(tree, tmp_path / "nowhere", "pkg.one")
-    assert not (tmp_path / "nowhere").exists()
-
-
-def test_a_name_that_becomes_a_module_is_one(tree: Path, tmp_path: Path) -> None:
+def test_a_name_that_becomes_a_module_is_one(tree: Path) -> None:
     """Though the source that imports it is the same."""
-    before = digest_at_a_start(tree, tmp_path, "pkg.two")
-    (tree / "pkg/shared.py").unlink()
+    before = code_digest("pkg.two", root=tree)
+    # digests are remembered by path
+    other = tree.rename(tree.with_name("other"))
+    (other / "pkg/shared.py").unlink()
     for name, text in (("__init__", "value = 1\n"), ("value", "x = 1\n")):
-        (tree / "pkg/shared").mkdir(exist_ok=True)
-        (tree / f"pkg/shared/{name}.py").write_text(text)
-    assert "pkg.shared.value" in imported_modules("pkg.two", root=tree)
-    assert digest_at_a_start(tree, tmp_path, "pkg.two") != before
+        (other / "pkg/shared").mkdir(exist_ok=True)
+        (other / f"pkg/shared/{name}.py").write_text(text)
+    assert "pkg.shared.value" in imported_modules("pkg.two", root=other)
+    assert code_digest("pkg.two", root=other) != before

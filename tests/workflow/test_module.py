@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from snakemake_runs import run_snakemake
-from workflow_copy import REPOSITORY, copy_of_the_project, with_code_read
+from workflow_copy import REPOSITORY, copy_of_the_project
 
 from sepi.scenes import render
 
@@ -46,7 +46,6 @@ class User:
 
     def run(self, *words: str) -> subprocess.CompletedProcess[str]:
         """Snakemake as the user calls it; stdout holds its messages too."""
-        with_code_read(self.folder)
         return run_snakemake(["--cores", "1", *words], self.folder, self.environment)
 
     def told(self) -> str:

@@ -21,7 +21,7 @@ from sepi.io.scores import AllScores
 from sepi.lightfield import FloatMap, LightField
 from sepi.process.command import PATH, SepiCommand
 from sepi.report.panels import Panel
-from sepi.report.table import BEST, Head, Kind, Section, section
+from sepi.report.table import BEST, Head, Kind, Section, section, shown
 from sepi.scoring.error_bars import ERROR_BAR_SCORES, ErrorBars
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, SCORES, region_masks, score_regions
 from sepi.stage import StageMaps
@@ -29,9 +29,9 @@ from sepi.stage import StageMaps
 # share of the pixels beyond each end of the colour scale, so that a few wrong ones do not widen it
 _BEYOND = 0.005
 
-_SHOWN = ("mse100", "q25", "badpix007", "fattening", "thinning", "non_finite")
+_SHOWN = ["mse100", "q25", "badpix007", "fattening", "thinning", "non_finite"]
 # scores without a best value: intervals should be neither wide nor narrow
-_WITH_BARS = ("coverage", "width")
+_WITH_BARS = ["coverage", "width"]
 
 
 @dataclass(frozen=True)
@@ -130,30 +130,22 @@ def _score_section(found: Comparison) -> Section | None:
     if not found.scores:
         return None
     titles = SCORES | EDGE_SCORES | ERROR_BAR_SCORES | COUNTS
-    scores = (*_SHOWN, *(_WITH_BARS if any(bars is not None for bars in found.bars) else ()))
+    scores = [*_SHOWN, *(_WITH_BARS if any(bars is not None for bars in found.bars) else ())]
     heads = {"protocol": Head("protocol", Kind.TEXT), "region": Head("region", Kind.TEXT)}
     heads |= {
         f"{score} {name}": Head(f"{titles[score]}, {name}", Kind.OURS) for score in scores for name in found.names
     }
-    rows, marks = [], []
-    for protocol, regions in next(iter(found.scores.values())).items():
-        for region in regions:
-            row = {"protocol": protocol, "region": region}
-            better: dict[str, str] = {}
-            for score in scores:
-                pair = {f"{score} {name}": of[protocol][region].get(score) for name, of in found.scores.items()}
-                row |= {key: _text(value) for key, value in pair.items()}
-                known = [value for value in pair.values() if value is not None and score not in _WITH_BARS]
-                better |= {key: BEST for key, value in pair.items() if known and value in known and value < max(known)}
-            rows.append(row)
-            marks.append(better)
-    return section("", heads, pd.DataFrame(rows), pd.DataFrame(marks))
-
-
-def _text(value: float | None) -> str:
-    if value is None:
-        return "no interval"
-    return "n/a" if np.isnan(value) else str(value) if isinstance(value, int) else f"{value:.3f}"
+    of_maps = []
+    for known in found.scores.values():
+        rows = {(protocol, region): of for protocol, regions in known.items() for region, of in regions.items()}
+        of_maps.append(pd.DataFrame.from_dict(rows, orient="index").reindex(columns=scores, fill_value="no interval"))
+    texts, marks = [], []
+    for name, one, other in zip(found.names, of_maps, reversed(of_maps), strict=True):
+        texts.append(shown(one, 3, "n/a").add_suffix(f" {name}"))
+        better = one[_SHOWN].astype(float).lt(other[_SHOWN].astype(float))
+        marks.append(better.map({True: BEST, False: ""}.get).add_suffix(f" {name}"))
+    cells = pd.concat(texts, axis=1).rename_axis(["protocol", "region"]).reset_index()
+    return section("", heads, cells, pd.concat(marks, axis=1).reset_index(drop=True))
 
 
 @click.command(cls=SepiCommand)

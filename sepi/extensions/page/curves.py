@@ -11,10 +11,11 @@ References
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 from sepi.errors import SepiError
 from sepi.image.noise import residual_variance
-from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.lightfield import FloatMap, LightField, as_unit_float, full_scale
 from sepi.matching.expected_costs import expected_costs
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.softening import softened
@@ -157,13 +158,11 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
         v, u = baselines[t, s]
         down, across = rows - disparities[:, None] * v, columns - disparities[:, None] * u
         inside = ((down >= 0) & (down <= H - 1))[:, :, None] & ((across >= 0) & (across <= W - 1))[:, None]
-        # samples outside have any value
-        top, left = (np.clip(at.astype(np.int64), 0, n - 2) for at, n in ((down, H), (across, W)))
-        fy, fx = (down - top)[:, :, None, None], (across - left)[:, None, :, None]
-        corners = (compared[t, s][(top + i)[:, :, None], (left + j)[:, None]] for i in (0, 1) for j in (0, 1))
-        a, b, c, d = (as_unit_float(colours) for colours in corners)
-        sample = (1 - fy) * ((1 - fx) * a + fx * b) + fy * ((1 - fx) * c + fx * d)
-        squared = ((sample - reference_view) ** 2).sum(axis=3)
+        places = np.broadcast_arrays(down[:, :, None], across[:, None])
+        colours = [
+            map_coordinates(compared[t, s, :, :, c], places, np.float32, order=1, mode="nearest") for c in range(3)
+        ]
+        squared = ((np.stack(colours, axis=3) / full_scale(compared.dtype) - reference_view) ** 2).sum(axis=3)
         group = views.groups[t, s]
         sums[group] += np.einsum("kyx,yx->k", squared / (squared + scale2) * inside, weights)
         counts[group] += np.einsum("kyx,yx->k", inside, weights)

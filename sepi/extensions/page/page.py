@@ -64,28 +64,29 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
         ``scene``; ``published``: MSE x100 and Q25 x100; ``ours``: variant to the same two; ``notes``: variant to the
         number of scenes, if lower than in the row.
     """
-
-    def ours(dataset: str, scenes: list[str]) -> dict[str, Any]:
-        found = [runs.of(score, dataset).loc[scenes] for score in ("mse100", "q25")]
+    papers = [pair for pair in runs.scored_pairs if published.paper_scene(*pair) is not None]
+    others = [pair for pair in runs.scored_pairs if pair not in papers]
+    groups = [[pair] for pair in papers]
+    groups += [[pair for pair in others if pair[0] == dataset] for dataset in runs.plan.scenes]
+    rows = []
+    for pairs in filter(None, groups):
+        dataset, scenes = pairs[0][0], [scene for _, scene in pairs]
+        place = (dataset, published.paper_scene(dataset, scenes[0]))
+        theirs = [
+            table[published.PAPERS_METHOD].get(place, math.nan) for table in (published.table1(), published.table2())
+        ]
+        ours = [runs.of(score, dataset).loc[scenes] for score in ("mse100", "q25")]
         keys = {variant: own_key(variant) for variant in runs.plan.compared}
-        return {
-            "ours": {variant: [known(one[key].mean()) for one in found] for variant, key in keys.items()},
-            "notes": {v: count_note([int(one[key].count()) for one in found], len(scenes)) for v, key in keys.items()},
-        }
-
-    rows: list[dict[str, Any]] = []
-    for dataset in published.DATASETS:
-        for scene in runs.scored(dataset):
-            name = published.paper_scene(dataset, scene)
-            if name is not None:
-                tables = (published.table1(), published.table2())
-                theirs = [known(table.at[(dataset, name), published.PAPERS_METHOD]) for table in tables]
-                rows.append({"scene": f"{dataset}/{scene}", "published": theirs, **ours(dataset, [scene])})
-    for dataset in runs.plan.scenes:
-        others = [scene for scene in runs.scored(dataset) if published.paper_scene(dataset, scene) is None]
-        if others:
-            title = f"{dataset}, average of {len(others)}" if len(others) > 1 else f"{dataset}/{others[0]}"
-            rows.append({"scene": title, "published": [None, None], **ours(dataset, others)})
+        rows.append(
+            {
+                "scene": f"{dataset}, average of {len(scenes)}" if len(scenes) > 1 else f"{dataset}/{scenes[0]}",
+                "published": [known(figure) for figure in theirs],
+                "ours": {variant: [known(one[key].mean()) for one in ours] for variant, key in keys.items()},
+                "notes": {
+                    v: count_note([int(one[key].count()) for one in ours], len(scenes)) for v, key in keys.items()
+                },
+            }
+        )
     return rows
 
 
@@ -108,19 +109,6 @@ def total_seconds(*reports: Runs) -> float:
         for row in runs.numbers[runs.numbers["score"] == "seconds"].itertuples()
     }
     return float(sum(seconds.values()))
-
-
-def parameter_rows(runs: Runs) -> list[tuple[str, list[tuple[str, Any]]]]:
-    """Stage and choice with its parameters; repeated if scenes have different ones."""
-    return [
-        (
-            f"{stage}: {choice}",
-            [(key, "by range and grid" if given is None else given) for key, given in values.items()],
-        )
-        for stage, choices in runs.facts["parameters"].items()
-        for choice, found in choices.items()
-        for values in found
-    ]
 
 
 def page_of(runs: Runs, scenes: Sequence[Mapping[str, Any]], parts: Runs | None = None) -> str:
@@ -157,11 +145,10 @@ def page_of(runs: Runs, scenes: Sequence[Mapping[str, Any]], parts: Runs | None 
         headline=headline(runs) if averaged else [],
         missing=missing_scenes(runs) if averaged else {},
         dataset_titles=published.DATASETS,
-        bars=charts.ablation_bars(runs) if averaged else [],
-        part_bars=[] if parts is None else charts.part_bars(parts),
+        bars=charts.ablation_bars(runs) if averaged else {},
+        part_bars={} if parts is None else charts.part_bars(parts),
         times=charts.stage_times(runs),
         total_seconds=total_seconds(*filter(None, (runs, parts))),
-        parameters=parameter_rows(runs),
         scenes=embedded_scenes(scenes),
         first=shown[0] if shown else None,
         first_title=first_title,

@@ -63,19 +63,9 @@ class SepiPicture:
     """
 
     def __init__(self, light_field: LightField, y: int, x: int, disparity: float) -> None:
-        if not math.isfinite(disparity):
-            raise SepiError(f"{light_field.name}: a SEPI needs a finite disparity, got {disparity:g}")
         sepi = stitched_epi(light_field, y, disparity)
-        columns = x + np.arange(-HALF_WIDTH, HALF_WIDTH + 1)
-        position = columns + (-disparity * sepi.positions - sepi.offsets)[:, None]
-        width = sepi.rows.shape[1]
-        self.inside = sepi.inside[:, None] & (position >= 0) & (position <= width - 1)
-        # far outside, integers would overflow
-        position = np.clip(position, 0, width - 1)
-        left = np.minimum(np.floor(position).astype(np.int64), width - 2)
-        weight = (position - left).astype(np.float32)[:, :, None]
-        number = np.arange(len(sepi.rows))[:, None]
-        samples = (1 - weight) * sepi.rows[number, left] + weight * sepi.rows[number, left + 1]
+        lines = [sepi.along_line(column) for column in range(x - HALF_WIDTH, x + HALF_WIDTH + 1)]
+        samples, self.inside = (np.stack(of_lines, axis=1) for of_lines in zip(*lines, strict=True))
         self.pixels = np.where(self.inside[:, :, None], as_rgb(samples), np.uint8(GREY))
         self.disparity = float(disparity)
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from sepi.extensions.page.probe import Probe
+from sepi.extensions.page.probe import HALF_WIDTH, Probe
 from sepi.report.drawing import new_figure, save
 from sepi.report.pictures import Picture
 
@@ -30,13 +30,12 @@ _SEPIS = {"wrong": "worst candidate", "minimum": "lowest cost", "chosen": "chose
 # pixels of the reference view on each side of the pixel
 _CROP_RADIUS = 40
 
-_DPI = 100
-# inches: a SEPI of 81 rows and 49 columns has two dots to a pixel
-_HEIGHT, _SEPI_WIDTH, _PATCH = 1.62, 0.98, 0.81
-_WIDTH, _ROW, _HEAD, _FOOT = 11.0, 2.14, 0.3, 0.26
-_GAP, _MARGIN = 0.22, 0.1
-_PICTURES = _HEIGHT + 3 * (_GAP + _SEPI_WIDTH) + _GAP + _PATCH
-_PLOT = _MARGIN + _PICTURES + 0.6
+# inches: width, height of a row's pictures and of what stands round them
+_WIDTH, _HEIGHT, _BETWEEN, _HEAD, _FOOT = 11.0, 1.62, 0.52, 0.5, 0.46
+# widths of surroundings, SEPIs, angular patch and curves
+_WIDTHS = (1.62, 0.98, 0.98, 0.98, 0.81, 3.9)
+# rows of a SEPI beyond which there are more of them than dots
+_MOST_ROWS = 162
 
 
 def write_probes(path: Path, probes: Sequence[Probe], view: Picture) -> None:
@@ -62,77 +61,62 @@ def write_probes(path: Path, probes: Sequence[Probe], view: Picture) -> None:
     SepiError
         If a file cannot be written.
     """
-    height = _HEAD + _ROW * len(probes) + _FOOT
+    height = _HEAD + _HEIGHT * len(probes) + _BETWEEN * (len(probes) - 1) + _FOOT
     figure = new_figure(_WIDTH, height, layout=None)
-    # one frame for all pictures, in inches, since many frames are slow
-    sheet = figure.add_axes((0, 0, 1, 1))
-    sheet.set_axis_off()
-    for number, found in enumerate(probes):
-        bottom = _FOOT + _ROW * (len(probes) - 1 - number) + 0.2
-        _draw_pictures(sheet, found, view, bottom)
-        area = (_PLOT / _WIDTH, bottom / height, 1 - (_PLOT + _MARGIN) / _WIDTH, _HEIGHT / height)
-        _draw_curves(figure.add_axes(area), found, last=number == len(probes) - 1)
-    # drawing pictures has changed the limits
-    sheet.set_xlim(0, _WIDTH)
-    sheet.set_ylim(0, height)
+    around = {"left": 0.01, "right": 0.95, "bottom": _FOOT / height, "top": 1 - _HEAD / height, "wspace": 0.15}
+    around["hspace"] = _BETWEEN / _HEIGHT
+    size = len(probes), len(_WIDTHS)
+    rows = figure.subplots(*size, squeeze=False, width_ratios=_WIDTHS, gridspec_kw=around)
+    for axes, found in zip(rows, probes, strict=True):
+        _draw_pictures(axes[:-1], found, view)
+        _draw_curves(axes[-1], found)
+    rows[-1, -1].set_xlabel("disparity / pixels per view step", fontsize=7, labelpad=1)
     _draw_legend(figure, probes)
     save(figure, path.parent, path.name)
 
 
-def _draw_pictures(sheet: Axes, found: Probe, view: Picture, bottom: float) -> None:
-    """Surroundings, SEPIs and angular patch of a probe, from ``bottom`` inches on."""
+def _draw_pictures(axes: Sequence[Axes], found: Probe, view: Picture) -> None:
+    """Surroundings, SEPIs and angular patch of a probe."""
     y, x, label = found.pixel
-    sheet.text(_MARGIN, bottom + _HEIGHT + 0.11, f"(y, x) = ({y}, {x}): {label}", fontsize=8, weight="bold")
-    _draw_surroundings(sheet, view, y, x, bottom)
-    pictures = found.stretched
-    left = _MARGIN + _HEIGHT + _GAP
-    for name, title in _SEPIS.items():
-        _place(sheet, pictures[name], left, bottom, _SEPI_WIDTH, _HEIGHT)
-        middle = left + _SEPI_WIDTH / 2
-        sheet.plot([middle], [bottom - 0.03], marker="^", markersize=4, color="black")
-        sheet.plot([middle], [bottom + _HEIGHT + 0.03], marker="v", markersize=4, color="black")
-        _write_below(sheet, middle, bottom, f"{title}: {found.pictures[name].disparity:+.2f}")
-        if not found.kept.all():
-            _draw_kept(sheet, found, left - 0.06, bottom)
-        left += _SEPI_WIDTH + _GAP
-    T, S = found.kept.shape
-    scale = _PATCH / max(T, S)
-    _place(sheet, found.patch, left, bottom, S * scale, T * scale)
-    _write_below(sheet, left + S * scale / 2, bottom, "views, chosen")
-
-
-def _place(sheet: Axes, picture: Picture, left: float, bottom: float, width: float, height: float) -> None:
-    # pixels stay visible unless there are more of them than dots
-    between = "nearest" if picture.shape[0] <= height * _DPI else "antialiased"
-    sheet.imshow(picture, extent=(left, left + width, bottom, bottom + height), aspect="auto", interpolation=between)
-
-
-def _write_below(sheet: Axes, x: float, bottom: float, text: str) -> None:
-    sheet.text(x, bottom - 0.08, text, fontsize=7, ha="center", va="top")
-
-
-def _draw_surroundings(sheet: Axes, view: Picture, y: int, x: int, bottom: float) -> None:
-    top, left = max(0, y - _CROP_RADIUS), max(0, x - _CROP_RADIUS)
-    crop = view[top : y + _CROP_RADIUS + 1, left : x + _CROP_RADIUS + 1]
-    height, width = crop.shape[:2]
-    scale = _HEIGHT / max(height, width)
-    ceiling = bottom + _HEIGHT
-    _place(sheet, crop, _MARGIN, ceiling - height * scale, width * scale, height * scale)
-    across, up = _MARGIN + (x - left + 0.5) * scale, ceiling - (y - top + 0.5) * scale
+    surroundings, *sepis, patch = axes
+    for axis in axes:
+        axis.set_axis_off()
+    surroundings.set_title(f"(y, x) = ({y}, {x}): {label}", fontsize=8, weight="bold", loc="left", pad=7)
+    surroundings.imshow(view)
     for colour, size in (("black", 3.0), (_PIXEL, 1.5)):
-        sheet.plot([across], [up], marker="o", markersize=11, fillstyle="none", color=colour, markeredgewidth=size)
+        surroundings.plot([x], [y], marker="o", markersize=11, fillstyle="none", color=colour, markeredgewidth=size)
+    reach = _CROP_RADIUS + 0.5
+    surroundings.set(xlim=(x - reach, x + reach), ylim=(y + reach, y - reach))
+    # pixels stay visible
+    between = "nearest" if found.kept.size <= _MOST_ROWS else "antialiased"
+    for axis, (name, title) in zip(sepis, _SEPIS.items(), strict=True):
+        axis.imshow(found.stretched[name], aspect="auto", interpolation=between)
+        axis.autoscale(False)
+        for marker, place in (("^", -0.02), ("v", 1.02)):
+            upright = axis.get_xaxis_transform()
+            axis.plot([HALF_WIDTH], [place], marker, transform=upright, markersize=4, color="black", clip_on=False)
+        _write_below(axis, f"{title}: {found.pictures[name].disparity:+.2f}")
+        if not found.kept.all():
+            _draw_kept(axis, found)
+    patch.imshow(found.patch, interpolation="nearest")
+    patch.set_anchor("S")
+    _write_below(patch, "views, chosen")
 
 
-def _draw_kept(sheet: Axes, found: Probe, x: float, bottom: float) -> None:
+def _write_below(axis: Axes, text: str) -> None:
+    axis.text(0.5, -0.05, text, transform=axis.transAxes, fontsize=7, ha="center", va="top")
+
+
+def _draw_kept(axis: Axes, found: Probe) -> None:
     """Bars along the rows of the SEPI whose views are kept."""
     ends = np.diff(found.kept.ravel().astype(np.int64), prepend=0, append=0)
     colour = _CURVES.get(found.kept_subset, _QUARTER)
     for begin, end in zip(np.flatnonzero(ends == 1), np.flatnonzero(ends == -1), strict=True):
-        y = [bottom + _HEIGHT * (1 - place / found.kept.size) for place in (begin + 0.1, end - 0.1)]
-        sheet.plot([x, x], y, color=colour, linewidth=2.5, solid_capstyle="butt")
+        y = [begin - 0.4, end - 0.6]
+        axis.plot([-3, -3], y, color=colour, linewidth=2.5, solid_capstyle="butt", clip_on=False)
 
 
-def _draw_curves(axes: Axes, found: Probe, last: bool) -> None:
+def _draw_curves(axes: Axes, found: Probe) -> None:
     for name, (colour, dashes, width, _) in _MARKS.items():
         value = getattr(found, name)
         if value is not None:
@@ -152,9 +136,9 @@ def _draw_curves(axes: Axes, found: Probe, last: bool) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(5))
     axes.tick_params(labelsize=7)
     axes.set_ylabel("mean cost", fontsize=7)
+    axes.yaxis.tick_right()
+    axes.yaxis.set_label_position("right")
     axes.set_title(_values(found), fontsize=6, loc="left", pad=3)
-    if last:
-        axes.set_xlabel("disparity / pixels per view step", fontsize=7, labelpad=1)
 
 
 def _values(found: Probe) -> str:

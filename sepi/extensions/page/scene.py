@@ -95,5 +95,5 @@ def page_json(
         "first": {"a": "reference_view", "b": first_final(shown)},
         **viewer_json(shown, disparity_limits(results.light_field), results.light_field),
         "probes": [to_json(found) for found in probes],
-        "problems": dict(results.problems),
+        "problems": {method: found.problem for method, found in results.external.items() if found.problem},
     }

@@ -90,34 +90,28 @@ _MOST_PIXELS = 2**20
 _WEBP = [cv2.IMWRITE_WEBP_QUALITY, 90]
 
 
-class _Arrays:
-    """Arrays, each once, with every ``stride``-th row and column, and their roles."""
+# digest of an array to the array and its role
+_Held = dict[str, tuple[npt.NDArray[Any], int]]
 
-    def __init__(self, stride: int) -> None:
-        self.stride = stride
-        self.held: dict[str, tuple[npt.NDArray[Any], int]] = {}
 
-    def thinned(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """The rows and columns of an array that are kept."""
-        return np.ascontiguousarray(values[:: self.stride, :: self.stride])
+def _number(held: _Held, values: npt.NDArray[Any], role: int) -> int:
+    """Number of an array, added unless an equal one is there; the finest of several roles counts."""
+    values = values if role == MASK else values.astype(np.float32)
+    key = values.dtype.name + hashlib.sha256(values.tobytes()).hexdigest()
+    _, before = held.get(key, (None, role))
+    held[key] = (values, min(role, before))
+    return list(held).index(key)
 
-    def number(self, thinned: npt.NDArray[Any], role: int) -> int:
-        """Number of an array, added unless an equal one is there; the finest of several roles counts."""
-        values = thinned if role == MASK else thinned.astype(np.float32)
-        key = values.dtype.name + hashlib.sha256(values.tobytes()).hexdigest()
-        _, before = self.held.get(key, (None, role))
-        self.held[key] = (values, min(role, before))
-        return list(self.held).index(key)
 
-    def packed(self, pixels: int) -> list[dict[str, Any]]:
-        """All arrays, in the finest steps that keep them within their share of characters, or the coarsest."""
-        # error bars have no share of their own, so other maps of a full page get slightly coarser
-        budget = _SHARE * pixels * sum(role != LOGARITHM for _, role in self.held.values())
-        for steps in STEPS:
-            found = [packed(values, (*steps, *_FIXED)[role]) for values, role in self.held.values()]
-            if sum(len(array["data"]) for array in found) <= budget:
-                break
-        return found
+def _all_packed(held: _Held, pixels: int) -> list[dict[str, Any]]:
+    """All arrays, in the finest steps that keep them within their share of characters, or the coarsest."""
+    # error bars have no share of their own, so other maps of a full page get slightly coarser
+    budget = _SHARE * pixels * sum(role != LOGARITHM for _, role in held.values())
+    for steps in STEPS:
+        found = [packed(values, (*steps, *_FIXED)[role]) for values, role in held.values()]
+        if sum(len(array["data"]) for array in found) <= budget:
+            break
+    return found
 
 
 def viewer_json(
@@ -137,9 +131,9 @@ def viewer_json(
     full_height, full_width = next(panel.values.shape for panel in panels if panel.values is not None)
     stride = max(1, math.ceil(math.sqrt(full_height * full_width / _MOST_PIXELS)))
     height, width = -(-full_height // stride), -(-full_width // stride)
-    arrays = _Arrays(stride)
-    entries = [_entry(panel, arrays) for panel in panels]
-    picture = None if light_field is None else arrays.thinned(reference_picture(light_field))
+    held: _Held = {}
+    entries = [_entry(panel, stride, held) for panel in panels]
+    picture = None if light_field is None else reference_picture(light_field)[::stride, ::stride]
     return {
         "height": height,
         "width": width,
@@ -150,11 +144,11 @@ def viewer_json(
         "camera": light_field and _camera(light_field),
         "picture": "" if picture is None else picture_uri(picture, "webp", _WEBP),
         "panels": entries,
-        "arrays": arrays.packed(max(_LEAST_PIXELS, height * width)),
+        "arrays": _all_packed(held, max(_LEAST_PIXELS, height * width)),
     }
 
 
-def _entry(panel: Panel, arrays: _Arrays) -> dict[str, Any]:
+def _entry(panel: Panel, stride: int, held: _Held) -> dict[str, Any]:
     """A panel with the numbers of its arrays, without empty fields."""
     entry: dict[str, Any] = {name: getattr(panel, name) for name in ("key", "title", "group", "kind")}
     entry |= {name: text for name in ("note", "ends", "no_interval") if (text := getattr(panel, name))}
@@ -170,10 +164,10 @@ def _entry(panel: Panel, arrays: _Arrays) -> dict[str, Any]:
     }
     for name, (values, held_for) in shown.items():
         if values is not None:
-            thinned = arrays.thinned(values)
+            thinned: npt.NDArray[Any] = values[::stride, ::stride]
             # reduced before drawing, since borders of one pixel would break
             thinned = outlines(thinned) if panel.kind == "outline" else thinned
-            entry[name] = arrays.number(thinned, held_for)
+            entry[name] = _number(held, thinned, held_for)
     return entry
 
 
