@@ -111,6 +111,7 @@ ADDED_RULES = [
 SCENE = scene_files("{dataset}", "{scene}")
 # the same for commands that find files by themselves
 PLACED_SCENE = scene_files("{dataset}", "{scene}", Path(placed(RESULTS)))
+LABELS = {stage: f"{{{stage}}}" for stage in STAGES}
 
 if not REPORTS[""].pairs:
     sys.exit("sepi: config.report.partial: no scene is computed yet")
@@ -135,6 +136,54 @@ wildcard_constraints:
     report="|".join(name and f"{name}/" for name in REPORTS),
 
 
+def stage_input(stage):
+    """Inputs of a stage's rule: light field, the file of the last stage that ran before, and files of the choice."""
+    before = list(STAGES)[: list(STAGES).index(stage)]
+
+    def previous(wildcards):
+        labels = {name: wildcards[name] for name in before}
+        return scene_files(wildcards.dataset, wildcards.scene).stage(labels, before[-1])
+
+    return {"light_field": SCENE.light_field, "files": files_of(stage), **({"previous": previous} if before else {})}
+
+
+def stage_output(stage):
+    """Outputs of a stage's rule, for every choice except the one that hands maps on and has no job."""
+    known = {name: "|".join(map(re.escape, found)) for name, found in SETTINGS.parameters.items()}
+    known[stage] = "|".join(re.escape(label) for label in SETTINGS.parameters[stage] if label != HANDED_ON)
+    patterns = {name: f"{{{name},{labels}}}" for name, labels in known.items()}
+    return {"maps": SCENE.stage(patterns, stage), "timing": SCENE.stage(patterns, stage, "time.json")}
+
+
+def stage_params(stage):
+    """Parameters of a stage's rule, as functions of wildcards: a change of one of them runs the job again."""
+    known = {label: SETTINGS.parameters_json(stage, label) for label in SETTINGS.parameters[stage]}
+    return {
+        "choice": lambda wildcards: choice_of(wildcards[stage]),
+        "parameters": lambda wildcards: known[wildcards[stage]],
+        "dates": dates_of(files_of(stage)),
+        "code": lambda wildcards: code_digest(*stage_modules(stage, STAGES[stage][choice_of(wildcards[stage])])),
+    }
+
+
+def stage_log(folder, stage, ending):
+    """Pattern of a stage's log or benchmark."""
+    return f"{folder}/{{dataset}}/{{scene}}/{key_of(LABELS, stage)}/{stage}.{ending}"
+
+
+def stage_message(stage, title):
+    """Message when a stage starts: the scene, and the choices up to this stage."""
+    choices = key_of(LABELS, stage).replace("{", "{wildcards.")
+    return f"{{wildcards.dataset}}/{{wildcards.scene}}: {title} ({choices})"
+
+
+# the command of every stage, after its inputs
+STAGE_FLAGS = (
+    "--choice {params.choice} --parameters {params.parameters:q} --threads {threads} "
+    "--output {output.maps:q} --timing {output.timing:q} 2> {log:q}"
+)
+
+
 def final_file(wildcards):
     """Stage file with the final maps of a variant."""
     require_known("variant", [wildcards.variant], SETTINGS.variants)
@@ -154,6 +203,11 @@ def result_files(variants, scenes=REPORTS[""].pairs):
 def plan_of(wildcards):
     """Plan of the report that the wildcards name, by the ending of a file or by a folder."""
     return PLANS[(wildcards.get("which") or wildcards.get("report", "")).strip("_/")]
+
+
+def files_of(stage):
+    """Function of wildcards: further files that a stage's choice reads, such as a network."""
+    return lambda wildcards: list(map(own_file, SETTINGS.parameters[stage][wildcards[stage]].files))
 
 
 def scene_of(wildcards):
@@ -227,6 +281,20 @@ def ingest_range(wildcards):
 def threads_for(wildcards):
     """Threads of a job: one for each 8 million samples, since small scenes gain more from parallel jobs."""
     return min(1 + scene_of(wildcards).samples // 8_000_000, 8)
+
+
+def stage_resources(stage):
+    """Resources of a stage's rule: memory in MB and minutes of a job, as functions of wildcards."""
+
+    def asked(wildcards):
+        scene, parameters = scene_of(wildcards), SETTINGS.parameters[stage][wildcards[stage]]
+        light_field = scene_files(wildcards.dataset, wildcards.scene, Path(placed(RESULTS))).light_field
+        return stage_needs(scene, light_field, stage, parameters, threads_for(wildcards))
+
+    return {
+        "mem_mb": lambda wildcards, attempt: attempt * asked(wildcards)[0],
+        "runtime": lambda wildcards, attempt: attempt * asked(wildcards)[1],
+    }
 
 
 def memory_for(*needs, **more):

@@ -59,11 +59,11 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
     """A rule without the digest of its command would keep what earlier code made."""
     checked = set()
     for rule in read.rules:
-        command = re.search(r"-m (sepi[\w.]*)", (rule.shellcmd or "").replace("{params.stage}", rule.name))
+        command = re.search(r"-m (sepi[\w.]*)", rule.shellcmd or "")
         if command is None:
             continue
         checked.add(rule.name)
-        assert rule.name not in STAGES or rule.params.stage == rule.name
+        assert rule.name not in STAGES or command[1] == f"sepi.{rule.name}"
         code = dict(rule.params.items()).get("code")
         for name, chosen in STAGES.get(rule.name, {"": None}).items():
             if name == HANDED_ON:
