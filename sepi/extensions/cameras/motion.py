@@ -1,14 +1,13 @@
 """Features and matches of pictures without poses, and whether the camera's motion suits a light field; by pycolmap.
 
-Features are found one picture after the other and written into COLMAP's database in the order of the pictures, so that
-it does not depend on threads. The check of the motion looks at a few small pictures before a long calibration. Its
-result is an estimate, since the focal length may be a guess. So it refuses only pictures far outside what
-:mod:`sepi.extensions.cameras.rectification` accepts.
+Pictures are written into COLMAP's database in their order before their features, so that it does not depend on threads.
+The check of the motion looks at a few small pictures before a long calibration. Its result is an estimate, since the
+focal length may be a guess. So it refuses only pictures far outside what :mod:`sepi.extensions.cameras.rectification`
+accepts.
 """
 
 import tempfile
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
@@ -20,9 +19,7 @@ import numpy as np
 from sepi.camera.rig import Floats
 from sepi.errors import SepiError, printable
 from sepi.extensions.cameras.model import require_alike, require_sideways
-from sepi.io.files import reading
 from sepi.io.images import read_picture
-from sepi.lightfield import FloatMap, as_unit_float
 from sepi.stage import Progress, no_progress
 
 SEED = 0
@@ -30,8 +27,8 @@ SEED = 0
 
 # largest error of a right match, pixels, up to this side of pictures; in proportion beyond
 _MATCH_ERROR, _SIDE = 1.0, 1000
-# number of pairs that are matched between two updates of the progress
-_AT_ONCE = 64
+# number of pictures or pairs of them between two updates of the progress
+_AT_ONCE = 16
 
 
 class Finding(NamedTuple):
@@ -86,55 +83,29 @@ def write_features(
     SepiError
         If a picture cannot be read, or is of another size than the others and shares their camera.
     """
-    wanted = pycolmap.FeatureExtractionOptions(num_threads=1)
-
-    def found(path: Path) -> tuple[tuple[int, ...], Any, Any]:
-        grey: FloatMap = np.ascontiguousarray(as_unit_float(read_picture(path)).mean(axis=2), np.float32)
-        height, width = grey.shape
-        if (scale := finding.side / max(height, width)) < 1:
-            small = max(1, round(width * scale)), max(1, round(height * scale))
-            grey = np.asarray(cv2.resize(grey, small, interpolation=cv2.INTER_AREA), np.float32)
-        bytes_of = np.rint(np.clip(grey, 0, 1) * 255).astype(np.uint8)
-        extractor = pycolmap.FeatureExtractor.create(wanted, pycolmap.Device.cpu)
-        features, descriptors = extractor.extract_from_uint8_array(bytes_of)
-        places = np.array([(feature.x, feature.y) for feature in features], np.float32).reshape(-1, 2)
-        places *= np.array([width / grey.shape[1], height / grey.shape[0]], np.float32)
-        return (width, height), places, descriptors
-
-    counts: list[int] = []
-    first: tuple[int, ...] = ()
-    with pycolmap.Database.open(str(database)) as file, ThreadPoolExecutor(finding.threads) as pool:
-        camera = rig = -1
-        for path, (size, places, descriptors) in zip(pictures, pool.map(found, pictures), strict=True):
-            first = first or size
-            if size != first and not finding.each:
-                raise SepiError(
-                    f"{path}: {size[0]}x{size[1]} pixels, but {pictures[0].name} has {first[0]}x{first[1]}; expected "
-                    "pictures of one camera, or --cameras each"
-                )
-            if not counts or finding.each:
-                camera, rig = _write_camera(pycolmap, file, path, finding.lens)
-            image = pycolmap.Image(name=path.name, camera_id=camera)
-            image.image_id = file.write_image(image)
-            frame = pycolmap.Frame(rig_id=rig)
-            frame.add_data_id(image.data_id)
-            file.write_frame(frame)
-            file.write_keypoints(image.image_id, places)
-            file.write_descriptors(image.image_id, descriptors)
-            counts.append(len(places))
-            progress(len(counts) / len(pictures))
-        return file.read_all_cameras()[0], counts
-
-
-def _write_camera(pycolmap: Any, file: Any, path: Path, lens: str) -> tuple[int, int]:
-    options = pycolmap.ImageReaderOptions(camera_model=lens)
-    with reading(path, "picture that COLMAP can read"):
-        # its focal length is from EXIF if there is one
-        known = pycolmap.infer_camera_from_image(str(path), options)
-    known.camera_id = file.write_camera(known)
-    rig = pycolmap.Rig()
-    rig.add_ref_sensor(known.sensor_id)
-    return known.camera_id, file.write_rig(rig)
+    # COLMAP skips damaged pictures without a word
+    sizes = [read_picture(path).shape[1::-1] for path in pictures]
+    for path, size in zip(pictures, sizes, strict=True):
+        if size != sizes[0] and not finding.each:
+            raise SepiError(
+                f"{path}: {size[0]}x{size[1]} pixels, but {pictures[0].name} has {sizes[0][0]}x{sizes[0][1]}; expected "
+                "pictures of one camera, or --cameras each"
+            )
+    mode = pycolmap.CameraMode.PER_IMAGE if finding.each else pycolmap.CameraMode.SINGLE
+    reader = pycolmap.ImageReaderOptions(camera_model=finding.lens)
+    names, where = [path.name for path in pictures], (str(database), str(pictures[0].parent))
+    wanted = pycolmap.FeatureExtractionOptions(num_threads=finding.threads, max_image_size=finding.side)
+    with pycolmap.Database.open(str(database)) as file:
+        # first of all, so that numbers do not depend on which thread is done first
+        pycolmap.import_images(*where, mode, names, reader)
+        for begin in range(0, len(names), _AT_ONCE):
+            some = names[begin : begin + _AT_ONCE]
+            pycolmap.extract_features(*where, some, mode, reader, wanted, pycolmap.Device.cpu)
+            progress(min(1.0, (begin + _AT_ONCE) / len(names)))
+        images = [file.read_image_with_name(name) for name in names]
+        if None in images:
+            raise SepiError(f"{pictures[images.index(None)]}: not a picture that COLMAP can read")
+        return file.read_all_cameras()[0], [file.num_keypoints_for_image(image.image_id) for image in images]
 
 
 def match(
