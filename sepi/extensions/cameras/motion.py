@@ -124,7 +124,8 @@ def match(
     progress : callable
     """
     matching = pycolmap.FeatureMatchingOptions(num_threads=threads)
-    geometry = pycolmap.TwoViewGeometryOptions(ransac={"random_seed": SEED, "max_error": size})
+    ransac = {"random_seed": SEED, "max_error": size}
+    geometry = pycolmap.TwoViewGeometryOptions(compute_relative_pose=True, ransac=ransac)
     listed = database.with_suffix(".pairs")
     pairing = pycolmap.ImportedPairingOptions(match_list_path=str(listed))
     for begin in range(0, len(pairs), _AT_ONCE):
@@ -177,7 +178,7 @@ def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], findin
         size = tolerance(camera) * unit
         match(pycolmap, database, list(combinations(names, 2)), size, finding.threads, no_progress)
         with pycolmap.Database.open(str(database)) as file:
-            steps = _steps(pycolmap, file, size)
+            steps = _steps(file, size)
     if not steps:
         raise SepiError(
             f"{folder}: no two of {_listed(names)} match; expected pictures of one static scene, each from a position "
@@ -202,20 +203,14 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
-def _steps(pycolmap: Any, file: Any, size: float) -> list[Step]:
-    ransac = {"random_seed": SEED, "max_error": size}
-    options = pycolmap.TwoViewGeometryOptions(compute_relative_pose=True, ransac=ransac)
+def _steps(file: Any, size: float) -> list[Step]:
     steps: list[Step] = []
     for one, other in combinations(sorted(file.read_all_images(), key=lambda image: image.image_id), 2):
+        found = file.read_two_view_geometry(one.image_id, other.image_id)
+        if found is None or found.cam2_from_cam1 is None or len(found.inlier_matches) < _MATCHES:
+            continue
         here, there = (np.asarray(file.read_keypoints(image.image_id)[:, :2], np.float64) for image in (one, other))
-        pairs = np.asarray(file.read_matches(one.image_id, other.image_id), np.uint32).reshape(-1, 2)
-        if len(pairs) < _MATCHES:
-            continue
-        cameras = [file.read_camera(image.camera_id) for image in (one, other)]
-        found = pycolmap.estimate_calibrated_two_view_geometry(cameras[0], here, cameras[1], there, pairs, options)
-        motion = found.cam2_from_cam1
-        if len(found.inlier_matches) < _MATCHES or motion is None:
-            continue
+        pairs, motion = np.asarray(file.read_matches(one.image_id, other.image_id)), found.cam2_from_cam1
         rotation = np.array(motion.rotation.matrix())
         place = -rotation.T @ np.array(motion.translation)
         ahead = min(1.0, abs(place[2]) / length) if (length := np.linalg.norm(place)) else np.nan
