@@ -27,7 +27,7 @@ def value_of(text: str) -> Any:
 
 
 def settings_of(texts: Iterable[str], example: str, form: str = "KEY=VALUE", flag: str = "--set") -> dict[str, Any]:
-    """Key to value, from a repeated flag such as ``--set KEY=VALUE``; keys have as many dots as the ``form`` in the error."""
+    """Key to value, from a repeated flag ``--set KEY=VALUE``; keys have as many dots as the ``form`` in the error."""
     key = r"\.".join([r"\w+"] * (form.count(".") + 1))
     found = {}
     for text in texts:
