@@ -61,10 +61,6 @@ from sepi.stage import Progress, no_progress
 Flags = npt.NDArray[np.bool_]
 """Which of the views sees which of the points, (N, P)."""
 
-_CAMERAS = "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"
-_IMAGES = "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n#   POINTS2D[] as (X, Y, POINT3D_ID)"
-_POINTS = "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)"
-
 
 def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_progress) -> None:
     """Write views, poses, points and depth as a COLMAP workspace; equal content gives equal bytes.
@@ -123,8 +119,7 @@ def _write_maps(path: Path, maps: FloatMap) -> None:
 
 def _cameras(posed: PosedViews) -> Iterator[str]:
     (height, width), focal = posed.light_field.shape, posed.camera.focal_px
-    yield "# Camera list with one line of data per camera:"
-    yield _CAMERAS
+    yield "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"
     for number, (x, y) in enumerate((posed.principal_points + 0.5).tolist(), 1):
         yield f"{number} PINHOLE {width} {height} {focal!r} {focal!r} {x!r} {y!r}"
 
@@ -134,8 +129,7 @@ def _images(posed: PosedViews, sees: Flags) -> Iterator[str]:
     if posed.rig is not None:
         x, y, z, w = Rotation.from_matrix(posed.rig.rotation).as_quat(canonical=True).tolist()
         turn, places = f"{w!r} {x!r} {y!r} {z!r}", posed.rig.to_world(places) @ posed.rig.rotation.T
-    yield "# Image list with two lines of data per image:"
-    yield _IMAGES
+    yield "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME; then POINTS2D[] as (X, Y, POINT3D_ID)"
     yield f"# units: {posed.units}"
     for view, name in enumerate(posed.names):
         # adding zero makes -0 a 0
@@ -149,8 +143,7 @@ def _images(posed: PosedViews, sees: Flags) -> Iterator[str]:
 def _points(posed: PosedViews, sees: Flags) -> Iterator[str]:
     # a point's number among those that a view sees
     places = np.cumsum(sees, axis=1) - 1
-    yield "# 3D point list with one line of data per point:"
-    yield _POINTS
+    yield "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)"
     world = posed.points if posed.rig is None else posed.rig.to_world(posed.points)
     told = world.tolist(), posed.colours.tolist(), posed.pixel_errors(sees).tolist()
     for point, ((x, y, z), (r, g, b), error) in enumerate(zip(*told, strict=True)):
