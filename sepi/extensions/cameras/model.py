@@ -114,10 +114,8 @@ class CameraModel:
         extent = float(np.linalg.norm(np.ptp(centres, axis=0)))
         apart = np.linalg.norm(centres[:, None] - centres, axis=2)
         for one, other in np.argwhere(np.triu(apart <= _SAME_PLACE * extent, 1)).tolist():
-            raise SepiError(
-                f"{self.path}: {names[one]} and {names[other]} were taken from one position; leave one of them out "
-                f"(--exclude {names[other]})"
-            )
+            where = f"{self.path}: {names[one]} and {names[other]} were taken from one position"
+            raise SepiError(f"{where}; leave one of them out (--exclude {names[other]})")
         turned = np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)))
         one, other = divmod(int(turned.argmax()), len(turned))
         require_alike(self.path, names[one], names[other], turned[one, other])
@@ -132,8 +130,7 @@ def require_alike(where: Path, one: str, other: str, angle: float) -> None:
     """Raise if two cameras' viewing directions are by this many degrees too far apart."""
     if angle > _MOST_TURNED:
         raise SepiError(
-            f"{where}: {one} and {other} look {angle:.0f} degrees apart; expected similar viewing directions, at most "
-            f"{_MOST_TURNED:.0f} degrees apart"
+            f"{where}: {one} and {other} look {angle:.0f} degrees apart; expected at most {_MOST_TURNED:.0f}"
         )
 
 

@@ -169,10 +169,7 @@ def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], findin
         camera, counts = write_features(pycolmap, database, looked_at, finding._replace(side=_LOOK), no_progress)
         poor = [name for name, count in zip(names, counts, strict=True) if count < _FEATURES]
         if 2 * len(poor) > len(counts):
-            raise SepiError(
-                f"{folder}: hardly any features in {_listed(poor)}; expected pictures with texture, in focus "
-                "and well lit"
-            )
+            raise SepiError(f"{folder}: hardly any features in {_listed(poor)}; expected sharp, well lit texture")
         # width of a reduced picture's pixel, and largest error of a match
         unit = max(1.0, max(camera.width, camera.height) / _LOOK)
         size = tolerance(camera) * unit
@@ -180,10 +177,8 @@ def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], findin
         with pycolmap.Database.open(str(database)) as file:
             steps = _steps(file, size)
     if not steps:
-        raise SepiError(
-            f"{folder}: no two of {_listed(names)} match; expected pictures of one static scene, each from a position "
-            "a little beside the last"
-        )
+        expected = "expected one static scene, each picture from a position a little beside the last"
+        raise SepiError(f"{folder}: no two of {_listed(names)} match; {expected}")
     pairs = [names for names, *_ in steps]
     parallax, ahead, turned = np.array([measured for _, *measured in steps]).T
     widest, farthest = int(parallax.argmax()), int(turned.argmax())

@@ -96,9 +96,8 @@ def refocus(
     """
     require_light_field(light_field)
     if not is_finite(disparity):
-        raise SepiError(
-            f"{light_field.name}: disparity to focus at must be a finite number, got {described(disparity)}"
-        )
+        told = described(disparity)
+        raise SepiError(f"{light_field.name}: disparity to focus at must be a finite number, got {told}")
     surfaces = None if maps is None else _surfaces(_disparity_of(light_field, maps))
     height, width = light_field.shape
     moved = disparity * light_field.baselines
