@@ -18,7 +18,7 @@ UNITS_OF_MODEL = "units of the model"
 # largest distance of cameras at one place, relative to that of the farthest cameras
 _SAME_PLACE = 1e-6
 # largest angle between viewing directions of two cameras, degrees
-_MOST_TURNED = 60.0
+_MOST_TURNED = 60
 # least angle between motion and viewing direction, degrees
 _LEAST_ANGLE = 45.0
 # least share of the model's points in front of the cameras
@@ -129,9 +129,7 @@ class CameraModel:
 def require_alike(where: Path, one: str, other: str, angle: float) -> None:
     """Raise if two cameras' viewing directions are by this many degrees too far apart."""
     if angle > _MOST_TURNED:
-        raise SepiError(
-            f"{where}: {one} and {other} look {angle:.0f} degrees apart; expected at most {_MOST_TURNED:.0f}"
-        )
+        raise SepiError(f"{where}: {one} and {other} look {angle:.0f} degrees apart; expected at most {_MOST_TURNED}")
 
 
 def require_sideways(where: Path, angle: float, least: float = _LEAST_ANGLE) -> None:

@@ -50,7 +50,15 @@ import numpy.typing as npt
 from pydantic import Field
 from scipy import fft
 
-from sepi.extensions.methods.costs import GuidedFilter, Previous, distinctness, filtered, maps_of, weighted_median
+from sepi.extensions.methods.costs import (
+    GuidedFilter,
+    IntArray,
+    Previous,
+    distinctness,
+    filtered,
+    maps_of,
+    weighted_median,
+)
 from sepi.extensions.methods.markov_field import labels_of_least_energy
 from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap, LightField, as_unit_float, without_reference
@@ -58,7 +66,6 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, no_progress, require_costs
 
 FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 _AT_ONCE = 8
 """Candidates that are transformed together."""
@@ -152,9 +159,7 @@ def phase_shift_costs(
     return costs
 
 
-def truncated_difference(
-    moved: FloatMap, reference: FloatMap, across_share: float, parameters: AccParameters
-) -> FloatMap:
+def truncated_difference(moved: FloatMap, reference: FloatMap, share: float, parameters: AccParameters) -> FloatMap:
     """Truncated differences of a view's colours and gradients, (3, H or more, W or more), from (3, H, W); (H, W)."""
     height, width = reference.shape[1:]
     colour, across, down = np.zeros((3, height, width), np.float32)
@@ -164,8 +169,8 @@ def truncated_difference(
         # central differences without the division by 2
         across += np.abs(cv2.Sobel(residual, -1, 1, 0, ksize=1, borderType=cv2.BORDER_REPLICATE))
         down += np.abs(cv2.Sobel(residual, -1, 0, 1, ksize=1, borderType=cv2.BORDER_REPLICATE))
-    gradients = across_share * np.minimum(across / 6, parameters.gradient_truncation)
-    gradients += (1 - across_share) * np.minimum(down / 6, parameters.gradient_truncation)
+    gradients = share * np.minimum(across / 6, parameters.gradient_truncation)
+    gradients += (1 - share) * np.minimum(down / 6, parameters.gradient_truncation)
     colours = np.minimum(colour / 3, parameters.colour_truncation)
     return np.asarray(parameters.colour_share * colours + (1 - parameters.colour_share) * gradients, np.float32)
 

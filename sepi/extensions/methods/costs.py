@@ -28,11 +28,12 @@ from sepi.stage import Choice, CostVolume, Parameters, Progress, StageMaps, requ
 GREY = np.array([0.299, 0.587, 0.114], np.float32)
 """Weights of red, green and blue in the grey value (ITU-R BT.601)."""
 
+IntArray = npt.NDArray[np.int64]
 Previous = StageMaps | None
 """Maps of the stage before; None for the first stage."""
 
 
-def least_costs(volume: CostVolume) -> npt.NDArray[np.int64]:
+def least_costs(volume: CostVolume) -> IntArray:
     """Index of the candidate of least cost of each pixel.
 
     Parameters
@@ -56,7 +57,7 @@ def least_costs(volume: CostVolume) -> npt.NDArray[np.int64]:
     return np.asarray(np.argmin(volume.costs, axis=0))
 
 
-def disparity_of(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
+def disparity_of(volume: CostVolume, labels: IntArray) -> FloatMap:
     """Disparity of the chosen candidates, refined by the parabola through the costs of each and its two neighbours.
 
     Parameters
@@ -85,9 +86,7 @@ def disparity_of(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
     return between_candidates(volume.disparities, volume.costs, labels)
 
 
-def between_candidates(
-    disparities: FloatMap, costs: npt.NDArray[np.floating], labels: npt.NDArray[np.int64]
-) -> FloatMap:
+def between_candidates(disparities: FloatMap, costs: npt.NDArray[np.floating], labels: IntArray) -> FloatMap:
     """Disparity of the chosen candidates as of :func:`disparity_of`; costs (K, ...), infinite for rejected ones."""
     last = len(disparities) - 1
     below, here, above = (
@@ -102,7 +101,7 @@ def between_candidates(
     return np.asarray(disparities[labels] + (disparities[1] - disparities[0]) * offset, np.float32)
 
 
-def distinctness(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
+def distinctness(volume: CostVolume, labels: IntArray) -> FloatMap:
     """Confidence: how far the chosen candidates' costs are below the mean over all candidates.
 
     Parameters

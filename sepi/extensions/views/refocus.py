@@ -34,7 +34,7 @@ ANIMATION = "focus.webp"
 """Endless animation of the focal stack from the nearest to the farthest image and back."""
 
 # of an image of the animation
-_MILLISECONDS = 120
+_PAUSE = 120
 _QUALITY = 85
 
 _MADE = re.compile(rf"focus_\d+\.png|{re.escape(ALL_IN_FOCUS)}|{re.escape(ANIMATION)}")
@@ -109,9 +109,7 @@ def _write_animation(path: Path, frames: Sequence[npt.NDArray[Any]]) -> None:
         raise SepiError(f"{path}: the installed Pillow has no WebP, which animations need")
     first, *more = (Image.fromarray(frame).convert("RGB") for frame in [*frames, *frames[-2:0:-1]])
     with atomic_path(path) as temporary:
-        first.save(
-            temporary, "WEBP", save_all=True, append_images=more, duration=_MILLISECONDS, loop=0, quality=_QUALITY
-        )
+        first.save(temporary, "WEBP", save_all=True, append_images=more, duration=_PAUSE, loop=0, quality=_QUALITY)
 
 
 def _earlier_files(index: Path) -> list[str]:

@@ -109,7 +109,7 @@ def refocus(
         if one_row.any():
             views = ShearedViews(light_field, one_row).at(disparity)
             if surfaces is not None:
-                views = _filled_between(light_field, one_row, views, surfaces, disparity)
+                views = _filled(light_field, one_row, views, surfaces, disparity)
             for place, sheared in zip(np.argwhere(one_row).tolist(), views, strict=True):
                 shown = _shown(light_field, tuple(place), moved[tuple(place)])
                 sums += sheared * shown
@@ -287,9 +287,7 @@ def _cell(light_field: LightField) -> FloatMap:
     return np.array(found, np.float32)
 
 
-def _filled_between(
-    light_field: LightField, chosen: BoolMap, views: FloatMap, surfaces: FloatMap, focus: float
-) -> FloatMap:
+def _filled(light_field: LightField, chosen: BoolMap, views: FloatMap, surfaces: FloatMap, focus: float) -> FloatMap:
     """Sheared views ``(N, 3, H, W)`` of one row of the grid, each with the views round it."""
     baselines, cell = light_field.baselines, _cell(light_field)
     (t,) = np.flatnonzero(chosen.any(axis=1)).tolist()

@@ -86,7 +86,7 @@ def _front(front: Front) -> Things:
                 blinds.append(wall((x - w / 2, high, 0.2), w, drop * h))
             if front.shutters and floor:
                 leaves += [
-                    _slab((x + off - w / 4, high), (x + off + w / 4, low), 0.04, -0.05) for off in (-0.77 * w, 0.77 * w)
+                    _slab((at - w / 4, high), (at + w / 4, low), 0.04, -0.05) for at in (x - 0.77 * w, x + 0.77 * w)
                 ]
             if front.balconies and floor:
                 iron += _railing(x - w / 2 - 0.15, low + 0.05, w + 0.3, 0.95, -0.3, 0.12, 0.012)
