@@ -233,10 +233,8 @@ def rectified_view(seeing: Seeing, frame: Frame, view: int) -> tuple[FloatMap, B
     else:
         # samples between pixels depend mostly on the four around them
         unusable = np.asarray(cv2.dilate(unusable, np.ones((3, 3), np.uint8)), np.uint8)
-        channels = [
-            ndimage.map_coordinates(picture[..., c], at, np.float32, order=_SPLINES, mode="mirror")
-            for c in range(picture.shape[2])
-        ]
+        parts = np.moveaxis(picture, 2, 0)
+        channels = [ndimage.map_coordinates(part, at, np.float32, order=_SPLINES, mode="mirror") for part in parts]
         found = np.clip(np.stack(channels, axis=-1), -0.5, 1.5)
     absent |= unusable[tuple(np.rint(at).astype(int))] > 0
     found = np.where(absent[:, None], 0, found).reshape(height, width, -1)

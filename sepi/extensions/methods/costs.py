@@ -89,10 +89,8 @@ def disparity_of(volume: CostVolume, labels: IntArray) -> FloatMap:
 def between_candidates(disparities: FloatMap, costs: npt.NDArray[np.floating], labels: IntArray) -> FloatMap:
     """Disparity of the chosen candidates as of :func:`disparity_of`; costs (K, ...), infinite for rejected ones."""
     last = len(disparities) - 1
-    below, here, above = (
-        np.take_along_axis(costs, np.clip(labels + step, 0, last)[None], axis=0)[0].astype(np.float64)
-        for step in (-1, 0, 1)
-    )
+    numbers = (np.clip(labels + step, 0, last)[None] for step in (-1, 0, 1))
+    below, here, above = (np.take_along_axis(costs, number, axis=0)[0].astype(np.float64) for number in numbers)
     with np.errstate(invalid="ignore"):
         curvature, slope = below - 2 * here + above, below - above
     inner = (labels > 0) & (labels < last) & (here <= np.minimum(below, above))

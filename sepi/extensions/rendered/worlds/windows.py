@@ -85,9 +85,8 @@ def _front(front: Front) -> Things:
             if drop:
                 blinds.append(wall((x - w / 2, high, 0.2), w, drop * h))
             if front.shutters and floor:
-                leaves += [
-                    _slab((at - w / 4, high), (at + w / 4, low), 0.04, -0.05) for at in (x - 0.77 * w, x + 0.77 * w)
-                ]
+                sides = (x - 0.77 * w, x + 0.77 * w)
+                leaves += [_slab((at - w / 4, high), (at + w / 4, low), 0.04, -0.05) for at in sides]
             if front.balconies and floor:
                 iron += _railing(x - w / 2 - 0.15, low + 0.05, w + 0.3, 0.95, -0.3, 0.12, 0.012)
                 sills.append(_slab((x - w / 2 - 0.2, low), (x + w / 2 + 0.2, low + 0.12), 0.1, -0.38))
