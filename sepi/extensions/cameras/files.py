@@ -182,9 +182,8 @@ def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
     # nerfstudio's points
     cloud = told.get("ply_file_path")
     inside = isinstance(cloud, str) and not Path(cloud).is_absolute() and ".." not in Path(cloud).parts
-    if not inside or not (path.parent / cloud).is_file():
-        return CameraModel(path, tuple(found), units=units)
-    return CameraModel(path, tuple(found), read_positions(path.parent / cloud), units)
+    points = read_positions(path.parent / cloud) if inside and (path.parent / cloud).is_file() else None
+    return CameraModel(path, tuple(found), points, units)
 
 
 def _picture_of_frame(name: str, entry: Mapping[str, Any], pictures: Pictures) -> Picture:

@@ -65,7 +65,8 @@ def files_of(path: Path, options: ReadOptions) -> tuple[Sequence[Path], Sequence
     found = cameras_in(path)
     assert found is not None
     model = read_model(path, options.images, options.part)
-    return (*described_by(found), *model.files), [picture.file for picture in model.pictures]
+    described = sorted(path for path in found.iterdir() if path.stem in MODEL_FILES) if found.is_dir() else [found]
+    return (*described, *model.files), [picture.file for picture in model.pictures]
 
 
 FORMATS = {
@@ -177,11 +178,6 @@ def model_in(folder: Path) -> Path | None:
         if any(all((place / f"{name}{end}").is_file() for name in _FILES) for end in (".bin", ".txt")):
             return place
     return None
-
-
-def described_by(found: Path) -> tuple[Path, ...]:
-    """The files of the cameras that :func:`cameras_in` found."""
-    return tuple(sorted(path for path in found.iterdir() if path.stem in MODEL_FILES)) if found.is_dir() else (found,)
 
 
 def read_model(path: Path, images: str | None = None, crop_of: Part | None = None) -> CameraModel:
