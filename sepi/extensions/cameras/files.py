@@ -218,8 +218,7 @@ def _picture_of_frame(name: str, entry: Mapping[str, Any], pictures: Pictures) -
 
 
 def _lens_kind(model: str) -> str:
-    if model not in _LENSES:
-        raise SepiError(f"camera model {model[:40]}; expected one of {', '.join(_LENSES)}")
+    require_known("camera model", [model[:40]], _LENSES)
     return _LENSES[model]
 
 

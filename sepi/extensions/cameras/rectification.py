@@ -1,7 +1,7 @@
 """Rectifies calibrated cameras to a light field: views of parallel cameras in one plane.
 
-The steps: the plane through the cameras and a grid for them (``plane``), the picture of the reference view, and the
-views themselves (``frame``).
+The steps are in ``frame``: the plane through the cameras and a grid for them, the picture of the reference view, and
+the views themselves.
 """
 
 from dataclasses import replace
@@ -11,9 +11,8 @@ import numpy as np
 from sepi.camera import Camera
 from sepi.camera.rig import Rig
 from sepi.errors import SepiError
-from sepi.extensions.cameras.frame import Seeing, completed, frame_of, rectified_view
+from sepi.extensions.cameras.frame import Plane, Seeing, completed, frame_of, grid_of, rectified_view
 from sepi.extensions.cameras.model import CameraModel
-from sepi.extensions.cameras.plane import Plane, grid_of
 from sepi.io.files import name_of
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.exposure import equally_bright
