@@ -4,15 +4,7 @@ from pathlib import Path
 
 import click
 
-from sepi.cli.input_options import (
-    Geometry,
-    Reading,
-    camera_flags,
-    camera_of,
-    default_folder,
-    read_light_field_of,
-    reading_flags,
-)
+from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
 from sepi.errors import SepiError
 from sepi.process.command import PATH, SepiCommand, progress_bar
 
@@ -101,6 +93,7 @@ def poses(
       sepi poses cotton cotton-depth
       sepi poses cotton cotton-depth --to nerfstudio -o cotton-nerf
     """
+    from sepi.cli.input_options import camera_of, read_light_field_of
     from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
     from sepi.extensions.cameras.posed_views import PosedViews
     from sepi.io.all_views import surfaces_of

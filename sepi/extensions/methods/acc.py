@@ -50,15 +50,7 @@ import numpy.typing as npt
 from pydantic import Field
 from scipy import fft
 
-from sepi.extensions.methods.costs import (
-    GuidedFilter,
-    IntArray,
-    Previous,
-    distinctness,
-    filtered,
-    maps_of,
-    weighted_median,
-)
+from sepi.extensions.methods.costs import GuidedFilter, Previous, distinctness, filtered, maps_of, weighted_median
 from sepi.extensions.methods.markov_field import labels_of_least_energy
 from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap, LightField, as_unit_float, without_reference
@@ -66,6 +58,7 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, no_progress, require_costs
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 _AT_ONCE = 8
 """Candidates that are transformed together."""

@@ -7,19 +7,9 @@ into each other, as a sculptor adds clay and takes it away. There ``y`` is up an
 import numpy as np
 from skimage import measure
 
+from sepi.extensions.rendered import shapes
 from sepi.extensions.rendered.patterns import field, noise, painted, stone
-from sepi.extensions.rendered.shapes import (
-    Points,
-    box,
-    joined,
-    moved,
-    raster,
-    rotation,
-    sheet,
-    thing,
-    tube,
-    turned_body,
-)
+from sepi.extensions.rendered.shapes import Points, box, moved, raster, sheet, thing, turned_body
 from sepi.extensions.rendered.staging import fruit, profile, vessel
 from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Pattern, Things, Vector, World
 
@@ -83,7 +73,7 @@ def _niche(radius: float, spring: float) -> Mesh:
     wall = raster(x, low, WALL + radius * np.sin(turn))
     rise = np.linspace(0, np.pi / 2, 40)[None, :]
     dome = [x * np.cos(rise), spring - radius * np.sin(rise) + 0 * x, WALL + radius * np.sin(turn) * np.cos(rise)]
-    return joined([sheet(wall), sheet(raster(*dome))])
+    return shapes.joined([sheet(wall), sheet(raster(*dome))])
 
 
 def _amphora(foot: Vector) -> Mesh:
@@ -92,8 +82,8 @@ def _amphora(foot: Vector) -> Mesh:
     turn = np.linspace(0, np.pi, 30)
     out = 0.042 + 0.035 * turn / np.pi + 0.065 * np.sin(turn)
     paths = [raster(side * out, -0.455 + 0.115 * turn / np.pi, 0 * turn) for side in (-1, 1)]
-    handles = [tube(path @ rotation((0, 0.5, 0)).T + np.array(foot), 0.011) for path in paths]
-    return joined([vessel(outline, 0.006, foot), *handles])
+    handles = [shapes.tube(path @ shapes.rotation((0, 0.5, 0)).T + np.array(foot), 0.011) for path in paths]
+    return shapes.joined([vessel(outline, 0.006, foot), *handles])
 
 
 def _urn(foot: Vector) -> Mesh:
