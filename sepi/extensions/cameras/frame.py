@@ -275,10 +275,8 @@ def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
         share = min(height / reference.lens.height, width / reference.lens.width)
         if len(kept) > 1 and share >= _LEAST_PART and min(height, width) >= MIN_SIZE:
             return Frame((seeing.principal[0] - box[2], seeing.principal[1] - box[0]), (height, width)), kept
-    raise SepiError(
-        f"{seeing.model.path}: the cameras share hardly anything of the picture of {reference.name}; they look in too "
-        "different directions, or stand too far apart"
-    )
+    hardly = f"the cameras share hardly anything of the picture of {reference.name}"
+    raise SepiError(f"{seeing.model.path}: {hardly}; they look in too different directions, or stand too far apart")
 
 
 def _lattice(across: npt.NDArray[Any], down: npt.NDArray[Any]) -> Floats:

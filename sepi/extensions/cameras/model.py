@@ -120,10 +120,8 @@ class CameraModel:
         one, other = divmod(int(turned.argmax()), len(turned))
         require_alike(self.path, names[one], names[other], turned[one, other])
         if len(self.points) and np.mean((self.points - centres.mean(axis=0)) @ axes.mean(axis=0) > 0) < _BEFORE:
-            raise SepiError(
-                f"{self.path}: the scene's points lie behind the cameras; expected poses of cameras that look along "
-                "their z axis, with y down (OpenCV), not against it with y up (OpenGL)"
-            )
+            expected = "expected cameras that look along z, with y down (OpenCV), not against it with y up (OpenGL)"
+            raise SepiError(f"{self.path}: the scene's points lie behind the cameras; {expected}")
 
 
 def require_alike(where: Path, one: str, other: str, angle: float) -> None:
@@ -135,10 +133,8 @@ def require_alike(where: Path, one: str, other: str, angle: float) -> None:
 def require_sideways(where: Path, angle: float, least: float = _LEAST_ANGLE) -> None:
     """Raise if the cameras move at less than so many degrees to their viewing direction."""
     if angle < least:
-        raise SepiError(
-            f"{where}: the cameras move along their viewing direction (at {angle:.0f} degrees to it); expected them to "
-            f"move sideways, at {_LEAST_ANGLE:.0f} to 90 degrees"
-        )
+        ahead = f"the cameras move along their viewing direction (at {angle:.0f} degrees to it)"
+        raise SepiError(f"{where}: {ahead}; expected them to move sideways, at {_LEAST_ANGLE:.0f} to 90 degrees")
 
 
 # where COLMAP says it, and names of folders that it and others use

@@ -87,10 +87,8 @@ def write_features(
     sizes = [read_picture(path).shape[1::-1] for path in pictures]
     for path, size in zip(pictures, sizes, strict=True):
         if size != sizes[0] and not finding.each:
-            raise SepiError(
-                f"{path}: {size[0]}x{size[1]} pixels, but {pictures[0].name} has {sizes[0][0]}x{sizes[0][1]}; expected "
-                "pictures of one camera, or --cameras each"
-            )
+            told = f"{size[0]}x{size[1]} pixels, but {pictures[0].name} has {sizes[0][0]}x{sizes[0][1]}"
+            raise SepiError(f"{path}: {told}; expected pictures of one camera, or --cameras each")
     mode = pycolmap.CameraMode.PER_IMAGE if finding.each else pycolmap.CameraMode.SINGLE
     reader = pycolmap.ImageReaderOptions(camera_model=finding.lens)
     names, where = [path.name for path in pictures], (str(database), str(pictures[0].parent))

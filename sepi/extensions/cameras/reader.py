@@ -202,10 +202,8 @@ def read_model(path: Path, images: str | None = None, crop_of: Part | None = Non
 
     found = cameras_in(path)
     if found is None:
-        raise SepiError(
-            f"{path}: no calibrated cameras; expected a COLMAP model (cameras, images and points3D, .txt or .bin), "
-            f"{TRANSFORMS[0]}, or a table {', '.join(TABLES)}"
-        )
+        expected = f"a COLMAP model (with points3D), {TRANSFORMS[0]}, or a table {', '.join(TABLES)}"
+        raise SepiError(f"{path}: no calibrated cameras; expected {expected}")
     pictures = Pictures(found, None if images is None else Path(images).expanduser(), crop_of)
     read = files.read_transforms if found.suffix.lower() == ".json" else files.read_table
     model = (files.read_colmap if found.is_dir() else read)(found, pictures)

@@ -334,9 +334,5 @@ def guided_median(
     return maps.updated(disparity, maps.confidence)
 
 
-CHOICES = {
-    "optimize": {
-        "guided_costs": Choice(GuidedCostsParameters, guided_costs),
-        "guided_median": Choice(GuidedMedianParameters, guided_median),
-    }
-}
+CHOICES = {"optimize": {"guided_costs": Choice(GuidedCostsParameters, guided_costs)}}
+CHOICES["optimize"]["guided_median"] = Choice(GuidedMedianParameters, guided_median)

@@ -122,13 +122,10 @@ def _looked_at(tracer: Tracer, options: RenderOptions, number: int) -> tuple[Arr
     seen = tracer.surfaces.first(at)
     disparity = tracer.rig.disparity(seen.depth).astype(np.float32)
     straight = tracer.surfaces.first(tracer.position(down, across)) if any(turn) else seen
-    truth: Arrays = {
-        "disparity": disparity,
-        "normal": seen.normal.astype(np.float16),
-        "masks": surface_bits(tracer.world.things, seen, disparity),
-        # occlusion masks need a view without a turn
-        "upright": tracer.rig.disparity(straight.depth).astype(np.float32),
-    }
+    truth: Arrays = {"disparity": disparity, "normal": seen.normal.astype(np.float16)}
+    truth["masks"] = surface_bits(tracer.world.things, seen, disparity)
+    # occlusion masks need a view without a turn
+    truth["upright"] = tracer.rig.disparity(straight.depth).astype(np.float32)
     if not options.shares_light:
         return truth, partial(tracer.picture, at, seed, options.samples)
     passes, albedo, whole = planned(tracer, at, seen, options.samples, seed)

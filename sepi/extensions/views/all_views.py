@@ -251,12 +251,10 @@ def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sour
         # distances of the bounds hold in other views, too; an unknown disparity may lie beyond both
         below, above = np.maximum(maps.disparity - maps.low, 0), np.maximum(maps.high - maps.disparity, 0)
         told.append(np.stack([maps.confidence, maps.sigma, below, above], axis=2))
-    return Sources(
-        np.stack([maps.disparity for maps in found], dtype=np.float32),
-        np.stack(told, dtype=np.float32),
-        np.stack([corner_disparities(maps.disparity) for maps in found], dtype=np.float32),
-        baselines,
-    )
+    disparities = [maps.disparity for maps in found]
+    parts = disparities, told, list(map(corner_disparities, disparities))
+    disparity, of_all, corners = (np.stack(part, dtype=np.float32) for part in parts)
+    return Sources(disparity, of_all, corners, baselines)
 
 
 def _fused(

@@ -220,10 +220,8 @@ def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
     chosen = light_field.present & (distance <= aperture)
     if chosen.sum() < 2:
         others = without_reference(light_field, light_field.present)
-        raise SepiError(
-            f"{light_field.name}: an aperture of {aperture:g} view steps has no view but the reference view; the "
-            f"nearest other is {distance[others].min():g} away"
-        )
+        alone = f"an aperture of {aperture:g} view steps has no view but the reference view"
+        raise SepiError(f"{light_field.name}: {alone}; the nearest other is {distance[others].min():g} away")
     return np.asarray(chosen, bool)
 
 
