@@ -258,10 +258,8 @@ def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
     larger = float((high - low).max()) / max(reference.lens.width, reference.lens.height)
     if not larger <= _MOST_LARGER:
         large = f"{larger:.3g} times as large" if np.isfinite(larger) else "without bounds"
-        raise SepiError(
-            f"{seeing.model.path}: {reference.name}: would be {large} once rectified; expected "
-            "focal lengths and distortion that fit its size, and are much the same for all cameras"
-        )
+        expected = "expected focal lengths and distortion that fit its size, and are much the same for all cameras"
+        raise SepiError(f"{seeing.model.path}: {reference.name}: would be {large} once rectified; {expected}")
     stride = max(1.0, float((high - low).max()) / _LATTICE)
     counts = np.maximum(2, np.ceil((high - low) / stride).astype(int) + 1)
     across, down = (np.round(np.linspace(low[n], high[n], counts[n])) for n in (0, 1))

@@ -231,10 +231,9 @@ class Pictures:
         """
         low, high = sorted(np.mean(self._middles or [[1.0, 1.0]], axis=0))
         if 0 < low <= high < _ALIKE * low and not 1 / _OTHER < low < _OTHER:
-            raise SepiError(
-                f"{self._model}: the principal points are those of pictures about {low:.2g} times as large; expected "
-                "w and h, the size of the calibrated pictures, or --crop-of if these pictures are crops of them"
-            )
+            told = f"the principal points are those of pictures about {low:.2g} times as large"
+            expected = "expected w and h, the size of the calibrated pictures, or --crop-of if these are crops of them"
+            raise SepiError(f"{self._model}: {told}; {expected}")
         return (f"{self._scaled}; if the pictures are crops, give --crop-of",) if self._scaled else ()
 
 

@@ -181,11 +181,9 @@ def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], findin
     parallax, ahead, turned = np.array([measured for _, *measured in steps]).T
     widest, farthest = int(parallax.argmax()), int(turned.argmax())
     if parallax[widest] < _NARROW * unit:
-        raise SepiError(
-            f"{folder}: from {' to '.join(pairs[widest])} the parallax is {parallax[widest]:.1f} pixels: the "
-            "camera turned but hardly moved, or the scene is flat; expected a camera that moves sideways, with a "
-            f"parallax of at least {4 * _NARROW * unit:.0f} pixels between near and far points"
-        )
+        told = f"from {' to '.join(pairs[widest])} the parallax is {parallax[widest]:.1f} pixels"
+        why = "the camera turned but hardly moved, or the scene is flat; expected a camera that moves sideways, with"
+        raise SepiError(f"{folder}: {told}: {why} at least {4 * _NARROW * unit:.0f} pixels between near and far points")
     require_alike(folder, *pairs[farthest], turned[farthest])
     firm = ahead[(parallax >= _FIRM * unit) & ~np.isnan(ahead)]
     if len(firm):
