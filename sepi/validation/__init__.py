@@ -26,14 +26,14 @@ def value_of(text: str) -> Any:
         return text
 
 
-def settings_of(texts: Iterable[str], example: str, form: str = "KEY=VALUE") -> dict[str, Any]:
-    """Key to value, from repeated ``--set KEY=VALUE``; keys have as many dots as the ``form`` in the error."""
+def settings_of(texts: Iterable[str], example: str, form: str = "KEY=VALUE", flag: str = "--set") -> dict[str, Any]:
+    """Key to value, from a repeated flag ``--set KEY=VALUE``; keys have as many dots as the ``form`` in the error."""
     key = r"\.".join([r"\w+"] * (form.count(".") + 1))
     found = {}
     for text in texts:
         match = re.fullmatch(rf"({key})=(.*)", text)
         if match is None:
-            raise SepiError(f"--set {text}: expected {form}, such as {example}")
+            raise SepiError(f"{flag} {text}: expected {form}, such as {example}")
         found[match[1]] = value_of(match[2])
     return found
 

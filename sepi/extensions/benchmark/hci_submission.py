@@ -12,7 +12,6 @@ References
 
 import math
 import stat
-import struct
 import tempfile
 import zipfile
 import zlib
@@ -27,11 +26,11 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import read_pfm
-from sepi.io.files import atomic_path
+from sepi.io.files import atomic_path, reading
 from sepi.io.result_files import RUNTIME
 from sepi.io.result_folder import read_result
 from sepi.process.command import PATH, SepiCommand
-from sepi.validation import require_known, require_path, require_type
+from sepi.validation import require_known, require_path, require_type, settings_of
 
 SCENES = (
     *("backgammon", "dots", "pyramids", "stripes"),
@@ -173,7 +172,7 @@ def problems_of(path: str | Path, *, partial: bool = False) -> list[str]:
     Raises
     ------
     SepiError
-        If ``path`` does not exist or cannot be read.
+        If ``path`` does not exist, cannot be read, or is not a zip archive.
 
     Examples
     --------
@@ -190,56 +189,23 @@ def problems_of(path: str | Path, *, partial: bool = False) -> list[str]:
     runtimes/: no such folder with files of the benchmark's scenes
     """
     path = require_path("submission", path)
-    try:
-        if path.is_dir():
-            # files and folders of the first two levels
-            inner = {*path.glob("*/*"), *(entry for entry in path.iterdir() if not entry.is_dir())}
-            return _problems_in(path, sorted(file.relative_to(path).as_posix() for file in inner), {}, partial)
-        if not path.is_file():
-            raise SepiError(f"{path}: no such file or folder")
-        archive = zipfile.ZipFile(path)
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (zipfile.BadZipFile, ValueError, OverflowError, struct.error, NotImplementedError) as error:
-        return [f"{path}: not a readable zip archive ({error})"]
-    with archive, tempfile.TemporaryDirectory(prefix="sepi-") as folder:
-        return _problems_in(Path(folder), archive.namelist(), _unpack(archive, Path(folder)), partial)
+    if path.is_dir():
+        # files and folders of the first two levels
+        inner = {*path.glob("*/*"), *(entry for entry in path.iterdir() if not entry.is_dir())}
+        return _problems_in(path, sorted(file.relative_to(path).as_posix() for file in inner), None, partial)
+    if not path.is_file():
+        raise SepiError(f"{path}: no such file or folder")
+    with tempfile.TemporaryDirectory() as folder, reading(path, "zip archive"), zipfile.ZipFile(path) as archive:
+        return _problems_in(Path(folder), archive.namelist(), archive, partial)
 
 
-def _unpack(archive: zipfile.ZipFile, folder: Path) -> dict[str, str]:
-    """Unpack only the files of a submission; returns name to problem for those that cannot be unpacked."""
-    damaged: dict[str, str] = {}
-    for info in archive.infolist():
-        name = info.filename
-        if name not in _EXPECTED:
-            continue
-        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            damaged[name] = f"compressed by method {info.compress_type}; expected 'deflated' or none"
-        # zipfile never unpacks more than the declared size
-        elif problem := _size_problem(name, info.file_size):
-            damaged[name] = problem
-        else:
-            try:
-                content = archive.read(info)
-            except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError, OSError) as error:
-                damaged[name] = f"cannot be unpacked ({error})"
-            else:
-                (folder / name).parent.mkdir(exist_ok=True)
-                (folder / name).write_bytes(content)
-    return damaged
-
-
-def _problems_in(folder: Path, names: Sequence[str], damaged: Mapping[str, str], partial: bool) -> list[str]:
-    """Problems with a submission: ``names`` of its files, which lie in ``folder`` unless they are ``damaged``."""
+def _problems_in(folder: Path, names: Sequence[str], archive: zipfile.ZipFile | None, partial: bool) -> list[str]:
+    """Problems with a submission: ``names`` of its files, which lie in ``folder``, or are unpacked there."""
     problems = [f"{_shown(name)}: {count} files of this name" for name, count in Counter(names).items() if count > 1]
     # some programs write entries for folders, which are harmless
-    strange = {name: name.split("/") for name in names if name not in _EXPECTED and not name.endswith("/")}
-    # disp_maps/ and runtimes/ one level too low; macOS adds __MACOSX/
-    wrapping = {parts[0] for parts in strange.values() if parts[1:2] and parts[1] in _NAMES} - {"", "__MACOSX"}
-    for wrapper in sorted(map(_shown, wrapping)):
-        problems.append(f"{wrapper}/: expected {MAPS}/ and {RUNTIMES}/ at the root, not in this folder")
-    others = [_shown(name) for name, parts in strange.items() if parts[0] not in wrapping]
-    problems += [f"{name}: does not belong to a submission; leave it out" for name in others[:_MOST_LINES]]
+    others = [_shown(name) for name in names if name not in _EXPECTED and not name.endswith("/")]
+    rule = f"does not belong to a submission; expected only {MAPS}/ and {RUNTIMES}/, in no other folder"
+    problems += [f"{name}: {rule}" for name in others[:_MOST_LINES]]
     if len(others) > _MOST_LINES:
         problems.append(f"...: {len(others) - _MOST_LINES} more files that do not belong")
     known = _EXPECTED.intersection(names)
@@ -248,23 +214,29 @@ def _problems_in(folder: Path, names: Sequence[str], damaged: Mapping[str, str],
             problems.append(f"{part}/: no such folder with files of the benchmark's scenes")
             continue
         for name, *both in zip(expected, *_NAMES.values(), strict=True):
-            if name in known and (problem := damaged.get(name) or _problem_in(folder / name, name)):
+            if name in known and (problem := _problem_in(folder, name, archive)):
                 problems.append(f"{name}: {problem}")
             elif name not in known and not (partial and known.isdisjoint(both)):
                 problems.append(f"{name}: missing")
     return problems
 
 
-def _problem_in(path: Path, name: str) -> str | None:
+def _problem_in(folder: Path, name: str, archive: zipfile.ZipFile | None) -> str | None:
+    path = folder / name
+    if problem := _size_problem(name, archive.getinfo(name).file_size if archive else path.stat().st_size):
+        return problem
     try:
-        if not name.startswith(MAPS):
+        if archive:
+            # no more than the size that it tells
+            archive.extract(name, folder)
+        if name.startswith(RUNTIMES):
             _read_seconds(path)
             return None
-        if problem := _size_problem(name, path.stat().st_size):
-            return problem
         disparity = read_pfm(path)
     except SepiError as error:
         return str(error).removeprefix(f"{path}: ")
+    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError, OSError) as error:
+        return f"cannot be unpacked ({error})"
     if disparity.shape != SHAPE:
         return f"{disparity.shape[1]}x{disparity.shape[0]} pixels; expected {_PIXELS}"
     unknown = np.count_nonzero(~np.isfinite(disparity))
@@ -274,18 +246,14 @@ def _problem_in(path: Path, name: str) -> str | None:
 def _read_seconds(path: Path) -> float:
     if problem := _size_problem(RUNTIMES, path.stat().st_size):
         raise SepiError(f"{path}: {problem}")
-    text = path.read_bytes().decode("ascii", "replace").strip()
-    seconds = _seconds(text)
-    if seconds is None:
-        raise SepiError(f"{path}: expected the run time in seconds as a number, got {text!r}; it must be positive")
-    return seconds
+    return _seconds(path.read_bytes().decode("ascii", "replace").strip(), path)
 
 
-def _seconds(text: str) -> float | None:
+def _seconds(text: str, where: object) -> float:
     with suppress(ValueError):
         if 0 < (seconds := float(text)) < math.inf:
             return seconds
-    return None
+    raise SepiError(f"{where}: expected the run time in seconds as a number, got {text!r}; it must be positive")
 
 
 def _size_problem(name: str, size: int) -> str | None:
@@ -318,13 +286,8 @@ def submission(results: tuple[Path, ...], output: Path, runtimes: tuple[str, ...
       for scene in stratified/* training/* test/*; do sepi depth "$scene" --timing; done
       sepi submission *-depth -o submission.zip
     """
-    seconds: dict[str, float] = {}
-    for text in runtimes:
-        scene, _, number = text.partition("=")
-        given = _seconds(number)
-        if not scene or given is None:
-            raise SepiError(f"--runtime {text}: expected SCENE=SECONDS with a positive number, such as cotton=12.5")
-        seconds[scene] = given
+    given = settings_of(runtimes, "cotton=12.5", "SCENE=SECONDS", "--runtime")
+    seconds = {scene: _seconds(str(value), f"--runtime {scene}={value}") for scene, value in given.items()}
     entries: dict[str, Entry] = {}
     for folder in results:
         scene, entry = entry_of(folder, seconds)

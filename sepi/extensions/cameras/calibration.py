@@ -10,7 +10,7 @@ import os
 import re
 import shutil
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -169,14 +169,12 @@ def calibrate(
         (temporary / PROJECT).write_text(f"image_path = {beside}\n", "utf-8")
         shutil.rmtree(work)
     placed = {image.name for image in model.images.values() if image.has_pose}
-    notes: tuple[str, ...] = ()
-    unusable = None
-    try:
-        notes = Rectification(read_model(output)).notes
-    except SepiError as error:
-        unusable = str(error)
     found, left_out = (tuple(name for name in names if (name in placed) is wanted) for wanted in (True, False))
-    return Calibration(output, found, left_out, float(model.compute_mean_reprojection_error()), notes, unusable)
+    made = Calibration(output, found, left_out, float(model.compute_mean_reprojection_error()), (), None)
+    try:
+        return replace(made, notes=Rectification(read_model(output)).notes)
+    except SepiError as error:
+        return replace(made, unusable=str(error))
 
 
 def pictures_in(folder: Path) -> list[Path]:
@@ -244,10 +242,9 @@ def _placed(pycolmap: Any, folder: Path, database: Path, camera: Any, count: int
         if best is not None and best.num_reg_images() >= _ENOUGH * count:
             return best
     if best is None:
-        raise SepiError(
-            f"{folder}: no two pictures tell the positions of their cameras: the camera moved too little or along its "
-            "viewing direction, or the pictures share too little; expected a sweep sideways past a scene with texture"
-        )
+        why = "the camera moved too little or along its viewing direction, or the pictures share too little"
+        told = f"no two pictures tell the positions of their cameras: {why}"
+        raise SepiError(f"{folder}: {told}; expected a sweep sideways past a scene with texture")
     return best
 
 

@@ -4,15 +4,7 @@ from pathlib import Path
 
 import click
 
-from sepi.cli.input_options import (
-    Geometry,
-    Reading,
-    camera_flags,
-    camera_of,
-    default_folder,
-    read_light_field_of,
-    reading_flags,
-)
+from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
 from sepi.errors import SepiError
 from sepi.process.command import PATH, SepiCommand, progress_bar
 
@@ -21,18 +13,10 @@ from sepi.process.command import PATH, SepiCommand, progress_bar
 @click.argument("folder", type=PATH)
 @click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-cameras for a FOLDER called NAME.")
 @click.option(
-    "--lens",
-    default="SIMPLE_RADIAL",
-    show_default=True,
-    metavar="MODEL",
-    help="COLMAP's lens model: SIMPLE_PINHOLE, RADIAL, OPENCV, OPENCV_FISHEYE, ...",
+    "--lens", default="SIMPLE_RADIAL", show_default=True, metavar="MODEL", help="COLMAP's: RADIAL, OPENCV, ..."
 )
 @click.option(
-    "--cameras",
-    type=click.Choice(["one", "each"]),
-    default="one",
-    show_default=True,
-    help="Whether one camera took all pictures, or each has its own.",
+    "--cameras", type=click.Choice(["one", "each"]), default="one", show_default=True, help="One for all, or one each."
 )
 @click.option("--force", is_flag=True, help="Go on even if a check of a few pictures fails.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
@@ -75,19 +59,11 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
 @click.argument("light_field_path", metavar="INPUT", type=PATH)
 @click.argument("result_path", metavar="RESULT", type=PATH)
 @click.option(
-    "--to",
-    "kind",
-    type=click.Choice(["colmap", "nerfstudio"]),
-    default="colmap",
-    show_default=True,
-    help="Program to write for.",
+    "--to", "kind", type=click.Choice(["colmap", "nerfstudio"]), default="colmap", show_default=True, help="Program."
 )
 @click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
 @click.option(
-    "--min-confidence",
-    type=float,
-    metavar="X",
-    help="Least confidence of points; default: the median of all pixels.",
+    "--min-confidence", type=float, metavar="X", help="Least confidence of points; default: the median of all pixels."
 )
 @click.option(
     "--points", type=click.IntRange(min=0), default=10000, show_default=True, metavar="N", help="At most N points."
@@ -117,6 +93,7 @@ def poses(
       sepi poses cotton cotton-depth
       sepi poses cotton cotton-depth --to nerfstudio -o cotton-nerf
     """
+    from sepi.cli.input_options import camera_of, read_light_field_of
     from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
     from sepi.extensions.cameras.posed_views import PosedViews
     from sepi.io.all_views import surfaces_of

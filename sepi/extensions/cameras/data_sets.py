@@ -61,10 +61,6 @@ from sepi.stage import Progress, no_progress
 Flags = npt.NDArray[np.bool_]
 """Which of the views sees which of the points, (N, P)."""
 
-_CAMERAS = "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"
-_IMAGES = "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n#   POINTS2D[] as (X, Y, POINT3D_ID)"
-_POINTS = "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)"
-
 
 def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_progress) -> None:
     """Write views, poses, points and depth as a COLMAP workspace; equal content gives equal bytes.
@@ -85,7 +81,7 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
     with atomic_folder(Path(folder)) as temporary:
         sees = np.zeros((len(posed.positions), int(posed.chosen.sum())), bool)
         # the names that ``--ImageReader.mask_path`` and ``--StereoFusion.mask_path`` look for
-        for view, name, carried in _with_pictures(temporary, posed, ".png.png", progress):
+        for view, name, carried in _pictured(temporary, posed, ".png.png", progress):
             sees[view] = posed.sees(view, carried)
             stereo = f"{name}.png.geometric.bin"
             _write_maps(temporary / "stereo/depth_maps" / stereo, posed.depth(carried)[None])
@@ -102,9 +98,7 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
             shutil.copyfile(path, temporary / "sparse" / path.name)
 
 
-def _with_pictures(
-    folder: Path, posed: PosedViews, mask: str, progress: Progress
-) -> Iterator[tuple[int, str, FloatMap]]:
+def _pictured(folder: Path, posed: PosedViews, mask: str, progress: Progress) -> Iterator[tuple[int, str, FloatMap]]:
     """Number, name and disparity of each view, whose picture and mask are written."""
     missing = posed.light_field.missing
     for view, name in enumerate(posed.names):
@@ -123,8 +117,7 @@ def _write_maps(path: Path, maps: FloatMap) -> None:
 
 def _cameras(posed: PosedViews) -> Iterator[str]:
     (height, width), focal = posed.light_field.shape, posed.camera.focal_px
-    yield "# Camera list with one line of data per camera:"
-    yield _CAMERAS
+    yield "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"
     for number, (x, y) in enumerate((posed.principal_points + 0.5).tolist(), 1):
         yield f"{number} PINHOLE {width} {height} {focal!r} {focal!r} {x!r} {y!r}"
 
@@ -134,8 +127,7 @@ def _images(posed: PosedViews, sees: Flags) -> Iterator[str]:
     if posed.rig is not None:
         x, y, z, w = Rotation.from_matrix(posed.rig.rotation).as_quat(canonical=True).tolist()
         turn, places = f"{w!r} {x!r} {y!r} {z!r}", posed.rig.to_world(places) @ posed.rig.rotation.T
-    yield "# Image list with two lines of data per image:"
-    yield _IMAGES
+    yield "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME; then POINTS2D[] as (X, Y, POINT3D_ID)"
     yield f"# units: {posed.units}"
     for view, name in enumerate(posed.names):
         # adding zero makes -0 a 0
@@ -149,8 +141,7 @@ def _images(posed: PosedViews, sees: Flags) -> Iterator[str]:
 def _points(posed: PosedViews, sees: Flags) -> Iterator[str]:
     # a point's number among those that a view sees
     places = np.cumsum(sees, axis=1) - 1
-    yield "# 3D point list with one line of data per point:"
-    yield _POINTS
+    yield "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)"
     world = posed.points if posed.rig is None else posed.rig.to_world(posed.points)
     told = world.tolist(), posed.colours.tolist(), posed.pixel_errors(sees).tolist()
     for point, ((x, y, z), (r, g, b), error) in enumerate(zip(*told, strict=True)):
@@ -180,7 +171,7 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
         If the folder exists and is not empty, or cannot be written.
     """
     with atomic_folder(Path(folder)) as temporary:
-        for view, name, carried in _with_pictures(temporary, posed, ".png", progress):
+        for view, name, carried in _pictured(temporary, posed, ".png", progress):
             _write_millimetres(temporary / "depths" / f"{name}.npy", posed.depth(carried))
             if posed.sure:
                 _write_millimetres(temporary / "depth_sigmas" / f"{name}.npy", posed.depth_sigma(view, carried))
@@ -203,9 +194,7 @@ def _transforms(posed: PosedViews, rig: Rig) -> dict[str, Any]:
     # the camera's right, up and back in the world; adding zero makes -0 a 0
     axes = (rig.rotation * [[1], [-1], [-1]]).T + 0.0
     frames = []
-    for name, (x, y), centre in zip(
-        posed.names, posed.principal_points + 0.5, rig.to_world(posed.centres), strict=True
-    ):
+    for name, (x, y), at in zip(posed.names, posed.principal_points + 0.5, rig.to_world(posed.centres), strict=True):
         frame: dict[str, Any] = {"file_path": f"images/{name}.png", "depth_file_path": f"depths/{name}.npy"}
         # nerfstudio wants it for all views or for none
         if posed.sure:
@@ -213,7 +202,7 @@ def _transforms(posed: PosedViews, rig: Rig) -> dict[str, Any]:
         if posed.light_field.missing is not None:
             frame["mask_path"] = f"masks/{name}.png"
         frame |= {"w": width, "h": height, "fl_x": focal, "fl_y": focal, "cx": float(x), "cy": float(y)}
-        frame["transform_matrix"] = [*np.column_stack([axes, centre]).tolist(), [0.0, 0.0, 0.0, 1.0]]
+        frame["transform_matrix"] = [*np.column_stack([axes, at]).tolist(), [0.0, 0.0, 0.0, 1.0]]
         frames.append(frame)
     cloud = {"ply_file_path": _CLOUD} if posed.chosen.any() else {}
     return {"camera_model": "OPENCV", "units": posed.units, **cloud, "frames": frames}

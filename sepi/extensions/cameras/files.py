@@ -148,10 +148,8 @@ def rotation_of(told: Any) -> Floats:
     if values.shape == (3, 3) and np.abs(values @ values.T - np.eye(3)).max() < _NEARLY and np.linalg.det(values) > 0:
         left, _, right = np.linalg.svd(values)
         return np.asarray(left @ right, np.float64)
-    raise SepiError(
-        "rotation: expected a quaternion w x y z of length 1, or a 3x3 rotation matrix (no reflection), "
-        "from the world's axes to the camera's"
-    )
+    expected = "a quaternion w x y z of length 1, or a 3x3 rotation matrix (no reflection)"
+    raise SepiError(f"rotation: expected {expected}, from the world's axes to the camera's")
 
 
 def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
@@ -181,9 +179,8 @@ def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
     # nerfstudio's points
     cloud = told.get("ply_file_path")
     inside = isinstance(cloud, str) and not Path(cloud).is_absolute() and ".." not in Path(cloud).parts
-    if not inside or not (path.parent / cloud).is_file():
-        return CameraModel(path, tuple(found), units=units)
-    return CameraModel(path, tuple(found), read_positions(path.parent / cloud), units)
+    points = read_positions(path.parent / cloud) if inside and (path.parent / cloud).is_file() else None
+    return CameraModel(path, tuple(found), points, units)
 
 
 def read_positions(path: Path) -> Floats:
@@ -236,8 +233,7 @@ def _picture_of_frame(name: str, entry: Mapping[str, Any], pictures: Pictures) -
 
 
 def _lens_kind(model: str) -> str:
-    if model not in _LENSES:
-        raise SepiError(f"camera model {model[:40]}; expected one of {', '.join(_LENSES)}")
+    require_known("camera model", [model[:40]], _LENSES)
     return _LENSES[model]
 
 

@@ -18,7 +18,7 @@ UNITS_OF_MODEL = "units of the model"
 # largest distance of cameras at one place, relative to that of the farthest cameras
 _SAME_PLACE = 1e-6
 # largest angle between viewing directions of two cameras, degrees
-_MOST_TURNED = 60.0
+_MOST_TURNED = 60
 # least angle between motion and viewing direction, degrees
 _LEAST_ANGLE = 45.0
 # least share of the model's points in front of the cameras
@@ -114,36 +114,27 @@ class CameraModel:
         extent = float(np.linalg.norm(np.ptp(centres, axis=0)))
         apart = np.linalg.norm(centres[:, None] - centres, axis=2)
         for one, other in np.argwhere(np.triu(apart <= _SAME_PLACE * extent, 1)).tolist():
-            raise SepiError(
-                f"{self.path}: {names[one]} and {names[other]} were taken from one position; leave one of them out "
-                f"(--exclude {names[other]})"
-            )
+            where = f"{self.path}: {names[one]} and {names[other]} were taken from one position"
+            raise SepiError(f"{where}; leave one of them out (--exclude {names[other]})")
         turned = np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)))
         one, other = divmod(int(turned.argmax()), len(turned))
         require_alike(self.path, names[one], names[other], turned[one, other])
         if len(self.points) and np.mean((self.points - centres.mean(axis=0)) @ axes.mean(axis=0) > 0) < _BEFORE:
-            raise SepiError(
-                f"{self.path}: the scene's points lie behind the cameras; expected poses of cameras that look along "
-                "their z axis, with y down (OpenCV), not against it with y up (OpenGL)"
-            )
+            expected = "expected cameras that look along z, with y down (OpenCV), not against it with y up (OpenGL)"
+            raise SepiError(f"{self.path}: the scene's points lie behind the cameras; {expected}")
 
 
 def require_alike(where: Path, one: str, other: str, angle: float) -> None:
     """Raise if two cameras' viewing directions are by this many degrees too far apart."""
     if angle > _MOST_TURNED:
-        raise SepiError(
-            f"{where}: {one} and {other} look {angle:.0f} degrees apart; expected similar viewing directions, at most "
-            f"{_MOST_TURNED:.0f} degrees apart"
-        )
+        raise SepiError(f"{where}: {one} and {other} look {angle:.0f} degrees apart; expected at most {_MOST_TURNED}")
 
 
 def require_sideways(where: Path, angle: float, least: float = _LEAST_ANGLE) -> None:
     """Raise if the cameras move at less than so many degrees to their viewing direction."""
     if angle < least:
-        raise SepiError(
-            f"{where}: the cameras move along their viewing direction (at {angle:.0f} degrees to it); expected them to "
-            f"move sideways, at {_LEAST_ANGLE:.0f} to 90 degrees"
-        )
+        ahead = f"the cameras move along their viewing direction (at {angle:.0f} degrees to it)"
+        raise SepiError(f"{where}: {ahead}; expected them to move sideways, at {_LEAST_ANGLE:.0f} to 90 degrees")
 
 
 # where COLMAP says it, and names of folders that it and others use
@@ -240,10 +231,9 @@ class Pictures:
         """
         low, high = sorted(np.mean(self._middles or [[1.0, 1.0]], axis=0))
         if 0 < low <= high < _ALIKE * low and not 1 / _OTHER < low < _OTHER:
-            raise SepiError(
-                f"{self._model}: the principal points are those of pictures about {low:.2g} times as large; expected "
-                "w and h, the size of the calibrated pictures, or --crop-of if these pictures are crops of them"
-            )
+            told = f"the principal points are those of pictures about {low:.2g} times as large"
+            expected = "expected w and h, the size of the calibrated pictures, or --crop-of if these are crops of them"
+            raise SepiError(f"{self._model}: {told}; {expected}")
         return (f"{self._scaled}; if the pictures are crops, give --crop-of",) if self._scaled else ()
 
 

@@ -1,14 +1,13 @@
 """Features and matches of pictures without poses, and whether the camera's motion suits a light field; by pycolmap.
 
-Features are found one picture after the other and written into COLMAP's database in the order of the pictures, so that
-it does not depend on threads. The check of the motion looks at a few small pictures before a long calibration. Its
-result is an estimate, since the focal length may be a guess. So it refuses only pictures far outside what
-:mod:`sepi.extensions.cameras.rectification` accepts.
+Pictures are written into COLMAP's database in their order before their features, so that it does not depend on threads.
+The check of the motion looks at a few small pictures before a long calibration. Its result is an estimate, since the
+focal length may be a guess. So it refuses only pictures far outside what :mod:`sepi.extensions.cameras.rectification`
+accepts.
 """
 
 import tempfile
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
@@ -20,9 +19,7 @@ import numpy as np
 from sepi.camera.rig import Floats
 from sepi.errors import SepiError, printable
 from sepi.extensions.cameras.model import require_alike, require_sideways
-from sepi.io.files import reading
 from sepi.io.images import read_picture
-from sepi.lightfield import FloatMap, as_unit_float
 from sepi.stage import Progress, no_progress
 
 SEED = 0
@@ -30,8 +27,8 @@ SEED = 0
 
 # largest error of a right match, pixels, up to this side of pictures; in proportion beyond
 _MATCH_ERROR, _SIDE = 1.0, 1000
-# number of pairs that are matched between two updates of the progress
-_AT_ONCE = 64
+# number of pictures or pairs of them between two updates of the progress
+_AT_ONCE = 16
 
 
 class Finding(NamedTuple):
@@ -86,55 +83,27 @@ def write_features(
     SepiError
         If a picture cannot be read, or is of another size than the others and shares their camera.
     """
-    wanted = pycolmap.FeatureExtractionOptions(num_threads=1)
-
-    def found(path: Path) -> tuple[tuple[int, ...], Any, Any]:
-        grey: FloatMap = np.ascontiguousarray(as_unit_float(read_picture(path)).mean(axis=2), np.float32)
-        height, width = grey.shape
-        if (scale := finding.side / max(height, width)) < 1:
-            small = max(1, round(width * scale)), max(1, round(height * scale))
-            grey = np.asarray(cv2.resize(grey, small, interpolation=cv2.INTER_AREA), np.float32)
-        bytes_of = np.rint(np.clip(grey, 0, 1) * 255).astype(np.uint8)
-        extractor = pycolmap.FeatureExtractor.create(wanted, pycolmap.Device.cpu)
-        features, descriptors = extractor.extract_from_uint8_array(bytes_of)
-        places = np.array([(feature.x, feature.y) for feature in features], np.float32).reshape(-1, 2)
-        places *= np.array([width / grey.shape[1], height / grey.shape[0]], np.float32)
-        return (width, height), places, descriptors
-
-    counts: list[int] = []
-    first: tuple[int, ...] = ()
-    with pycolmap.Database.open(str(database)) as file, ThreadPoolExecutor(finding.threads) as pool:
-        camera = rig = -1
-        for path, (size, places, descriptors) in zip(pictures, pool.map(found, pictures), strict=True):
-            first = first or size
-            if size != first and not finding.each:
-                raise SepiError(
-                    f"{path}: {size[0]}x{size[1]} pixels, but {pictures[0].name} has {first[0]}x{first[1]}; expected "
-                    "pictures of one camera, or --cameras each"
-                )
-            if not counts or finding.each:
-                camera, rig = _write_camera(pycolmap, file, path, finding.lens)
-            image = pycolmap.Image(name=path.name, camera_id=camera)
-            image.image_id = file.write_image(image)
-            frame = pycolmap.Frame(rig_id=rig)
-            frame.add_data_id(image.data_id)
-            file.write_frame(frame)
-            file.write_keypoints(image.image_id, places)
-            file.write_descriptors(image.image_id, descriptors)
-            counts.append(len(places))
-            progress(len(counts) / len(pictures))
-        return file.read_all_cameras()[0], counts
-
-
-def _write_camera(pycolmap: Any, file: Any, path: Path, lens: str) -> tuple[int, int]:
-    options = pycolmap.ImageReaderOptions(camera_model=lens)
-    with reading(path, "picture that COLMAP can read"):
-        # its focal length is from EXIF if there is one
-        known = pycolmap.infer_camera_from_image(str(path), options)
-    known.camera_id = file.write_camera(known)
-    rig = pycolmap.Rig()
-    rig.add_ref_sensor(known.sensor_id)
-    return known.camera_id, file.write_rig(rig)
+    # COLMAP skips damaged pictures without a word
+    sizes = [read_picture(path).shape[1::-1] for path in pictures]
+    for path, size in zip(pictures, sizes, strict=True):
+        if size != sizes[0] and not finding.each:
+            told = f"{size[0]}x{size[1]} pixels, but {pictures[0].name} has {sizes[0][0]}x{sizes[0][1]}"
+            raise SepiError(f"{path}: {told}; expected pictures of one camera, or --cameras each")
+    mode = pycolmap.CameraMode.PER_IMAGE if finding.each else pycolmap.CameraMode.SINGLE
+    reader = pycolmap.ImageReaderOptions(camera_model=finding.lens)
+    names, where = [path.name for path in pictures], (str(database), str(pictures[0].parent))
+    wanted = pycolmap.FeatureExtractionOptions(num_threads=finding.threads, max_image_size=finding.side)
+    with pycolmap.Database.open(str(database)) as file:
+        # first of all, so that numbers do not depend on which thread is done first
+        pycolmap.import_images(*where, mode, names, reader)
+        for begin in range(0, len(names), _AT_ONCE):
+            some = names[begin : begin + _AT_ONCE]
+            pycolmap.extract_features(*where, some, mode, reader, wanted, pycolmap.Device.cpu)
+            progress(min(1.0, (begin + _AT_ONCE) / len(names)))
+        images = [file.read_image_with_name(name) for name in names]
+        if None in images:
+            raise SepiError(f"{pictures[images.index(None)]}: not a picture that COLMAP can read")
+        return file.read_all_cameras()[0], [file.num_keypoints_for_image(image.image_id) for image in images]
 
 
 def match(
@@ -153,7 +122,8 @@ def match(
     progress : callable
     """
     matching = pycolmap.FeatureMatchingOptions(num_threads=threads)
-    geometry = pycolmap.TwoViewGeometryOptions(ransac={"random_seed": SEED, "max_error": size})
+    ransac = {"random_seed": SEED, "max_error": size}
+    geometry = pycolmap.TwoViewGeometryOptions(compute_relative_pose=True, ransac=ransac)
     listed = database.with_suffix(".pairs")
     pairing = pycolmap.ImportedPairingOptions(match_list_path=str(listed))
     for begin in range(0, len(pairs), _AT_ONCE):
@@ -197,30 +167,23 @@ def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], findin
         camera, counts = write_features(pycolmap, database, looked_at, finding._replace(side=_LOOK), no_progress)
         poor = [name for name, count in zip(names, counts, strict=True) if count < _FEATURES]
         if 2 * len(poor) > len(counts):
-            raise SepiError(
-                f"{folder}: hardly any features in {_listed(poor)}; expected pictures with texture, in focus "
-                "and well lit"
-            )
+            raise SepiError(f"{folder}: hardly any features in {_listed(poor)}; expected sharp, well lit texture")
         # width of a reduced picture's pixel, and largest error of a match
         unit = max(1.0, max(camera.width, camera.height) / _LOOK)
         size = tolerance(camera) * unit
         match(pycolmap, database, list(combinations(names, 2)), size, finding.threads, no_progress)
         with pycolmap.Database.open(str(database)) as file:
-            steps = _steps(pycolmap, file, size)
+            steps = _steps(file, size)
     if not steps:
-        raise SepiError(
-            f"{folder}: no two of {_listed(names)} match; expected pictures of one static scene, each from a position "
-            "a little beside the last"
-        )
+        expected = "expected one static scene, each picture from a position a little beside the last"
+        raise SepiError(f"{folder}: no two of {_listed(names)} match; {expected}")
     pairs = [names for names, *_ in steps]
     parallax, ahead, turned = np.array([measured for _, *measured in steps]).T
     widest, farthest = int(parallax.argmax()), int(turned.argmax())
     if parallax[widest] < _NARROW * unit:
-        raise SepiError(
-            f"{folder}: from {' to '.join(pairs[widest])} the parallax is {parallax[widest]:.1f} pixels: the "
-            "camera turned but hardly moved, or the scene is flat; expected a camera that moves sideways, with a "
-            f"parallax of at least {4 * _NARROW * unit:.0f} pixels between near and far points"
-        )
+        told = f"from {' to '.join(pairs[widest])} the parallax is {parallax[widest]:.1f} pixels"
+        why = "the camera turned but hardly moved, or the scene is flat; expected a camera that moves sideways, with"
+        raise SepiError(f"{folder}: {told}: {why} at least {4 * _NARROW * unit:.0f} pixels between near and far points")
     require_alike(folder, *pairs[farthest], turned[farthest])
     firm = ahead[(parallax >= _FIRM * unit) & ~np.isnan(ahead)]
     if len(firm):
@@ -231,20 +194,14 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
-def _steps(pycolmap: Any, file: Any, size: float) -> list[Step]:
-    ransac = {"random_seed": SEED, "max_error": size}
-    options = pycolmap.TwoViewGeometryOptions(compute_relative_pose=True, ransac=ransac)
+def _steps(file: Any, size: float) -> list[Step]:
     steps: list[Step] = []
     for one, other in combinations(sorted(file.read_all_images(), key=lambda image: image.image_id), 2):
+        found = file.read_two_view_geometry(one.image_id, other.image_id)
+        if found is None or found.cam2_from_cam1 is None or len(found.inlier_matches) < _MATCHES:
+            continue
         here, there = (np.asarray(file.read_keypoints(image.image_id)[:, :2], np.float64) for image in (one, other))
-        pairs = np.asarray(file.read_matches(one.image_id, other.image_id), np.uint32).reshape(-1, 2)
-        if len(pairs) < _MATCHES:
-            continue
-        cameras = [file.read_camera(image.camera_id) for image in (one, other)]
-        found = pycolmap.estimate_calibrated_two_view_geometry(cameras[0], here, cameras[1], there, pairs, options)
-        motion = found.cam2_from_cam1
-        if len(found.inlier_matches) < _MATCHES or motion is None:
-            continue
+        pairs, motion = np.asarray(file.read_matches(one.image_id, other.image_id)), found.cam2_from_cam1
         rotation = np.array(motion.rotation.matrix())
         place = -rotation.T @ np.array(motion.translation)
         ahead = min(1.0, abs(place[2]) / length) if (length := np.linalg.norm(place)) else np.nan

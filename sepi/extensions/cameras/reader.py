@@ -65,7 +65,8 @@ def files_of(path: Path, options: ReadOptions) -> tuple[Sequence[Path], Sequence
     found = cameras_in(path)
     assert found is not None
     model = read_model(path, options.images, options.part)
-    return (*described_by(found), *model.files), [picture.file for picture in model.pictures]
+    described = sorted(path for path in found.iterdir() if path.stem in MODEL_FILES) if found.is_dir() else [found]
+    return (*described, *model.files), [picture.file for picture in model.pictures]
 
 
 FORMATS = {
@@ -179,11 +180,6 @@ def model_in(folder: Path) -> Path | None:
     return None
 
 
-def described_by(found: Path) -> tuple[Path, ...]:
-    """The files of the cameras that :func:`cameras_in` found."""
-    return tuple(sorted(path for path in found.iterdir() if path.stem in MODEL_FILES)) if found.is_dir() else (found,)
-
-
 def read_model(path: Path, images: str | None = None, crop_of: Part | None = None) -> CameraModel:
     """Calibrated cameras of any known format.
 
@@ -206,10 +202,8 @@ def read_model(path: Path, images: str | None = None, crop_of: Part | None = Non
 
     found = cameras_in(path)
     if found is None:
-        raise SepiError(
-            f"{path}: no calibrated cameras; expected a COLMAP model (cameras, images and points3D, .txt or .bin), "
-            f"{TRANSFORMS[0]}, or a table {', '.join(TABLES)}"
-        )
+        expected = f"a COLMAP model (with points3D), {TRANSFORMS[0]}, or a table {', '.join(TABLES)}"
+        raise SepiError(f"{path}: no calibrated cameras; expected {expected}")
     pictures = Pictures(found, None if images is None else Path(images).expanduser(), crop_of)
     read = files.read_transforms if found.suffix.lower() == ".json" else files.read_table
     model = (files.read_colmap if found.is_dir() else read)(found, pictures)

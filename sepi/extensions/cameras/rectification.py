@@ -1,7 +1,7 @@
 """Rectifies calibrated cameras to a light field: views of parallel cameras in one plane.
 
-The steps: the plane through the cameras and a grid for them (``plane``), the picture of the reference view, and the
-views themselves (``frame``).
+The steps are in ``frame``: the plane through the cameras and a grid for them, the picture of the reference view, and
+the views themselves.
 """
 
 from dataclasses import replace
@@ -11,9 +11,8 @@ import numpy as np
 from sepi.camera import Camera
 from sepi.camera.rig import Rig
 from sepi.errors import SepiError
-from sepi.extensions.cameras.frame import Seeing, completed, frame_of, rectified_view
+from sepi.extensions.cameras.frame import Plane, Seeing, completed, frame_of, grid_of, rectified_view
 from sepi.extensions.cameras.model import CameraModel
-from sepi.extensions.cameras.plane import Plane, grid_of
 from sepi.io.files import name_of
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.exposure import equally_bright
@@ -73,10 +72,9 @@ class Rectification:
             elif errors[worst] > _TOO_MUCH:
                 name, ahead = model.shots[worst].name, plane.places[worst, 2] / plane.step
                 if len(model.shots) <= _FEWEST:
-                    raise SepiError(
-                        f"{model.path}: the cameras do not stand in a plane: {name} is so far off that the disparity "
-                        f"error is {errors[worst]:.2g} pixels; expected at most {_TOO_MUCH:g}"
-                    )
+                    far = f"{name} is so far off that the disparity error is {errors[worst]:.2g} pixels"
+                    told = f"the cameras do not stand in a plane: {far}; expected at most {_TOO_MUCH:g}"
+                    raise SepiError(f"{model.path}: {told}")
                 where = f"{abs(ahead):.2g} steps {'before' if ahead > 0 else 'behind'} the others"
                 notes.append(f"left out, since it stands {where}: {name} (disparity error {errors[worst]:.2g} pixels)")
                 model = model.of([n for n in range(len(model.shots)) if n != worst])
@@ -105,10 +103,9 @@ def _of_points(model: CameraModel, plane: Plane) -> tuple[float, float] | None:
     low, high = (float(value) for value in np.quantile(1 / depth, (_BEYOND, 1 - _BEYOND)))
     moved = (high - low) * float(np.abs(plane.baselines).max()) * plane.step * max(shot.lens.focal)
     if len(depth) > 1 and moved < _NOTHING:
-        raise SepiError(
-            f"{model.path}: the cameras stand too close together for the scene: its points move by {moved:.2g} pixels "
-            "at most; expected a longer baseline (are positions and points in the same unit?)"
-        )
+        close = f"too close together for the scene: its points move by {moved:.2g} pixels at most"
+        expected = "expected a longer baseline (are positions and points in the same unit?)"
+        raise SepiError(f"{model.path}: the cameras stand {close}; {expected}")
     return low, high
 
 

@@ -7,24 +7,20 @@ from typing import Any
 
 from sepi.registry import Extension
 
-_COSTS_ALONE = {"occlusion": "none", "textureless": "none"}
+_ALONE = {"occlusion": "none", "textureless": "none"}
 
 METHODS: dict[str, dict[str, Any]] = {
-    "oavc": {"initial": "oavc", **_COSTS_ALONE, "optimize": {"choice": "guided_median", "radius": 7, "epsilon": 1e-5}},
-    "cae": {
-        "initial": "cae",
-        **_COSTS_ALONE,
-        "optimize": {"choice": "markov_field", "smoothness": 0.005, "truncation": 0.2},
-    },
+    "oavc": {"initial": "oavc", **_ALONE, "optimize": {"choice": "guided_median", "radius": 7, "epsilon": 1e-5}},
+    "cae": {"initial": "cae", **_ALONE, "optimize": {"choice": "markov_field", "smoothness": 0.005, "truncation": 0.2}},
     "pobr": {"initial": "pobr", "occlusion": "pobr", "textureless": "none", "optimize": "pobr"},
-    "spo": {"initial": "spo", **_COSTS_ALONE, "optimize": {"choice": "guided_costs", "radius": 9}},
-    "mishiba": {"initial": "mishiba", **_COSTS_ALONE, "optimize": "median_descent"},
-    "acc": {"initial": "acc", **_COSTS_ALONE, "optimize": "confident_labels"},
+    "spo": {"initial": "spo", **_ALONE, "optimize": {"choice": "guided_costs", "radius": 9}},
+    "mishiba": {"initial": "mishiba", **_ALONE, "optimize": "median_descent"},
+    "acc": {"initial": "acc", **_ALONE, "optimize": "confident_labels"},
     "occ": {"initial": "occ", "occlusion": "occ", "textureless": "none", "optimize": "occ"},
 }
 """Variant to its choices, in the format of :func:`sepi.variants.variant_from` and the order of the paper's tables."""
 
-LEARNED: dict[str, dict[str, Any]] = {"onnx": {"initial": "onnx", **_COSTS_ALONE, "optimize": "none"}}
+LEARNED: dict[str, dict[str, Any]] = {"onnx": {"initial": "onnx", **_ALONE, "optimize": "none"}}
 """Variants that need files which are not part of the package; reports include them only on request."""
 
 _MODULES = {

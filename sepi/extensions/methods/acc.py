@@ -152,9 +152,7 @@ def phase_shift_costs(
     return costs
 
 
-def truncated_difference(
-    moved: FloatMap, reference: FloatMap, across_share: float, parameters: AccParameters
-) -> FloatMap:
+def truncated_difference(moved: FloatMap, reference: FloatMap, share: float, parameters: AccParameters) -> FloatMap:
     """Truncated differences of a view's colours and gradients, (3, H or more, W or more), from (3, H, W); (H, W)."""
     height, width = reference.shape[1:]
     colour, across, down = np.zeros((3, height, width), np.float32)
@@ -164,8 +162,8 @@ def truncated_difference(
         # central differences without the division by 2
         across += np.abs(cv2.Sobel(residual, -1, 1, 0, ksize=1, borderType=cv2.BORDER_REPLICATE))
         down += np.abs(cv2.Sobel(residual, -1, 0, 1, ksize=1, borderType=cv2.BORDER_REPLICATE))
-    gradients = across_share * np.minimum(across / 6, parameters.gradient_truncation)
-    gradients += (1 - across_share) * np.minimum(down / 6, parameters.gradient_truncation)
+    gradients = share * np.minimum(across / 6, parameters.gradient_truncation)
+    gradients += (1 - share) * np.minimum(down / 6, parameters.gradient_truncation)
     colours = np.minimum(colour / 3, parameters.colour_truncation)
     return np.asarray(parameters.colour_share * colours + (1 - parameters.colour_share) * gradients, np.float32)
 

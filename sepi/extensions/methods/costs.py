@@ -28,11 +28,12 @@ from sepi.stage import Choice, CostVolume, Parameters, Progress, StageMaps, requ
 GREY = np.array([0.299, 0.587, 0.114], np.float32)
 """Weights of red, green and blue in the grey value (ITU-R BT.601)."""
 
+IntArray = npt.NDArray[np.int64]
 Previous = StageMaps | None
 """Maps of the stage before; None for the first stage."""
 
 
-def least_costs(volume: CostVolume) -> npt.NDArray[np.int64]:
+def least_costs(volume: CostVolume) -> IntArray:
     """Index of the candidate of least cost of each pixel.
 
     Parameters
@@ -56,7 +57,7 @@ def least_costs(volume: CostVolume) -> npt.NDArray[np.int64]:
     return np.asarray(np.argmin(volume.costs, axis=0))
 
 
-def disparity_of(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
+def disparity_of(volume: CostVolume, labels: IntArray) -> FloatMap:
     """Disparity of the chosen candidates, refined by the parabola through the costs of each and its two neighbours.
 
     Parameters
@@ -85,15 +86,11 @@ def disparity_of(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
     return between_candidates(volume.disparities, volume.costs, labels)
 
 
-def between_candidates(
-    disparities: FloatMap, costs: npt.NDArray[np.floating], labels: npt.NDArray[np.int64]
-) -> FloatMap:
+def between_candidates(disparities: FloatMap, costs: npt.NDArray[np.floating], labels: IntArray) -> FloatMap:
     """Disparity of the chosen candidates as of :func:`disparity_of`; costs (K, ...), infinite for rejected ones."""
     last = len(disparities) - 1
-    below, here, above = (
-        np.take_along_axis(costs, np.clip(labels + step, 0, last)[None], axis=0)[0].astype(np.float64)
-        for step in (-1, 0, 1)
-    )
+    numbers = (np.clip(labels + step, 0, last)[None] for step in (-1, 0, 1))
+    below, here, above = (np.take_along_axis(costs, number, axis=0)[0].astype(np.float64) for number in numbers)
     with np.errstate(invalid="ignore"):
         curvature, slope = below - 2 * here + above, below - above
     inner = (labels > 0) & (labels < last) & (here <= np.minimum(below, above))
@@ -102,7 +99,7 @@ def between_candidates(
     return np.asarray(disparities[labels] + (disparities[1] - disparities[0]) * offset, np.float32)
 
 
-def distinctness(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
+def distinctness(volume: CostVolume, labels: IntArray) -> FloatMap:
     """Confidence: how far the chosen candidates' costs are below the mean over all candidates.
 
     Parameters
@@ -337,9 +334,5 @@ def guided_median(
     return maps.updated(disparity, maps.confidence)
 
 
-CHOICES = {
-    "optimize": {
-        "guided_costs": Choice(GuidedCostsParameters, guided_costs),
-        "guided_median": Choice(GuidedMedianParameters, guided_median),
-    }
-}
+CHOICES = {"optimize": {"guided_costs": Choice(GuidedCostsParameters, guided_costs)}}
+CHOICES["optimize"]["guided_median"] = Choice(GuidedMedianParameters, guided_median)

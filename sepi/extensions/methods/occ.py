@@ -56,7 +56,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.extensions.methods.costs import Previous, between_candidates, disparity_of
+from sepi.extensions.methods.costs import IntArray, Previous, between_candidates, disparity_of
 from sepi.extensions.methods.markov_field import changes, labels_of_least_energy
 from sepi.image.edges import CannyParameters, canny_edges, edge_angle
 from sepi.kernels import occ as kernels
@@ -64,8 +64,6 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, require_previous
-
-IntArray = npt.NDArray[np.int64]
 
 SATURATION = 95
 """Percentile at which a cue saturates."""

@@ -23,13 +23,11 @@ References
 .. [2] Rogozhnikov: Einops: clear and reliable tensor manipulations with Einstein-like notation. ICLR 2022.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -41,9 +39,6 @@ from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.view_subsets import grid_steps
 from sepi.stage import Choice, Parameters, Progress, StageMaps
-
-if TYPE_CHECKING:
-    import onnxruntime
 
 VIEWS = ("all", "row", "column", "diagonal", "antidiagonal", "each")
 """Words for the views of an input."""
@@ -113,7 +108,7 @@ def onnx(light_field: LightField, previous: Previous, parameters: OnnxParameters
     return StageMaps(disparity, np.ones_like(disparity))
 
 
-def _session(parameters: OnnxParameters) -> onnxruntime.InferenceSession:
+def _session(parameters: OnnxParameters) -> Any:
     if parameters.model is None:
         raise SepiError("initial.onnx.model: not given; expected the path of an ONNX file (docs/reproduce/compared.md)")
     if not Path(parameters.model).is_file():
@@ -146,10 +141,8 @@ def _chosen_views(light_field: LightField, parameters: OnnxParameters) -> tuple[
     t, s = light_field.reference_position
     top, left = (t - rows // 2, s - columns // 2) if parameters.grid else (0, 0)
     if min(top, left) < 0 or top + rows > light_field.grid[0] or left + columns > light_field.grid[1]:
-        raise SepiError(
-            f"{light_field.name}: the network takes {rows}x{columns} views round view {t},{s}, but the light field has "
-            f"{light_field.grid[0]}x{light_field.grid[1]}"
-        )
+        held = f"{light_field.grid[0]}x{light_field.grid[1]}"
+        raise SepiError(f"{light_field.name}: {held} views; the network takes {rows}x{columns} round view {t},{s}")
     part = np.s_[top : top + rows, left : left + columns]
     if not light_field.present[part].all():
         raise SepiError(f"{light_field.name}: the network needs all views of its grid, but some are missing")
@@ -176,35 +169,26 @@ def _spans(length: int, parameters: OnnxParameters) -> Iterator[tuple[npt.NDArra
         yield window, np.s_[overlap : overlap + end - begin], np.s_[begin:end]
 
 
-def _run(
-    session: onnxruntime.InferenceSession, given: list[FloatMap], shape: tuple[int, int], parameters: OnnxParameters
-) -> FloatMap:
+def _run(session: Any, given: list[FloatMap], shape: tuple[int, int], parameters: OnnxParameters) -> FloatMap:
     """The network's output for a window of the views; its shape is checked."""
     wanted = session.get_inputs()
     if len(given) != len(wanted):
-        raise SepiError(
-            f"{parameters.model}: has {len(wanted)} inputs ({', '.join(one.name for one in wanted)}), but "
-            f"initial.onnx.inputs describes {len(given)}"
-        )
+        raise SepiError(f"{parameters.model}: has {len(wanted)} inputs but initial.onnx.inputs describes {len(given)}")
     kinds = {"tensor(float16)": np.float16, "tensor(double)": np.float64}
-    named = {
-        one.name: np.ascontiguousarray(array, kinds.get(one.type, np.float32))
-        for one, array in zip(wanted, given, strict=True)
-    }
+    named = {}
+    for one, array in zip(wanted, given, strict=True):
+        named[one.name] = np.ascontiguousarray(array, kinds.get(one.type, np.float32))
     name = parameters.output or session.get_outputs()[0].name
     try:
         found = np.asarray(session.run([name], named)[0], np.float32)
     except Exception as error:
         shapes = ", ".join(f"{key} {array.shape}" for key, array in named.items())
         raise SepiError(f"{parameters.model}: the network does not take {shapes} ({error})") from error
-    size = tuple(length - 2 * parameters.margin for length in shape)
-    squeezed = tuple(n for n in found.shape if n != 1)
-    if squeezed != tuple(n for n in size if n != 1):
-        raise SepiError(
-            f"{parameters.model}: output '{name}' of shape {found.shape} for views of {shape[0]}x{shape[1]} "
-            f"pixels; expected {size[0]}x{size[1]} (initial.onnx.margin is {parameters.margin})"
-        )
-    return found.reshape(size)
+    height, width = (length - 2 * parameters.margin for length in shape)
+    if [n for n in found.shape if n != 1] != [n for n in (height, width) if n != 1]:
+        where = f"{parameters.model}: output '{name}' of shape {found.shape}"
+        raise SepiError(f"{where}; expected {height}x{width} (initial.onnx.margin is {parameters.margin})")
+    return found.reshape(height, width)
 
 
 def _arrays(views: FloatMap, reference: tuple[int, int], inputs: tuple[str, ...]) -> list[FloatMap]:

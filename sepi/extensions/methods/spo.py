@@ -67,9 +67,7 @@ class SpoParameters(CandidateParameters):
     num_disparities: int | None = number_field(rule, "docs/reproduce/compared.md")
     scale: float = Field(0.8, ge=0.35, le=10, description="sigma of a line's sides, derivatives of Gaussians; pixels")
     bins: int = Field(64, ge=2, le=256, description="bins of a histogram, for each channel")
-    peak: float = Field(
-        0.26, ge=0.05, le=10, description="mean by largest distance at which a direction's weight falls"
-    )
+    peak: float = Field(0.26, ge=0.05, le=10, description="mean by largest distance where a direction's weight falls")
 
 
 def spo(light_field: LightField, previous: Previous, parameters: SpoParameters, progress: Progress) -> StageMaps:

@@ -31,14 +31,8 @@ class Dataset(ADataset):
     size: int = Field(512, ge=64, le=2048, description="height and width of a view in pixels")
     views: int = Field(9, ge=3, le=17, description="rows and columns of views")
     samples: int = Field(64, ge=1, le=4096, description="traced paths per pixel; fewer are faster but noisier")
-    noise: list[str] = Field(
-        list(NOISE_LEVELS),
-        min_length=1,
-        description="camera noise levels; each gives one light field per scene",
-    )
-    seeds: int = Field(
-        1, ge=1, le=99, description="light fields per scene and noise level; from 2 on, tables show how scores vary"
-    )
+    noise: list[str] = Field(list(NOISE_LEVELS), min_length=1, description="levels of noise, a light field each")
+    seeds: int = Field(1, ge=1, le=99, description="light fields per scene and level; 2 or more show how scores vary")
     variants: list[str] | Literal["all"] | None = Field(
         None,
         description="variants to run in addition to 'paper'; null: 'best', 'fast', your own and the compared methods; "

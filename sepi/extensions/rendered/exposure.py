@@ -29,18 +29,12 @@ READ = 4.0
 class Exposure(CheckedModel):
     """Options of the sensor."""
 
-    noise: NoiseLevel = Field(
-        "off", description="photons and reading of a sensor that holds 2,000 (low) or 250 (high) electrons at white"
-    )
+    noise: NoiseLevel = Field("off", description="of a sensor that holds 2,000 (low) or 250 (high) electrons at white")
     noise_seed: int = Field(1, ge=1, lt=2**31, description="of the noise, and of what differs from view to view")
     vignetting: float = Field(0.0, ge=0, le=1, description="part of the light that the corners lack")
-    exposure_spread: Share = Field(
-        0.0, description="standard deviation of the exposures of views but the reference view, in stops"
-    )
+    exposure_spread: Share = Field(0.0, description="standard deviation of the exposures of the other views, in stops")
     bits: Literal[8, 16] = Field(8, description="of each value")
-    gamma: Positive | None = Field(
-        None, description="exponent of the curve from light to values is 1 / gamma; 1: linear; null: sRGB"
-    )
+    gamma: Positive | None = Field(None, description="values are light to the power 1 / gamma; 1: linear; null: sRGB")
 
 
 def read_scene(path: Path, noise: str = "off", seed: int = 1) -> LightField:

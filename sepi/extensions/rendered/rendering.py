@@ -24,7 +24,7 @@ from sepi.extensions.rendered.world import FloatArray, Rig, Share, World
 from sepi.io.files import atomic_path, write_whole
 from sepi.io.provenance import package_version
 from sepi.process.threads import threads_used, use_threads
-from sepi.stage import no_progress
+from sepi.stage import Progress, no_progress
 from sepi.validation.models import CheckedModel, Positive
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -38,15 +38,9 @@ class RenderOptions(CheckedModel):
     grid: tuple[_Rows, _Rows] = Field((9, 9), description="rows and columns of views")
     samples: int = Field(64, ge=1, le=65536, description="paths of light for each pixel; few leave their own noise")
     baseline: Positive = Field(1.0, description="distance of views, and so disparity, as part of the scene's own")
-    lens: Share = Field(
-        0.0, description="radius of the lens in view steps; 0: a pinhole. Disparity d is a disc 2 lens |d| pixels wide"
-    )
-    position_error: Share = Field(
-        0.0, description="standard deviation of where views but the reference view stand, in view steps"
-    )
-    rotation_error: Share = Field(
-        0.0, description="standard deviation of how they are turned about each axis, in degrees"
-    )
+    lens: Share = Field(0.0, description="radius of the lens in view steps; disparity d is 2 lens |d| pixels wide")
+    position_error: Share = Field(0.0, description="standard deviation of the other views' positions, in view steps")
+    rotation_error: Share = Field(0.0, description="standard deviation of their turns about each axis, in degrees")
     seed: int = Field(0, ge=0, lt=2**31, description="of the light's paths and of these errors")
 
     @property
@@ -60,9 +54,7 @@ def made_by(name: str, options: RenderOptions) -> dict[str, Any]:
     return {"scene": name, "version": package_version(), **options.model_dump(mode="json")}
 
 
-def render_world(
-    name: str, world: World, options: RenderOptions, path: Path, progress: Callable[[float], None] = no_progress
-) -> None:
+def render_world(name: str, world: World, options: RenderOptions, path: Path, progress: Progress = no_progress) -> None:
     """Render a world into a file.
 
     Parameters
@@ -130,13 +122,10 @@ def _looked_at(tracer: Tracer, options: RenderOptions, number: int) -> tuple[Arr
     seen = tracer.surfaces.first(at)
     disparity = tracer.rig.disparity(seen.depth).astype(np.float32)
     straight = tracer.surfaces.first(tracer.position(down, across)) if any(turn) else seen
-    truth: Arrays = {
-        "disparity": disparity,
-        "normal": seen.normal.astype(np.float16),
-        "masks": surface_bits(tracer.world.things, seen, disparity),
-        # occlusion masks need a view without a turn
-        "upright": tracer.rig.disparity(straight.depth).astype(np.float32),
-    }
+    truth: Arrays = {"disparity": disparity, "normal": seen.normal.astype(np.float16)}
+    truth["masks"] = surface_bits(tracer.world.things, seen, disparity)
+    # occlusion masks need a view without a turn
+    truth["upright"] = tracer.rig.disparity(straight.depth).astype(np.float32)
     if not options.shares_light:
         return truth, partial(tracer.picture, at, seed, options.samples)
     passes, albedo, whole = planned(tracer, at, seen, options.samples, seed)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from sepi.extensions.rendered.world import FloatArray, Material, Mesh, Pattern, Thing, Vector
 
@@ -219,14 +220,7 @@ def moved(parts: Parts, turn: Vector = (0, 0, 0), by: Vector = (0, 0, 0)) -> Mes
 
 def rotation(turn: Vector) -> Points:
     """Rotation matrix about the x, then y, then z axis by angles in radians, shape (3, 3)."""
-    found = np.eye(3)
-    for axis, angle in enumerate(turn):
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        step = np.eye(3)
-        step[i, i] = step[j, j] = np.cos(angle)
-        step[i, j], step[j, i] = -np.sin(angle), np.sin(angle)
-        found = step @ found
-    return found
+    return np.asarray(Rotation.from_euler("xyz", turn).as_matrix())
 
 
 def joined(meshes: Parts) -> Mesh:

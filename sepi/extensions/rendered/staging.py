@@ -32,10 +32,7 @@ def seen_from(world: World, eye: Vector, below: float = 0.0, rightwards: float =
         vertices = (mesh.vertices.astype(np.float64) - np.array(eye)) @ axes.T
         return mesh._replace(vertices=vertices.astype(np.float32))
 
-    lamps = [
-        Lamp(axes @ np.subtract(lamp.corner, eye), axes @ lamp.across, axes @ lamp.down, lamp.radiance)
-        for lamp in world.light.lamps
-    ]
+    lamps = [Lamp(axes @ np.subtract(at, eye), axes @ x, axes @ y, glow) for at, x, y, glow in world.light.lamps]
     suns = [sun._replace(direction=axes @ sun.direction) for sun in world.light.suns]
     things = [one._replace(mesh=turned(one.mesh)) for one in world.things]
     return world._replace(things=things, light=world.light._replace(lamps=lamps, suns=suns))

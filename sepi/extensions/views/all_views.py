@@ -21,13 +21,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.errors import SepiError
 from sepi.kernels import all_views as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.matching.carried_map import TOLERANCE, corner_disparities
 from sepi.pipeline import estimate_depth
 from sepi.stage import Progress, StageMaps, no_progress
-from sepi.validation import require_type
+from sepi.validation import require_map, require_type
 from sepi.variants import Variant
 from sepi.variants.built_in import DEFAULT_VARIANT
 
@@ -190,10 +189,8 @@ def maps_of_all_views(
     maps : dict of str to ndarray, shape (H, W)
         Its :data:`ViewMaps`.
     """
-    if maps is not None and maps.disparity.shape != light_field.shape:
-        raise SepiError(
-            f"{light_field.name}: maps must have the views' shape {light_field.shape}, got {maps.disparity.shape}"
-        )
+    if maps is not None:
+        require_map(f"{light_field.name}: maps", maps.disparity, light_field.shape)
     if light_field.disparity_range is None:
         from sepi.inspection.disparity_range import estimate_range
 
@@ -254,12 +251,10 @@ def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sour
         # distances of the bounds hold in other views, too; an unknown disparity may lie beyond both
         below, above = np.maximum(maps.disparity - maps.low, 0), np.maximum(maps.high - maps.disparity, 0)
         told.append(np.stack([maps.confidence, maps.sigma, below, above], axis=2))
-    return Sources(
-        np.stack([maps.disparity for maps in found], dtype=np.float32),
-        np.stack(told, dtype=np.float32),
-        np.stack([corner_disparities(maps.disparity) for maps in found], dtype=np.float32),
-        baselines,
-    )
+    disparities = [maps.disparity for maps in found]
+    parts = disparities, told, list(map(corner_disparities, disparities))
+    disparity, of_all, corners = (np.stack(part, dtype=np.float32) for part in parts)
+    return Sources(disparity, of_all, corners, baselines)
 
 
 def _fused(

@@ -34,7 +34,7 @@ ANIMATION = "focus.webp"
 """Endless animation of the focal stack from the nearest to the farthest image and back."""
 
 # of an image of the animation
-_MILLISECONDS = 120
+_PAUSE = 120
 _QUALITY = 85
 
 _MADE = re.compile(rf"focus_\d+\.png|{re.escape(ALL_IN_FOCUS)}|{re.escape(ANIMATION)}")
@@ -109,9 +109,7 @@ def _write_animation(path: Path, frames: Sequence[npt.NDArray[Any]]) -> None:
         raise SepiError(f"{path}: the installed Pillow has no WebP, which animations need")
     first, *more = (Image.fromarray(frame).convert("RGB") for frame in [*frames, *frames[-2:0:-1]])
     with atomic_path(path) as temporary:
-        first.save(
-            temporary, "WEBP", save_all=True, append_images=more, duration=_MILLISECONDS, loop=0, quality=_QUALITY
-        )
+        first.save(temporary, "WEBP", save_all=True, append_images=more, duration=_PAUSE, loop=0, quality=_QUALITY)
 
 
 def _earlier_files(index: Path) -> list[str]:
@@ -133,18 +131,10 @@ _STEPS = 9
 @click.argument("result_path", metavar="[RESULT]", type=PATH, required=False)
 @click.option("-o", "--output", type=PATH, help="Folder to write; default: NAME-refocused for an INPUT called NAME.")
 @click.option(
-    "--steps",
-    type=click.IntRange(1, 999),
-    metavar="N",
-    help=f"Pictures from the nearest to the farthest surface; default: {_STEPS} without --disparity and --at.",
+    "--steps", type=click.IntRange(1, 999), metavar="N", help=f"Pictures from near to far; default if alone: {_STEPS}."
 )
 @click.option(
-    "--disparity",
-    "disparities",
-    type=float,
-    multiple=True,
-    metavar="D",
-    help="Focus at this disparity, pixels per view step; repeatable.",
+    "--disparity", "disparities", type=float, multiple=True, metavar="D", help="Focus at this disparity; repeatable."
 )
 @click.option(
     "--at",
@@ -156,10 +146,7 @@ _STEPS = 9
     help="Focus on the surface at pixel X, Y, from 0 at the top left; repeatable; needs RESULT.",
 )
 @click.option(
-    "--aperture",
-    type=float,
-    metavar="R",
-    help="Radius of the aperture in view steps; a smaller one has more in focus. Default: all views.",
+    "--aperture", type=float, metavar="R", help="Radius in view steps; a smaller one has more in focus. Default: all."
 )
 @click.option("--animation", is_flag=True, help="Also write the stack as an animation, focus.webp.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
@@ -262,9 +249,8 @@ def _read_result(
     view = reading.options.view
     disparity = read_disparity_at(path, view)
     if disparity.shape != light_field.shape:
-        raise SepiError(
-            f"{path}: is {disparity.shape}, but the views of {light_field_path} are {light_field.shape} (height, width)"
-        )
+        views = f"the views of {light_field_path} are {light_field.shape} (height, width)"
+        raise SepiError(f"{path}: is {disparity.shape}, but {views}")
     if read_origin_at(path, view) is None:
         return disparity, disparity, None
     result = read_result(path, view)

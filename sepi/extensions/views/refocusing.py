@@ -96,9 +96,8 @@ def refocus(
     """
     require_light_field(light_field)
     if not is_finite(disparity):
-        raise SepiError(
-            f"{light_field.name}: disparity to focus at must be a finite number, got {described(disparity)}"
-        )
+        told = described(disparity)
+        raise SepiError(f"{light_field.name}: disparity to focus at must be a finite number, got {told}")
     surfaces = None if maps is None else _surfaces(_disparity_of(light_field, maps))
     height, width = light_field.shape
     moved = disparity * light_field.baselines
@@ -106,16 +105,16 @@ def refocus(
     held = (np.abs(moved) <= (height - 1, width - 1)).all(axis=2)
     chosen = views_within(light_field, aperture) & held
     sums, counts = np.zeros((3, height, width), np.float32), np.zeros((height, width), np.float32)
-    for t, one_row in enumerate(_rows(chosen)):
-        if one_row.any():
-            views = ShearedViews(light_field, one_row).at(disparity)
-            if surfaces is not None:
-                views = _filled_between(light_field, one_row, views, surfaces, disparity)
-            for place, sheared in zip(np.argwhere(one_row).tolist(), views, strict=True):
-                shown = _shown(light_field, tuple(place), moved[tuple(place)])
-                sums += sheared * shown
-                counts += shown
-        progress((t + 1) / light_field.grid[0])
+    rows = _rows(chosen)
+    for number, row in enumerate(rows, 1):
+        views = ShearedViews(light_field, row).at(disparity)
+        if surfaces is not None:
+            views = _filled(light_field, row, views, surfaces, disparity)
+        for place, sheared in zip(np.argwhere(row).tolist(), views, strict=True):
+            shown = _shown(light_field, tuple(place), moved[tuple(place)])
+            sums += sheared * shown
+            counts += shown
+        progress(number / len(rows))
     picture = np.clip(sums / counts, 0, 1).transpose(1, 2, 0)
     return np.ascontiguousarray(picture[..., : light_field.views.shape[4]])
 
@@ -183,27 +182,25 @@ def all_in_focus(
     channels = reference.shape[2]
     noise = 2 * channels * noise_level(light_field.reference_view) ** 2
     scale2 = np.float32(COLOUR_SCALE**2 * channels / 3 + noise)
-    centre = reference
+    centre, rows = reference, _rows(others)
     for number in range(ROUNDS):
         sums = reference - centre
         weights = np.square(scale2 / (scale2 + np.square(sums).sum(axis=2)))
         sums *= weights[..., None]
-        for t, row in enumerate(_rows(others)):
-            if not row.any():
-                continue
+        for done, row in enumerate(rows, 1):
             found = nearest_surfaces(light_field, surfaces, row, Rows(0, light_field.shape[0]))
-            for s, nearest in zip(np.flatnonzero(row[t]), found, strict=True):
+            for (t, s), nearest in zip(np.argwhere(row).tolist(), found, strict=True):
                 view, margin = as_unit_float(light_field.views[t, s]), occlusion_margin
                 v, u = light_field.baselines[t, s]
                 kernels.add_view(view, v, u, disparity, nearest, margin, centre, float(scale2), sums, weights)
-            progress((number + (t + 1) / light_field.grid[0]) / ROUNDS)
+            progress((number + done / len(rows)) / ROUNDS)
         centre = centre + sums / weights[..., None]
     return np.clip(centre, 0, 1)
 
 
 def _rows(views: BoolMap) -> list[BoolMap]:
-    """Masks (T, S) of the views of each row of the grid, since all views at a time take much memory."""
-    return list(views & np.eye(len(views), dtype=bool)[:, :, None])
+    """Masks (T, S) of the views of each row of the grid with any, since all views at a time take much memory."""
+    return [row for row in views & np.eye(len(views), dtype=bool)[:, :, None] if row.any()]
 
 
 def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
@@ -223,10 +220,8 @@ def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
     chosen = light_field.present & (distance <= aperture)
     if chosen.sum() < 2:
         others = without_reference(light_field, light_field.present)
-        raise SepiError(
-            f"{light_field.name}: an aperture of {aperture:g} view steps has no view but the reference view; the "
-            f"nearest other is {distance[others].min():g} away"
-        )
+        alone = f"an aperture of {aperture:g} view steps has no view but the reference view"
+        raise SepiError(f"{light_field.name}: {alone}; the nearest other is {distance[others].min():g} away")
     return np.asarray(chosen, bool)
 
 
@@ -288,17 +283,13 @@ def _cell(light_field: LightField) -> FloatMap:
     return np.array(found, np.float32)
 
 
-def _filled_between(
-    light_field: LightField, chosen: BoolMap, views: FloatMap, surfaces: FloatMap, focus: float
-) -> FloatMap:
+def _filled(light_field: LightField, chosen: BoolMap, views: FloatMap, surfaces: FloatMap, focus: float) -> FloatMap:
     """Sheared views ``(N, 3, H, W)`` of one row of the grid, each with the views round it."""
-    baselines, cell = light_field.baselines, _cell(light_field)
-    (t,) = np.flatnonzero(chosen.any(axis=1)).tolist()
-    nearest = z_buffers(surfaces, baselines[chosen], 0, len(surfaces))
+    baselines, cell = light_field.baselines[chosen], _cell(light_field)
+    nearest = z_buffers(surfaces, baselines, 0, len(surfaces))
     filled = np.empty_like(views)
-    for n, s in enumerate(np.flatnonzero(chosen[t]).tolist()):
-        seen = _without_holes(nearest[n], focus)
-        here = _sheared(seen, focus * baselines[t, s])
+    for n, baseline in enumerate(baselines):
+        here = _sheared(_without_holes(nearest[n], focus), focus * baseline)
         kernels.fill_between(views[n], here, focus, cell, OCCLUSION_MARGIN, filled[n])
     return filled
 

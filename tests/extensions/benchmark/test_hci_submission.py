@@ -221,7 +221,7 @@ def test_what_the_benchmark_would_refuse_is_not_packed(tmp_path: Path) -> None:
         (side,): "side: depth of another view",
         (good_one, small): "small/cotton: scene cotton is given twice",
         (good_one, "--runtime", "dots=3"): "--runtime dots: no result of this scene",
-        (good_one, "--runtime", "cotton=-1"): "--runtime cotton=-1: expected SCENE=SECONDS",
+        (good_one, "--runtime", "cotton=-1"): "--runtime cotton=-1: expected the run time in seconds",
         (tmp_path / "gone",): "gone: no such folder",
     }
     for words, expected in cases.items():

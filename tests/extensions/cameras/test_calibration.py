@@ -15,8 +15,8 @@ from sepi.camera import Camera
 from sepi.camera.rig import Lens, Shot
 from sepi.errors import SepiError
 from sepi.extensions.cameras.calibration import calibrate, pairs_of, pictures_in
+from sepi.extensions.cameras.frame import Plane
 from sepi.extensions.cameras.model import CameraModel, Picture
-from sepi.extensions.cameras.plane import Plane
 from sepi.extensions.cameras.reader import read_model
 from sepi.scenes import render_shot
 

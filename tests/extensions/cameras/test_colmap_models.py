@@ -128,7 +128,7 @@ def _of_unknown_lenses(folder: Path) -> None:
         (_in_kilometres, r"move by 0\.0\d+ pixels .*unit"),
         (_without_pictures, r"no picture '1\.png' in .*--images"),
         (_damaged, "not a COLMAP model, or damaged"),
-        (_of_unknown_lenses, "camera model FOV; expected one of"),
+        (_of_unknown_lenses, "camera model: unknown 'FOV'"),
     ],
 )
 def test_bad_models_are_refused_in_one_line(tmp_path: Path, spoil: Callable[[Path], None], expected: str) -> None:

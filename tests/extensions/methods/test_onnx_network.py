@@ -116,7 +116,7 @@ def test_the_views_round_the_reference_view_are_taken(tmp_path: Path) -> None:
     [
         ({"inputs": ("all: 1 (t s) y x",)}, r"'all: 1 \(t s\) y x' does not fit views with .*'c': 3"),
         ({"inputs": ("all: 1 (t s c) y x", "row: 1 (s c) y x")}, "has 1 inputs .*describes 2"),
-        ({"grid": (5, 5)}, "takes 5x5 views round view 1,1, .*3x3"),
+        ({"grid": (5, 5)}, "3x3 views; .* takes 5x5 round view 1,1"),
         ({"margin": 1}, r"output 'out' of shape \(1, 1, 66, 66\).*expected 64x64 .*margin is 1"),
         ({"inputs": ("row: 1 (s c) y x",)}, r"does not take views \(1, 9, 64, 64\)"),
         ({"output": "depth"}, "does not take views"),

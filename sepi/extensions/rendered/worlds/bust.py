@@ -7,9 +7,9 @@ into each other, as a sculptor adds clay and takes it away. There ``y`` is up an
 import numpy as np
 from skimage import measure
 
-from sepi.extensions.rendered import patterns, shapes
-from sepi.extensions.rendered.patterns import noise
-from sepi.extensions.rendered.shapes import Points, box, moved, raster, thing
+from sepi.extensions.rendered import shapes
+from sepi.extensions.rendered.patterns import field, noise, painted, stone
+from sepi.extensions.rendered.shapes import Points, box, moved, raster, sheet, thing, turned_body
 from sepi.extensions.rendered.staging import fruit, profile, vessel
 from sepi.extensions.rendered.world import Cameras, Lamp, Light, Material, Mesh, Pattern, Things, Vector, World
 
@@ -24,12 +24,12 @@ def world() -> World:
 
 
 def _things() -> Things:
-    marble = Material(patterns.stone(3, 0.5, (0.86, 0.84, 0.8), (0.75, 0.73, 0.71)))
+    marble = Material(stone(3, 0.5, (0.86, 0.84, 0.8), (0.75, 0.73, 0.71)))
     limestone = Material(noise(11, (0.66, 0.62, 0.55), 0.07, 0.5, (3, 256)))
     glaze = Material(noise(41, (0.2, 0.42, 0.4), 0.05, 0.4, (4, 500)), "glossy", 0.08)
     flesh = Material(noise(51, (0.72, 0.26, 0.14), 0.05, 0.12, (3, 256)))
     yield thing(moved(_bust(), (0, 0.5, 0), (0.03, TABLE - 0.59, 1.62)), marble)
-    yield thing(shapes.turned_body(profile(_FOOT), (0.03, TABLE - 0.06, 1.62)), marble)
+    yield thing(turned_body(profile(_FOOT), (0.03, TABLE - 0.06, 1.62)), marble)
     yield thing(box((0.03, TABLE - 0.03, 1.62), (0.26, 0.06, 0.26), (0, 0.12, 0)), limestone)
     yield thing(box((0, TABLE + 0.06, 2.05), (3.6, 0.12, 1.8)), limestone)
     yield thing(_wall(0.48, -0.12), noise(21, (0.78, 0.72, 0.6), 0.022, 1.6, (4, 300)))
@@ -59,7 +59,7 @@ def _wall(radius: float, spring: float) -> Mesh:
     inner = _arch(radius, spring)
     out = inner - [0, TABLE]
     flat = np.stack([inner, [0, TABLE] + 2.5 * out / np.abs(out).max(1, keepdims=True)])
-    mesh = shapes.sheet(np.concatenate([flat, np.full((*flat.shape[:2], 1), WALL)], -1), smooth=False)
+    mesh = sheet(np.concatenate([flat, np.full((*flat.shape[:2], 1), WALL)], -1), smooth=False)
     return mesh._replace(uv=mesh.vertices[:, :2])
 
 
@@ -73,7 +73,7 @@ def _niche(radius: float, spring: float) -> Mesh:
     wall = raster(x, low, WALL + radius * np.sin(turn))
     rise = np.linspace(0, np.pi / 2, 40)[None, :]
     dome = [x * np.cos(rise), spring - radius * np.sin(rise) + 0 * x, WALL + radius * np.sin(turn) * np.cos(rise)]
-    return shapes.joined([shapes.sheet(wall), shapes.sheet(raster(*dome))])
+    return shapes.joined([sheet(wall), sheet(raster(*dome))])
 
 
 def _amphora(foot: Vector) -> Mesh:
@@ -108,9 +108,9 @@ def _amphora_paint() -> Pattern:
     band = (y * 24).astype(int)
     kinds = [np.isin(band, (5, 14)), np.isin(band, (4, 6, 13, 15)), np.isin(band, (9, 18, 19)), band % 4 == 0]
     black = np.select(kinds, [key, 0 * y, tongue, 1 + 0 * y], 0)
-    worn = 1 + 0.06 * patterns.field(71, 3, 120)
+    worn = 1 + 0.06 * field(71, 3, 120)
     colour = np.where(black[..., None] > 0, [0.17, 0.13, 0.12], [0.74, 0.42, 0.24]) * worn[..., None]
-    return patterns.painted(colour, 0.6)
+    return painted(colour, 0.6)
 
 
 def _bust(finest: float = 0.002) -> Mesh:

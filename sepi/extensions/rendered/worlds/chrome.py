@@ -75,12 +75,10 @@ def _porthole(centre: Vector) -> Things:
 
 def _books(foot: Vector, seed: int, heights: list[float]) -> Things:
     """A pile that lies on the table."""
-    rng, y = np.random.default_rng(seed), foot[1]
+    rng, (x, y, z) = np.random.default_rng(seed), foot
     for number, height in enumerate(heights):
         colour = patterns.noise(seed + 4 * number, rng.uniform(0.15, 0.5, 3), 0.04, 0.15, (3, 256))
-        yield thing(
-            box((foot[0], y - height / 2, foot[2]), (0.2, height, 0.14), (0, rng.uniform(-0.4, 0.4), 0)), colour
-        )
+        yield thing(box((x, y - height / 2, z), (0.2, height, 0.14), (0, rng.uniform(-0.4, 0.4), 0)), colour)
         y -= height
 
 
@@ -108,9 +106,8 @@ def _wallpaper() -> Pattern:
     y, x = np.mgrid[:1024, :1024] * (4 * np.pi / 1024)
     lattice = np.cos(x) + np.cos(y)
     flower = np.abs(lattice) > 1.25 + 0.4 * np.cos(6 * np.arctan2(np.sin(y), np.sin(x)))
-    share = (
-        0.8 * flower + 0.6 * (np.abs(lattice) < 0.12) + 0.15 * (np.cos(8 * x) > 0) + 0.06 * patterns.field(51, 3, 60)
-    )
+    share = 0.8 * flower + 0.6 * (np.abs(lattice) < 0.12) + 0.15 * (np.cos(8 * x) > 0)
+    share += 0.06 * patterns.field(51, 3, 60)
     colour = np.array([0.37, 0.49, 0.43]) + share[..., None] * np.array([0.3, 0.22, 0.14])
     return patterns.painted(colour, 0.5, 0.7)
 

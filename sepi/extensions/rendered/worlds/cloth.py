@@ -6,8 +6,7 @@ hem, the table's falls from the rim in flutes that deepen.
 
 import numpy as np
 
-from sepi.extensions.rendered import patterns
-from sepi.extensions.rendered.patterns import linen, noise, plaid
+from sepi.extensions.rendered.patterns import field, linen, noise, plaid, weave, wood
 from sepi.extensions.rendered.shapes import Points, ground, moved, raster, rectangle, sheet, thing, tube, wall
 from sepi.extensions.rendered.world import Cameras, Lamp, Light, Mesh, Things, Vector, World
 
@@ -25,12 +24,12 @@ def _things() -> Things:
     rug = rectangle((-0.95, FLOOR - 0.012, 1.6), (2.0, 0, 0.1), (-0.07, 0, 1.35))
     yield thing(_curtain(), linen(1, 1.0, (0.56, 0.63, 0.68), 0.05))
     yield thing(wall((-3, -2.5, 3.55), 6, 4), (0.8, 0.78, 0.72))
-    yield thing(ground((-3, FLOOR, 0.5), 6, 3.2), patterns.wood(41, 1.1, (0.56, 0.42, 0.29), (0.38, 0.26, 0.17)))
-    yield thing(rug, patterns.weave(61, 0.9, (0.5, 0.42, 0.4), 0.14))
+    yield thing(ground((-3, FLOOR, 0.5), 6, 3.2), wood(41, 1.1, (0.56, 0.42, 0.29), (0.38, 0.26, 0.17)))
+    yield thing(rug, weave(61, 0.9, (0.5, 0.42, 0.4), 0.14))
     yield thing(_table_cloth((0.16, TABLE, 2.6), 0.46), plaid(11, 0.9, (0.84, 0.8, 0.7), (0.72, 0.6, 0.5), 5, 0.35))
     yield thing(_tied((0.83, 0.4, 1.98)), noise(31, (0.55, 0.2, 0.17), 0.022, 0.7, (4, 80)))
     yield thing(_blanket((-0.72, -0.1, 2.45)), plaid(21, 0.8, (0.55, 0.5, 0.34), (0.3, 0.36, 0.3), 4, 0.8))
-    yield thing(_rack((-0.72, -0.1, 2.45)), patterns.wood(51, 0.4))
+    yield thing(_rack((-0.72, -0.1, 2.45)), wood(51, 0.4))
     for n, colour in enumerate([(0.86, 0.84, 0.8), (0.62, 0.68, 0.6), (0.78, 0.66, 0.56), (0.86, 0.85, 0.83)]):
         folded = _folded((0.32 + 0.008 * (n % 2), TABLE - 0.032 - 0.06 * n, 2.58), n)
         yield thing(folded, linen(70 + 3 * n, 0.6, colour))
@@ -117,9 +116,9 @@ def _folded(centre: Vector, number: int) -> Mesh:
 
 def _crumpled(centre: Vector) -> Mesh:
     """A napkin that was let fall: ridges between hollows."""
-    relief = np.abs(patterns.field(101, 20, 90, 128)) + 0.35 * np.abs(patterns.field(102, 9, 40, 128))
+    relief = np.abs(field(101, 20, 90, 128)) + 0.35 * np.abs(field(102, 9, 40, 128))
     v, u = np.mgrid[-1:1:128j, -1:1:128j]
-    round_ = np.hypot(u + 0.12 * patterns.field(103, 40, 120, 128), v + 0.12 * patterns.field(104, 40, 120, 128))
+    round_ = np.hypot(u + 0.12 * field(103, 40, 120, 128), v + 0.12 * field(104, 40, 120, 128))
     height = 0.075 * np.clip(1.15 - round_, 0, 1) * (0.6 + 0.5 * (1.3 - relief))
     points = np.stack([0.17 * u + 0.01 * relief, -np.maximum(height, 0), 0.13 * v], -1)
     return moved(sheet(points), (0, 0.4, 0), centre)

@@ -62,11 +62,7 @@ def _wires() -> Things:
     poles = [(-6.4, 12.4), (2.6, 14.0), (11.6, 15.6)]
     yield thing([rod((x, 0, z), (x, -8.4, z), 0.09) for x, z in poles], noise(31, (0.4, 0.32, 0.25), 0.05, 2.0))
     ends = [((-20, 10.0), poles[0]), (poles[0], poles[1]), (poles[1], poles[2]), ((-13.0, 24.0), (15.0, 27.0))]
-    cables = [
-        strand([(a, -high, b), (c, -high, d)], 0.4, 0.002 * high)
-        for (a, b), (c, d) in ends
-        for high in (8.3, 7.9, 7.4, 5.8)
-    ]
+    cables = [strand([(a, -y, b), (c, -y, d)], 0.4, 0.002 * y) for (a, b), (c, d) in ends for y in (8.3, 7.9, 7.4, 5.8)]
     for x, z, wide, tall, rise, _ in _PLACES:
         foot, size = np.array([x - wide / 4, -tall - rise, z]), np.array([0.035 * z, 0, 0])
         cables.append(rod(foot, foot - [0, 1 + 0.055 * z, 0], 0.0012 * z))

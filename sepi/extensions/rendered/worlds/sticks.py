@@ -78,10 +78,8 @@ def _sticks() -> Things:
     rng = np.random.default_rng(5)
     draws = [rng.uniform(-1.3, 1.3, 16), rng.normal(0, 0.25, 16)]
     draws += [rng.uniform(*span, 16) for span in ((0.1, 0.3), (0.9, 1.7), (0.005, 0.012))]
-    against = [
-        leaning((x, 0, _WALL - back), (x + lean, -height, _WALL - 0.02), 0.01, radius)
-        for x, lean, back, height, radius in zip(*draws, strict=True)
-    ]
+    places = zip(*draws, strict=True)
+    against = [leaning((x, 0, _WALL - b), (x + lean, -h, _WALL - 0.02), 0.01, r) for x, lean, b, h, r in places]
     # upper edges on which sticks can lie: two points of each
     edges = [((-0.66, -0.63, 2.43), (-0.32, -0.63, 2.46)), ((-0.14, -0.52, 2.54), (0.28, -0.52, 2.56))]
     edges += [((0.4, -0.3, 2.25), (0.75, -0.3, 2.38)), ((-0.32, -0.29, 1.92), (0.02, -0.29, 1.75))]

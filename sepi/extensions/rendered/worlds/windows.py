@@ -68,7 +68,9 @@ def _front(front: Front) -> Things:
     rng = np.random.default_rng(front.seed)
     length, (w, h) = front.bays * front.pitch, front.window
     centres = (np.arange(front.bays) + 0.5) * front.pitch
-    walls, sills, bars, blinds, leaves, iron, awnings = (list[Mesh]() for _ in range(7))
+    blind = Material(stripes(0.3, [(0.8, 0.76, 0.66), (0.7, 0.66, 0.56)], across=False))
+    walls, sills, bars, panes, blinds, leaves, iron, awnings = parts = [list[Mesh]() for _ in range(8)]
+    surfaces = [front.wall, _SILL, _WHITE, _PANE, blind, front.shutters or _WHITE, _IRON, front.awnings or _WHITE]
     for floor in range(front.floors):
         foot = -floor * front.storey
         low, high, top = foot - 0.9, foot - 0.9 - h, foot - front.storey
@@ -83,22 +85,16 @@ def _front(front: Front) -> Things:
             if drop:
                 blinds.append(wall((x - w / 2, high, 0.2), w, drop * h))
             if front.shutters and floor:
-                leaves += [
-                    _slab((x + off - w / 4, high), (x + off + w / 4, low), 0.04, -0.05) for off in (-0.77 * w, 0.77 * w)
-                ]
+                sides = (x - 0.77 * w, x + 0.77 * w)
+                leaves += [_slab((at - w / 4, high), (at + w / 4, low), 0.04, -0.05) for at in sides]
             if front.balconies and floor:
                 iron += _railing(x - w / 2 - 0.15, low + 0.05, w + 0.3, 0.95, -0.3, 0.12, 0.012)
                 sills.append(_slab((x - w / 2 - 0.2, low), (x + w / 2 + 0.2, low + 0.12), 0.1, -0.38))
     if front.awnings:
         for x in centres[-2::-2] + front.pitch / 2:
             awnings += _awning(x, 1.7 * front.pitch)
-    panes = [_slab((0, -front.floors * front.storey), (length, 0), 0.05, 0.27)]
-    blind = Material(stripes(0.3, [(0.8, 0.76, 0.66), (0.7, 0.66, 0.56)], across=False))
-    parts = [(walls, front.wall), (sills, _SILL), (bars, _WHITE), (panes, _PANE), (blinds, blind)]
-    parts += [
-        (meshes, own) for meshes, own in ((leaves, front.shutters), (iron, _IRON), (awnings, front.awnings)) if own
-    ]
-    for meshes, material in parts:
+    panes.append(_slab((0, -front.floors * front.storey), (length, 0), 0.05, 0.27))
+    for meshes, material in zip(parts, surfaces, strict=True):
         if meshes:
             yield thing(moved(meshes, (0, front.turn, 0), front.corner), material, thin=meshes is iron)
 

@@ -77,23 +77,19 @@ def _store() -> Things:
     barrel = shapes.turned_body(shapes.bevelled(side, 0.006), (1.42, 0, 3.6))
     ladder = [rod((-2.32, -0.3 * n, 6.03 + 0.034 * n), (-1.98, -0.3 * n, 6.03 + 0.034 * n), 0.014) for n in range(1, 9)]
     ladder += [rod((x, 0, 6.0), (x, -2.7, 6.3), 0.022) for x in (-2.34, -1.96)]
-    poles = [
-        leaning((x, 0, 5.4), (x + 0.2 * n - 0.2, -2.2 - 0.2 * n, _WALL - 0.02), 0.1, 0.016)
-        for n, x in enumerate((2.6, 2.75, 2.95))
-    ]
+    for n, x in enumerate((2.6, 2.75, 2.95)):
+        ladder.append(leaning((x, 0, 5.4), (x + 0.2 * n - 0.2, -2.2 - 0.2 * n, _WALL - 0.02), 0.1, 0.016))
     yield thing(crates, wood(31, 0.7, (0.7, 0.55, 0.38), (0.48, 0.34, 0.22)))
     yield thing(barrel, noise(32, (0.3, 0.4, 0.52), 0.07, 1.0, (3, 300), 0.7))
-    yield thing(ladder + poles, (0.62, 0.5, 0.3), thin=True)
+    yield thing(ladder, (0.62, 0.5, 0.3), thin=True)
 
 
 def _fence() -> Things:
     heights = np.arange(0.05, _HEIGHT, _MESH)
-    odd = np.arange(len(heights)) % 2
     # wires pass before and behind their neighbours in turn
-    wires = [
-        tube(_on_fence(_MESH * (number + odd), heights, 0.002 * (2.0 * odd - 1)), 0.0019, 6)
-        for number in range(int(_LENGTH / _MESH))
-    ]
+    odd = np.arange(len(heights)) % 2
+    off = 0.002 * (2.0 * odd - 1)
+    wires = [tube(_on_fence(_MESH * (n + odd), heights, off), 0.0019, 6) for n in range(int(_LENGTH / _MESH))]
     rows = ((0.08, 0.0), (0.75, 0.0), (1.43, 0.0), (1.54, 0.01), (1.66, 0.01))
     tension = [strand(_on_fence([0, _LENGTH], height), sag, 0.0022) for height, sag in rows]
     yield thing(wires + tension, Material((0.6, 0.63, 0.65), "glossy", 0.25), thin=True)
