@@ -13,10 +13,18 @@ from sepi.process.command import PATH, SepiCommand, progress_bar
 @click.argument("folder", type=PATH)
 @click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-cameras for a FOLDER called NAME.")
 @click.option(
-    "--lens", default="SIMPLE_RADIAL", show_default=True, metavar="MODEL", help="COLMAP's: RADIAL, OPENCV, ..."
+    "--lens",
+    default="SIMPLE_RADIAL",
+    show_default=True,
+    metavar="MODEL",
+    help="COLMAP's lens model: SIMPLE_PINHOLE, RADIAL, OPENCV, OPENCV_FISHEYE, ...",
 )
 @click.option(
-    "--cameras", type=click.Choice(["one", "each"]), default="one", show_default=True, help="One for all, or one each."
+    "--cameras",
+    type=click.Choice(["one", "each"]),
+    default="one",
+    show_default=True,
+    help="Whether one camera took all pictures, or each has its own.",
 )
 @click.option("--force", is_flag=True, help="Go on even if a check of a few pictures fails.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
@@ -59,7 +67,12 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
 @click.argument("light_field_path", metavar="INPUT", type=PATH)
 @click.argument("result_path", metavar="RESULT", type=PATH)
 @click.option(
-    "--to", "kind", type=click.Choice(["colmap", "nerfstudio"]), default="colmap", show_default=True, help="Program."
+    "--to",
+    "kind",
+    type=click.Choice(["colmap", "nerfstudio"]),
+    default="colmap",
+    show_default=True,
+    help="Program to write for.",
 )
 @click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
 @click.option(

@@ -28,10 +28,16 @@ _FLAGS = (
     click.Option(["--rendered"], is_flag=True, help="Path-traced scenes (Mitsuba 3, extra [render]); minutes each."),
     click.Option(["--samples"], type=click.IntRange(min=1), help="With --rendered: paths for each pixel; default: 64."),
     click.Option(
-        ["--noise", "levels"], type=click.Choice(NOISE_LEVELS), multiple=True, help="With --rendered; a folder each."
+        ["--noise", "levels"],
+        type=click.Choice(NOISE_LEVELS),
+        multiple=True,
+        help="With --rendered: noise of the sensor; repeatable, a folder for each; default: off.",
     ),
     click.Option(
-        ["--set", "settings"], multiple=True, metavar="KEY=VALUE", help="With --rendered; docs/reproduce/rendered.md."
+        ["--set", "settings"],
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="With --rendered: lens=0.5, vignetting=0.4, ...; repeatable. docs/reproduce/rendered.md lists them.",
     ),
     click.Option(["--all-views"], is_flag=True, help="With --rendered: also write a disparity map for each view."),
 )

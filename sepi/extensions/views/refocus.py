@@ -131,10 +131,18 @@ _STEPS = 9
 @click.argument("result_path", metavar="[RESULT]", type=PATH, required=False)
 @click.option("-o", "--output", type=PATH, help="Folder to write; default: NAME-refocused for an INPUT called NAME.")
 @click.option(
-    "--steps", type=click.IntRange(1, 999), metavar="N", help=f"Pictures from near to far; default if alone: {_STEPS}."
+    "--steps",
+    type=click.IntRange(1, 999),
+    metavar="N",
+    help=f"Pictures from the nearest to the farthest surface; default: {_STEPS} without --disparity and --at.",
 )
 @click.option(
-    "--disparity", "disparities", type=float, multiple=True, metavar="D", help="Focus at this disparity; repeatable."
+    "--disparity",
+    "disparities",
+    type=float,
+    multiple=True,
+    metavar="D",
+    help="Focus at this disparity, pixels per view step; repeatable.",
 )
 @click.option(
     "--at",
@@ -146,7 +154,10 @@ _STEPS = 9
     help="Focus on the surface at pixel X, Y, from 0 at the top left; repeatable; needs RESULT.",
 )
 @click.option(
-    "--aperture", type=float, metavar="R", help="Radius in view steps; a smaller one has more in focus. Default: all."
+    "--aperture",
+    type=float,
+    metavar="R",
+    help="Radius of the aperture in view steps; a smaller one has more in focus. Default: all views.",
 )
 @click.option("--animation", is_flag=True, help="Also write the stack as an animation, focus.webp.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
