@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import cv2
@@ -19,6 +20,7 @@ from sepi.image.noise import noise_level
 from sepi.io.readers.options import ORDERS
 from sepi.kernels import view_order as kernels
 from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.process.threads import threads_used
 
 REACH = 8
 """Views up to this many rows or columns away are looked at."""
@@ -97,10 +99,19 @@ class Views:
 
         Lenses darken and blur the views towards the edge of the grid, so that hardly more than noise is left.
         """
+        self.details(baselines)
         own, *lights = np.array([self._light(baseline) for baseline in ((0, 0), *baselines)])
         least = own * (_LEAST_BRIGHTNESS, _LEAST_CONTRAST)
         kept = [baseline for baseline, light in zip(baselines, lights, strict=True) if (light >= least).all()]
         return kept if 2 * len(kept) >= min(len(baselines), 4) else baselines
+
+    def details(self, baselines: list[Baseline]) -> list[FloatMap]:
+        """:meth:`detail` of several views."""
+        # which all are compared with: not to be made by each thread
+        self.detail((0, 0))
+        # OpenCV works outside Python's lock, on one thread for pictures as small as these
+        with ThreadPoolExecutor(threads_used()) as pool:
+            return list(pool.map(self.detail, baselines))
 
     def _light(self, baseline: Baseline) -> tuple[float, float]:
         """Mean and contrast of a view as it is."""

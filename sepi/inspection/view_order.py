@@ -271,7 +271,7 @@ def odd_views(light_field: LightField) -> list[str]:
     views = Views(light_field, _MOST_PIXELS)
     baselines = [(0, 0), *views.baselines]
     places = np.array(baselines, np.int64) + np.array(views.middle, np.int64)
-    small = [views.detail(baseline) for baseline in baselines]
+    small = views.details(baselines)
     looks = [picture.tobytes() for picture in small]
     times = Counter(looks)
     found = {
