@@ -193,6 +193,6 @@ def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32, moved
         unknown = np.isinf(behind)
         # by turns, so that what is reached is nearly round
         around = cv2.getStructuringElement(cv2.MORPH_RECT if step % 2 else cv2.MORPH_CROSS, (3, 3))
-        behind[unknown] = cv2.erode(behind, around)[unknown]
+        np.copyto(behind, cv2.erode(behind, around), where=unknown)
         left = np.maximum(left, cv2.dilate(left, np.ones((3, 3), np.uint8)) - 1)
     return np.where(disparity > behind + margin, behind, disparity), np.isfinite(behind) & (left >= 0)
