@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.noisy import few_views, with_noise
-from bench.streets import street
 from bench.sweep import scene_for_choosing
 from sepi.error_bars.bars import error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
@@ -73,9 +72,7 @@ def light_fields(
                 light_field = read_scene(Path(scene), level, 1) if held_out else scene_for_choosing(scene, level)
                 yield light_field.name, light_field
             continue
-        kind, _, seed = scene.partition(":")
-        drawn = kind == "street" and seed.isdecimal()
-        light_field = street(int(seed)) if drawn else scene_for_choosing(scene, NOISE_LEVELS[0])
+        light_field = scene_for_choosing(scene, NOISE_LEVELS[0])
         for sigma in sigmas:
             if sigma:
                 yield f"{light_field.name} + {sigma:g}", with_noise(light_field, sigma)

@@ -11,6 +11,7 @@ from typing import Any
 
 from tabulate import tabulate
 
+from bench.streets import street
 from sepi.errors import SepiError
 from sepi.extensions.rendered.worlds import RENDERED
 from sepi.inspection.coded_views import comparable
@@ -30,13 +31,16 @@ Scores = Mapping[str, Sequence[float]]
 
 
 def scene_for_choosing(given: str, noise: str) -> LightField:
-    """A built-in scene by its name, or a light field or a render at a level of noise by its path.
+    """A built-in scene by its name, a street as ``street:SEED``, a light field, or a render at a level of noise.
 
     Raises
     ------
     SepiError
         If there is no such scene, it has no ground truth, or it is held out.
     """
+    kind, _, seed = given.partition(":")
+    if kind == "street" and seed.isdecimal():
+        return street(int(seed))
     if given in SCENES:
         light_field = render(given)
     elif has_dataset(Path(given), "turns"):
