@@ -6,8 +6,8 @@
 
 namespace sepi::semi_global {
 
-constexpr int PATHS = 4;           // of one scan
-constexpr Index STRETCH = 64;      // pixels of a row after which the next row goes on
+constexpr int PATHS = 4;       // of one scan
+constexpr Index STRETCH = 64;  // pixels of a row after which the next row goes on
 
 constexpr float ONE = 65535;           // an averaged cost of 1
 constexpr Index AT_ONCE = 2 * LANES;   // candidates
@@ -112,7 +112,7 @@ struct Scan {
     void run() const {
         std::vector<std::atomic<Index>> done(H);
         std::atomic<Index> next = 0;
-        parallel_for(0, thread_count(), [&](Index) {
+        parallel_for(0, rows - 1, [&](Index) {
             for (Index i; (i = next++) < H;) {
                 const Index here = i % rows, there = (i + rows - 1) % rows;
                 weigh(i);
