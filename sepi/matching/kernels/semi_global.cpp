@@ -85,8 +85,9 @@ struct Scan {
             const Index u = j + beside(path), slot = path ? there : here;
             const bool goes_on = u >= 0 && u < W && (i > 0 || path == 0);
             last[path] = goes_on ? paths.array().at(slot, u, path) : none.array().data;
-            whole[path] = Word16{} + (goes_on ? least.array()(slot, u, path) : std::uint16_t(0));
-            jump[path] = whole[path] + (goes_on ? penalties.array()(here, path, x) : std::uint16_t(0));
+            const std::uint16_t from = goes_on ? least.array()(slot, u, path) : 0, penalty = goes_on ? penalties.array()(here, path, x) : 0;
+            whole[path] = Word16{} + from;
+            jump[path] = whole[path] + penalty;
             lowest[path] = most;
         }
         if (!places.has_all(y, x)) std::fill_n(own, PATHS * (K + 2), MOST);
