@@ -14,11 +14,11 @@ VERSION = "0.1.0"
 # jobs that read the rules belong to a run that has checked this
 if "SEPI_WORKFLOW_PROCESS" not in os.environ:
     PACKAGE, CHECKOUT = find_spec("sepi"), os.path.dirname(str(workflow.current_basedir))
-    if PACKAGE is None:
+    if PACKAGE is None or PACKAGE.origin is None:
         sys.exit(f"sepi: the Python package is not installed where Snakemake runs; pip install sepi=={VERSION}")
     # a source tree that is not installed has no version
     with suppress(PackageNotFoundError):
-        if version("sepi") != VERSION and Path(str(PACKAGE.origin)).parents[1] != Path(CHECKOUT):
+        if version("sepi") != VERSION and Path(PACKAGE.origin).parents[1] != Path(CHECKOUT):
             sys.exit(
                 f"sepi: the workflow in {CHECKOUT} is of version {VERSION}, the installed package of version "
                 f"{version('sepi')}; pip install sepi=={VERSION}, or take version {version('sepi')} of the workflow"

@@ -336,9 +336,11 @@ def _writers(
     masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
     writers |= {name: partial(write_png, pixels=mask, texts=_MASK_TEXT) for name, mask in masks.items()}
     if sigma is not None:
-        bounds = {name: floats[name].astype("<f4") for name in (LOW, HIGH, "nearest", "farthest") if name in floats}
+        bounds: dict[str, Any] = {
+            name: floats[name].astype("<f4") for name in (LOW, HIGH, "nearest", "farthest") if name in floats
+        }
         writers["sigma.png"] = lambda path: write_png(path, map_pictures.sigma_picture(sigma, unknown))
-        writers["interval.npz"] = lambda path: np.savez(path, allow_pickle=False, **bounds)
+        writers["interval.npz"] = lambda path: np.savez(path, **bounds)
     if seconds is not None:
         writers[RUNTIME] = partial(write_whole, content=f"{seconds:.3f}\n")
     return writers

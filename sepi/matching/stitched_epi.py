@@ -84,10 +84,9 @@ class StitchedEpi:
             Whether the sample lies inside its view.
         """
         position = x - self.disparity * self.positions - self.offsets
-        left = np.floor(position).astype(int)
         width = self.rows.shape[1]
         valid = self.inside & (position >= 0) & (position <= width - 1)
-        left = np.clip(left, 0, width - 2)
+        left = np.clip(np.floor(position), 0, width - 2).astype(int)
         weight = (position - left)[:, None]
         number = np.arange(len(self.rows))
         samples = (1 - weight) * self.rows[number, left] + weight * self.rows[number, left + 1]

@@ -99,7 +99,9 @@ def together(parts: Parts, colours: FloatMap, most: FloatMap) -> list[list[int]]
         apart = (there > 0) & (here != there)
         v, u = y[apart], x[apart]
         pairs.append(np.sort([here[apart], there[apart]], axis=0))
-        changes.append(((colours[v, u] - colours[v + down, u + across]) ** 2).sum(axis=-1) / most[v, u])
+        beyond = v + down, u + across
+        # of both, so that a mirrored picture has the same parts
+        changes.append(2 * ((colours[v, u] - colours[beyond]) ** 2).sum(axis=-1) / (most[v, u] + most[beyond]))
     alike, where, number = np.unique(np.hstack(pairs), axis=1, return_inverse=True, return_counts=True)
     along = number >= ALONG * np.sqrt(np.append(0, parts.areas)[alike].min(axis=0))
     root = np.arange(len(parts.areas) + 1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import re
@@ -33,6 +32,7 @@ from sepi.workflow.settings import Report, Settings, stage_settings
 _RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view", "dataset", "scene", "row", "region")
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
+_WORDS = {"true": True, "false": False, "null": None}
 # keys whose values stay text even if they look like numbers
 _TEXTS = ("path", "truth", "images", "reference", "pattern", "variable", "include", "exclude")
 
@@ -209,10 +209,12 @@ def _with_numbers(value: Any, top: bool = True) -> Any:
         return [_with_numbers(inner, False) for inner in value]
     if top or not isinstance(value, str):
         return value
-    for read in (json.loads, float):
+    if value in _WORDS:
+        return _WORDS[value]
+    for kind in (int, float):
         with suppress(ValueError):
-            found = read(value)
-            return value if isinstance(found, float) and not math.isfinite(found) else found
+            number = kind(value)
+            return number if math.isfinite(number) else value
     return value
 
 

@@ -82,6 +82,7 @@ def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
     assert set(os.listdir("pyramids-depth")) == {*RESULT_FILES, *masks, "depth.pfm", *bars}
     assert f"written to pyramids-depth/: {' '.join(RESULT_FILES[:-1])}" in called.stdout
     with np.load("pyramids-depth/interval.npz") as interval:
+        assert set(interval.files) == {"low", "high", "nearest", "farthest"}
         half = np.median(interval["high"] - interval["low"]) / 2
     assert f"90 % interval: median half width {half:.2g} pixels per view step\n" in called.stdout
     maps = read_stage(Path("pyramids-depth/result.h5"))

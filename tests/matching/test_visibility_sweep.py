@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
+from several_threads import SEVERAL, threads
 
 from sepi.kernels import semi_global, visibility
 from sepi.lightfield import DisparityRange, LightField
@@ -299,7 +300,7 @@ def test_smoothing_equals_a_plain_twin(large: float, scale: int, K: int, some: b
     Where pixels have ``some`` of the candidates, others are not reached.
     """
     random = np.random.default_rng(3)
-    H, W = 8, semi_global.STRETCH + 5
+    H, W = 8, 2 * semi_global.STRETCH + 5
     cost, guide = random.random((K, H, W)).astype(np.float32), random.random((H, W, 3)).astype(np.float32) * 0.1
     likely = np.sort(random.integers(0, K, (2, H, W), np.int32), axis=0) if some else candidates_of(cost)
     places = Places.of_candidates(*likely, K)
@@ -316,7 +317,8 @@ def test_smoothing_equals_a_plain_twin(large: float, scale: int, K: int, some: b
         (averaged / semi_global.ONE)[told], aggregate_twin(cost, guide, 2, variance)[told], atol=2e-5
     )
     smoothed = np.full_like(volume, 7)
-    semi_global.semi_global(volume, np.moveaxis(guide, 2, 0).copy(), places, 0.1, large, 5, smoothed)
+    with threads(SEVERAL):
+        semi_global.semi_global(volume, np.moveaxis(guide, 2, 0).copy(), places, 0.1, large, 5, smoothed)
     directions = [(0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
     steps, one = np.where(told, averaged // scale, np.inf), semi_global.ONE / scale
     expected = sum(path_twin(steps / one, guide, *d, 0.1, large, 5) for d in directions)

@@ -223,12 +223,15 @@ def _problems_in(folder: Path, names: Sequence[str], archive: zipfile.ZipFile | 
 
 def _problem_in(folder: Path, name: str, archive: zipfile.ZipFile | None) -> str | None:
     path = folder / name
-    if problem := _size_problem(name, archive.getinfo(name).file_size if archive else path.stat().st_size):
-        return problem
     try:
-        if archive:
+        info = archive.getinfo(name) if archive else None
+        if problem := _size_problem(name, info.file_size if info else path.stat().st_size):
+            return problem
+        if archive and info:
+            if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                return f"compressed by method {info.compress_type}; expected 'deflated' or none"
             # no more than the size that it tells
-            archive.extract(name, folder)
+            archive.extract(info, folder)
         if name.startswith(RUNTIMES):
             _read_seconds(path)
             return None
@@ -236,7 +239,7 @@ def _problem_in(folder: Path, name: str, archive: zipfile.ZipFile | None) -> str
     except SepiError as error:
         return str(error).removeprefix(f"{path}: ")
     except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError, OSError) as error:
-        return f"cannot be unpacked ({error})"
+        return f"cannot be {'unpacked' if archive else 'read'} ({error})"
     if disparity.shape != SHAPE:
         return f"{disparity.shape[1]}x{disparity.shape[0]} pixels; expected {_PIXELS}"
     unknown = np.count_nonzero(~np.isfinite(disparity))

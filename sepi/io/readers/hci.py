@@ -180,8 +180,9 @@ def _numbered_views(folder: Path) -> dict[int, Path]:
     if not names:
         raise SepiError(f"{folder}: no views (expected input_Cam000.png, input_Cam001.png, ...)")
     named = parse_view_numbers(str(folder), names, "input_Cam{number}.png")
-    if named.unmatched:
-        raise SepiError(f"{folder / named.unmatched[0]}: expected a name like input_Cam007.png")
+    strange = [*named.unmatched, *(name for name in names if not name.removeprefix("input_Cam")[0].isdigit())]
+    if strange:
+        raise SepiError(f"{folder / strange[0]}: expected a name like input_Cam007.png")
     require_different(folder, named)
     return {number: folder / name for name, (number,) in named.numbers.items()}
 

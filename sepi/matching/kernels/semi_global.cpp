@@ -44,8 +44,9 @@ struct Scan {
         return bits;
     }();
 
-    // Of rows on the way: the paths' costs, their least, and the penalties of a change from the pixel before.
-    const Index rows = thread_count() + 1;
+    // Of rows on the way, at most one for each stretch and the row before: the paths' costs, their least, and the penalties
+    // of a change from the pixel before.
+    const Index rows = std::min({Index(thread_count()), H, W / STRETCH + 1}) + 1;
     const Scratch<std::uint16_t, 4> paths = Scratch<std::uint16_t, 4>(rows, W, PATHS, K + 2).filled(MOST);
     const Scratch<std::uint16_t, 3> least = Scratch<std::uint16_t, 3>(rows, W, PATHS), penalties = Scratch<std::uint16_t, 3>(rows, PATHS, W);
     const Scratch<std::uint16_t, 1> none = zeros<std::uint16_t, 1>(K + 2);

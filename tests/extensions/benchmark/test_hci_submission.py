@@ -234,3 +234,11 @@ def test_what_the_benchmark_would_refuse_is_not_packed(tmp_path: Path) -> None:
     assert "cotton/disparity.pfm: no such file" in error_of(call("submission", good_one, "--partial"))
     with pytest.raises(SepiError, match="gone"):
         problems_of(tmp_path / "gone")
+
+
+def test_a_file_compressed_in_an_unusual_way_is_a_problem(tmp_path: Path) -> None:
+    """The benchmark may not unpack it."""
+    path = zipped(tmp_path / "mine.zip", without("disp_maps/cotton")(good()))
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_BZIP2) as archive:
+        archive.writestr("disp_maps/cotton.pfm", GOOD_MAP)
+    assert problems_of(path) == ["disp_maps/cotton.pfm: compressed by method 12; expected 'deflated' or none"]
