@@ -1,4 +1,4 @@
-"""Readers of formats of single programs and devices: pictures of all views, lenslet pictures, TIFF stacks, and OpenLF's HDF5 files.
+"""Readers of formats of single programs and devices: pictures of all views, lenslets, TIFF stacks, and OpenLF's HDF5.
 
 In decoded lenslet images of the Stanford Lytro Light Field Archive [3]_, a block of pixels lies under each lenslet, one
 of each sub-aperture image: the pixels ``(t, s)`` of all blocks are the view ``(t, s)``. Views near the corners of the
