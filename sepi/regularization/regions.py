@@ -100,8 +100,8 @@ def together(parts: Parts, colours: FloatMap, most: FloatMap) -> list[list[int]]
         v, u = y[apart], x[apart]
         pairs.append(np.sort([here[apart], there[apart]], axis=0))
         beyond = v + down, u + across
-        # of both, so that a mirrored picture has the same parts
-        changes.append(2 * ((colours[v, u] - colours[beyond]) ** 2).sum(axis=-1) / (most[v, u] + most[beyond]))
+        # noise of both
+        changes.append(((colours[v, u] - colours[beyond]) ** 2).sum(axis=-1) / (most[v, u] + most[beyond]))
     alike, where, number = np.unique(np.hstack(pairs), axis=1, return_inverse=True, return_counts=True)
     along = number >= ALONG * np.sqrt(np.append(0, parts.areas)[alike].min(axis=0))
     root = np.arange(len(parts.areas) + 1)
