@@ -8,7 +8,7 @@ import pytest
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
 from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
-from sepi.regularization.uniform_regions import UniformPlanesParameters, plain_pixels
+from sepi.regularization.uniform_regions import UniformPlanesParameters, plain_pixels, squared_gradients
 from sepi.scenes import render
 from sepi.scoring.error_bars import oracle, sparsification
 from sepi.scoring.scores import score
@@ -75,7 +75,7 @@ def test_uniform_is_what_the_noise_explains() -> None:
     random = np.random.default_rng(0)
     mean = np.full((60, 80, 3), 0.5) + random.normal(0, 1e-3, (60, 80, 3))
     mean[:, 40:] += 6e-3 * random.normal(0, 1, (60, 40, 1))
-    found = plain_pixels(mean.astype(np.float32), 1e-6, UniformPlanesParameters())
+    found = plain_pixels(squared_gradients(mean.astype(np.float32)), 1e-6, UniformPlanesParameters())
     assert found[:, :34].mean() > 0.95
     assert not found[:, 46:].any()
 

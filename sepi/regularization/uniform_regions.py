@@ -117,10 +117,11 @@ def fill_uniform_regions(
     variance = _variance_of_views(light_field, field, compared)
     of_mean = variance * np.float32((LEFT_OF_SLOPES if noisy else 1) / compared.sum())
     mean = matching.mean(before.disparity)[..., :3]
-    core = plain_pixels(mean, of_mean, parameters)
+    gradients = squared_gradients(mean)
+    core = plain_pixels(gradients, of_mean, parameters)
     # noise is measured; what rounding adds is supposed, and a single pixel may be plain by chance
     inner = uniform_regions(mean, core, of_mean, before.confidence, parameters, fewest=1 if noisy else 2)
-    uniform = spread_over_plain(mean, inner, of_mean, before.confidence, parameters)
+    uniform = spread_over_plain(mean, gradients, inner, of_mean, before.confidence, parameters)
     found = _with_borders(uniform, mean, of_mean, before, parameters)
     lit = _by_light(light_field, matching, before.disparity, found, variance, noisy) if parameters.light else {}
     known = light_field.require_disparity_range()
@@ -205,8 +206,8 @@ def _by_light(
     return {n: plane for n, plane in zip(asked, told, strict=True) if plane is not None}
 
 
-def _squared_gradients(mean: FloatMap) -> FloatMap:
-    """Of central differences, across and down; shape (H, W)."""
+def squared_gradients(mean: FloatMap) -> FloatMap:
+    """Of central differences of a picture (H, W, C), across and down, summed over channels; shape (H, W), float32."""
     axes = (1, 0), (0, 1)
     total = np.zeros(mean.shape[:2], np.float32)
     # a channel at a time is several times as fast as all channels of a pixel
@@ -221,13 +222,13 @@ def _most_gradient(variance: FloatMap, parameters: UniformPlanesParameters) -> f
     return parameters.noise_factor * 3 * variance
 
 
-def plain_pixels(mean: FloatMap, variance: FloatMap, parameters: UniformPlanesParameters) -> BoolMap:
+def plain_pixels(gradients: FloatMap, variance: FloatMap, parameters: UniformPlanesParameters) -> BoolMap:
     """Pixels round which the mean of the views varies no more than its noise.
 
     Parameters
     ----------
-    mean : ndarray, shape (H, W, 3), float32
-        Colours, 0..1.
+    gradients : ndarray, shape (H, W), float32
+        :func:`squared_gradients` of the mean.
     variance : ndarray, shape (H, W), float32
         Of the noise of one channel of the mean.
     parameters : UniformPlanesParameters
@@ -237,7 +238,7 @@ def plain_pixels(mean: FloatMap, variance: FloatMap, parameters: UniformPlanesPa
     ndarray, shape (H, W), bool
     """
     size = 2 * parameters.window_radius + 1
-    return np.asarray(cv2.blur(_squared_gradients(mean), (size, size)) < _most_gradient(variance, parameters))
+    return np.asarray(cv2.blur(gradients, (size, size)) < _most_gradient(variance, parameters))
 
 
 def _most_apart(variance: FloatMap, parameters: UniformPlanesParameters) -> FloatMap:
@@ -276,8 +277,10 @@ def uniform_regions(
 
     Parameters
     ----------
-    mean, variance
-        As in :func:`plain_pixels`.
+    mean : ndarray, shape (H, W, 3), float32
+        Mean of the views, 0..1.
+    variance : ndarray, shape (H, W), float32
+        Of the noise of one of its channels.
     core : ndarray, shape (H, W), bool
         The plain pixels.
     confidence : ndarray, shape (H, W), float32
@@ -299,6 +302,7 @@ def uniform_regions(
 
 def spread_over_plain(
     mean: FloatMap,
+    gradients: FloatMap,
     region: BoolMap,
     variance: FloatMap,
     confidence: FloatMap,
@@ -310,6 +314,8 @@ def spread_over_plain(
     ----------
     mean, variance, confidence
         As in :func:`uniform_regions`.
+    gradients : ndarray, shape (H, W), float32
+        :func:`squared_gradients` of the mean.
     region : ndarray, shape (H, W), bool
         Of :func:`uniform_regions`.
     parameters : UniformPlanesParameters
@@ -320,7 +326,7 @@ def spread_over_plain(
     """
     if not region.any():
         return region
-    gradients, most = _squared_gradients(mean), FEW_PLAIN * _most_gradient(variance, parameters)
+    most = FEW_PLAIN * _most_gradient(variance, parameters)
     size = (2 * parameters.window_radius + 1,) * 2
     beside = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     for _ in range(ROUNDS):

@@ -12,6 +12,7 @@ from sepi.regularization.uniform_regions import (
     fill_uniform_regions,
     plain_pixels,
     spread_over_plain,
+    squared_gradients,
     uniform_regions,
 )
 from sepi.stage import StageMaps
@@ -150,8 +151,9 @@ def test_a_bare_region_spreads_through_a_gap_that_no_window_fits_into() -> None:
     sky[:30] = sky[:70, 40:48] = True
     mean[sky] = 0.5 + random.normal(0, 1e-3, (sky.sum(), 3))
     doubtful, parameters = np.full((90, 80), 0.5, np.float32), UniformPlanesParameters()
-    inner = uniform_regions(mean, plain_pixels(mean, variance, parameters), variance, doubtful, parameters, 2)
-    spread = spread_over_plain(mean, inner, variance, doubtful, parameters)
+    gradients = squared_gradients(mean)
+    inner = uniform_regions(mean, plain_pixels(gradients, variance, parameters), variance, doubtful, parameters, 2)
+    spread = spread_over_plain(mean, gradients, inner, variance, doubtful, parameters)
     assert not inner[50:65, 40:48].any()
     assert spread[30:65, 42:46].all()
     assert not spread[~sky].any()

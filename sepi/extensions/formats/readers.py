@@ -39,7 +39,7 @@ from sepi.errors import SepiError, printable
 from sepi.io.codecs import TIFF, TIFF_SIGNATURES, directory_of, open_tiff, page_pixels, tiff_form
 from sepi.io.files import DEFLATE_RATIO, naming, reading
 from sepi.io.hdf5 import has_dataset, number_of, open_hdf5, read_dataset
-from sepi.io.images import SUFFIXES, read_picture
+from sepi.io.images import SUFFIXES, picture_header, read_picture
 from sepi.io.readers.arrays import Array, light_field_from_array
 from sepi.io.readers.formats import Format
 from sepi.io.readers.options import ReadOptions
@@ -85,6 +85,14 @@ _DARK = 0.2
 def matches_lenslets(path: Path) -> bool:
     """Whether ``path`` is an image with ``eslf`` in its name."""
     return "eslf" in path.name.lower() and path.suffix.lower() in SUFFIXES and path.is_file()
+
+
+def size_of_picture(path: Path) -> tuple[int, int, int, int]:
+    """Size as that of a light field whose default views lie under lenslets; all of the picture is decoded."""
+    header, views = picture_header(path), _CENTRAL**2
+    height, width = max(1, header.height // _BLOCK[0]), max(1, header.width // _BLOCK[1])
+    values = header.height * header.width * header.pixel_bytes
+    return views, height, width, -(-values // (views * height * width))
 
 
 def read_lenslets(path: Path, options: ReadOptions) -> LightField:
@@ -283,8 +291,12 @@ def _mosaic(path: Path, dataset: h5py.Dataset, shape: tuple[int, int], column: b
 
 
 FORMATS = {
-    "eslf": Format("Lytro lenslet image", "NAME_eslf.png", matches_lenslets, read_lenslets, ("grid",)),
-    "mosaic": Format("mosaic of views", "NAME_qs8x6a0.75.png", matches_quilt, read_mosaic, ("grid",)),
+    "eslf": Format(
+        "Lytro lenslet image", "NAME_eslf.png", matches_lenslets, read_lenslets, ("grid",), size_of=size_of_picture
+    ),
+    "mosaic": Format(
+        "mosaic of views", "NAME_qs8x6a0.75.png", matches_quilt, read_mosaic, ("grid",), size_of=size_of_picture
+    ),
     "tiff-stack": Format(
         "TIFF stack", "a page for each view", matches_stack, read_stack, ("grid",), size_of=size_of_stack
     ),

@@ -86,8 +86,6 @@ _SOME = ("grid", "pattern", "axes", "variable", "images", "reference", "follow_l
 _USUAL_SIDE = 512
 _USUAL_VIEWS = 81
 _RGB = 3
-# pixels a side under a lenslet
-_LENSLET = 14
 
 
 class Size(NamedTuple):
@@ -107,14 +105,6 @@ class Size(NamedTuple):
     height: int
     width: int
     pixel_bytes: int = _RGB
-
-
-def _size_of_lenslets(path: Path) -> Size:
-    header = picture_header(path)
-    height, width = max(1, header.height // _LENSLET), max(1, header.width // _LENSLET)
-    # all of the image is decoded
-    values = header.height * header.width * header.pixel_bytes
-    return Size(_USUAL_VIEWS, height, width, -(-values // (_USUAL_VIEWS * height * width)))
 
 
 def _size_of_array(arrays_in: Callable[[Path], Arrays], path: Path) -> Size:
@@ -352,9 +342,9 @@ def _inside(folder: Path, depth: int = 1) -> Iterator[Path]:
 def size_of(files: Sequence[Path]) -> Size:
     """Size of the light field that these files hold together; no values are read.
 
-    Each of several images is a view. A single image is a stack, or a lenslet image of which the default views count.
-    In other files, the largest array counts, with the first order of its axes that is likely. If nothing tells, the
-    largest file is taken as uncompressed pixels. The reader reports damaged files.
+    Each of several images is a view. In arrays, the largest counts, with the first order of its axes that is likely;
+    other formats tell it themselves. If nothing tells, the largest file is taken as uncompressed pixels. The reader
+    reports damaged files.
     """
     pictures = [path for path in files if path.suffix.lower() in SUFFIXES]
     with suppress(SepiError):
@@ -364,8 +354,6 @@ def size_of(files: Sequence[Path]) -> Size:
         known = matching(files[0]) if len(files) == 1 else None
         if known is not None and known.size_of is not None:
             return Size(*known.size_of(files[0]))
-        if pictures:
-            return _size_of_lenslets(pictures[0])
     if len(pictures) > 1:
         return Size(len(pictures), _USUAL_SIDE, _USUAL_SIDE)
     values = max((path.stat().st_size for path in files), default=0)

@@ -176,7 +176,7 @@ def _truth_of(folder: Path, shape: tuple[int, int], part: Part | None) -> Truth:
 
 def _numbered_views(folder: Path) -> dict[int, Path]:
     """Files of the views by number."""
-    names = [path.name for path in folder.glob("input_Cam*.png")]
+    names = sorted(path.name for path in folder.glob("input_Cam*.png"))
     if not names:
         raise SepiError(f"{folder}: no views (expected input_Cam000.png, input_Cam001.png, ...)")
     named = parse_view_numbers(str(folder), names, "input_Cam{number}.png")

@@ -6,9 +6,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from sepi.errors import SepiError
-from sepi.io.readers.formats import FORMATS, format_of, read
+from sepi.io.readers.formats import FORMATS, format_of, read, size_of
 from sepi.io.readers.options import ReadOptions
 
 
@@ -111,3 +112,10 @@ def test_what_does_not_fit_is_one_line_that_names_the_file(tmp_path: Path, case:
     assert str(path) in str(caught.value)
     assert word in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_the_size_counts_the_default_views_and_all_that_is_decoded(tmp_path: Path) -> None:
+    Image.new("RGB", (14 * 50, 14 * 40)).save(tmp_path / "a_eslf.png")
+    found = size_of([tmp_path / "a_eslf.png"])
+    assert found[:3] == (81, 40, 50)
+    assert 81 * 40 * 50 * found.pixel_bytes >= 14 * 50 * 14 * 40 * 3
