@@ -117,8 +117,8 @@ def _after_all_stages(
 
         maps = STAGES[stage][choice].run(light_field, maps, settings[stage], of_all)
         of_all(1.0)
-        if stage in ("initial", "occlusion"):
-            # these stages take most; later ones would only clear these pages again
+        if stage == "occlusion":
+            # this stage takes most
             give_back_memory()
     assert maps is not None  # there are stages
     return maps

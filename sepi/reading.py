@@ -21,7 +21,7 @@ from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ReadOptions, in_grid, unarranged
 from sepi.io.readers.view_grid import with_row_spacing
 from sepi.lightfield import DisparityRange, LightField
-from sepi.process.memory import give_back_memory, take_blas_buffer
+from sepi.process.memory import take_blas_buffer
 from sepi.validation import described, require_type
 
 # 16-bit views darker than this, a sixteenth of the full scale, have fewer bits or hardly any light
@@ -122,7 +122,6 @@ def read_light_field(
     if check_order:
         checked = view_order.check_order(light_field, options.order, views)
         del views
-        give_back_memory()
         if light_field.rig is not None and checked.clear and checked.warning():
             raise SepiError(
                 f"{path}: the views fit the poses only if turned over; expected poses of cameras that look along their "

@@ -101,12 +101,13 @@ def share_costs(
     farthest = float(np.abs(disparity).max())
     height, width = light_field.shape
     layer, wanted = _more_distant_layer(disparity, rim, views.margin, moved)
+    shown = (layer == disparity) & ~rim.inside
     background = np.zeros((height, width, 4), np.float32)
     for begin, end, rows in row_bands(light_field, present, farthest, BYTES_PER_PIXEL, rows_moved, MOST_BYTES):
         nearest = nearest_surfaces(light_field, around.nearest, present, rows)
         views = views._replace(nearest=nearest, low=rows.low)
         first, last = max(0, begin - rows_moved), min(height, end + rows_moved)
-        background_kernels.background_of(views, layer, wanted, first, last, background)
+        background_kernels.background_of(views, layer, wanted, shown, first, last, background)
         of_band = slice(*np.searchsorted(pixels, (begin * width, end * width)))
         kernels.costs_of_shares(
             views, rim, background, sides, *scales2, pixels[of_band], found.costs[of_band], found.told[of_band]

@@ -16,7 +16,7 @@ from sepi.boundaries.surface_shares import _views_alike as views_alike
 from sepi.boundaries.surface_shares import view_brightness
 from sepi.kernels import background as background_kernels
 from sepi.kernels import surface_shares as kernels
-from sepi.lightfield import LightField
+from sepi.lightfield import FloatMap, LightField
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Rows
 from sepi.process.workspace import Workspace
@@ -316,7 +316,7 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     twin = Twin(rim_views, rim, sides)
     layer = np.where(rim.is_near, rim.far, disparity)
     background = np.empty((*layer.shape, 4), np.float32)
-    background_kernels.background_of(rim_views, layer, np.ones(layer.shape, bool), 0, 12, background)
+    background_kernels.background_of(rim_views, layer, *np.ones((2, *layer.shape), bool), 0, 12, background)
     for y, x in np.ndindex(disparity.shape):
         colour, variance, count = twin.background(float(layer[y, x]), y, x)
         assert (background[y, x, 3] != background_kernels.UNSEEN) == (count >= background_kernels.FEWEST_VIEWS)
@@ -334,6 +334,27 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     assert twin.went_on > 10
     np.testing.assert_allclose(costs[told], [cost for cost in expected if cost is not None], atol=2e-5)
     assert (costs[~told] == 0).all()
+
+
+def test_fewer_views_tell_a_background_that_the_reference_view_shows() -> None:
+    """The same numbers as with these views alone."""
+    random = np.random.default_rng(4)
+    many = 2 * background_kernels.ENOUGH
+    lines = random.random((1, many, 6, 30), np.float32)
+    places = np.stack([np.zeros(many, np.int64), np.arange(many)], axis=1)
+    layer = np.zeros((6, 10), np.float32)
+
+    def found(step: int, shown: bool) -> FloatMap:
+        few = places[::step]
+        nearest = np.zeros((len(few), *layer.shape), np.float32)
+        views = RimViews(lines, 3, np.ones(len(few), np.float32), few, few * 0.0, nearest, 0, np.float32(0.1))
+        background = np.empty((*layer.shape, 4), np.float32)
+        wanted, asked = np.ones(layer.shape, bool), np.full(layer.shape, shown)
+        background_kernels.background_of(views, layer, wanted, asked, 0, 6, background)
+        return background
+
+    np.testing.assert_array_equal(found(1, shown=True), found(2, shown=False))
+    assert (found(1, shown=False) != found(1, shown=True)).any()
 
 
 def test_brightness_is_told_view_by_view() -> None:
