@@ -59,7 +59,7 @@ def light_fields(
 ) -> Iterator[tuple[str, LightField]]:
     """Light fields and names: built-in scenes, ``street:SEED`` and folders with the given noise, renders at all levels.
 
-    All but renders also as so many rows and columns of views from the reference view on, without noise.
+    All but renders also as so many rows and columns of views from the reference view on.
 
     Raises
     ------
@@ -74,12 +74,11 @@ def light_fields(
             continue
         light_field = scene_for_choosing(scene, NOISE_LEVELS[0])
         for sigma in sigmas:
-            if sigma:
-                yield f"{light_field.name} + {sigma:g}", with_noise(light_field, sigma)
-            else:
-                yield light_field.name, light_field
-        for rows, columns in grids:
-            yield f"{light_field.name} + {rows}x{columns}", few_views(light_field, rows, columns)
+            noisy = with_noise(light_field, sigma) if sigma else light_field
+            name = f"{light_field.name} + {sigma:g}" if sigma else light_field.name
+            yield name, noisy
+            for rows, columns in grids:
+                yield f"{name} + {rows}x{columns}", few_views(noisy, rows, columns)
 
 
 def sample(light_field: LightField, name: str, variant: str, step: float = 0.0, kept: Path | None = None) -> Sample:

@@ -61,7 +61,7 @@ FLOORS: Mapping[str, float] = {
     "range": 1e-3,
     "plane": 0.1,
     "few_views": 1.125,
-    "interpolation": 0.8,
+    "interpolation": 0.4,
     "conflict": 60.0,
     "light_deviation": 0.03,
 }
