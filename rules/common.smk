@@ -241,8 +241,6 @@ def dates_of(files):
 def ingest_source(wildcards):
     """Source of a scene, as arguments of the ingest command."""
     scene = scene_of(wildcards)
-    if scene.source is None:
-        return ["--builtin", scene.name, "--size", str(scene.height)]
     reader = [] if scene.module is None else ["--module", scene.module]
     return [placed(scene.source) if scene.is_made else str(scene.source), *reader, *scene.flags]
 
@@ -250,8 +248,7 @@ def ingest_source(wildcards):
 def truth_source(wildcards):
     """Source of a scene's ground truth, as arguments of its command; empty without ground truth."""
     scene = scene_of(wildcards)
-    words = ingest_source(wildcards) if scene.source is None or scene.brought_truth else []
-    return words if scene.module is None else words[: -len(scene.flags) or None]
+    return ingest_source(wildcards) if scene.module or scene.brought_truth else []
 
 
 def own_truth_size(wildcards):
@@ -311,5 +308,5 @@ def minutes_for(*seconds, **more):
 
 
 def of_source(read, of_module):
-    """Function of wildcards: ``of_module`` for scenes that a module of an extension reads, else ``read``."""
+    """Function of wildcards: ``of_module`` for scenes that a module reads or renders, else ``read``."""
     return lambda wildcards, attempt: (of_module if scene_of(wildcards).module else read)(wildcards, attempt)

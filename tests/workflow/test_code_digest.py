@@ -105,7 +105,7 @@ def test_every_version_of_python_gives_the_same(tree: Path) -> None:
 def test_a_light_field_is_read_again_for_its_own_reader_alone() -> None:
     """A word in another format's reader must not cost all maps."""
     readers = {known.matches.__module__ for known in FORMATS.values()} - {FORMATS["sepi"].matches.__module__}
-    for reader in (*readers, "sepi.scenes"):
+    for reader in (*readers, "sepi.scenes.light_field"):
         assert {reader, "sepi.io.hdf5"} <= imported_modules(*ingest_modules(reader))
     arrays = "sepi.io.readers.array_files"
     assert not imported_modules(*ingest_modules(arrays)) & (readers - {arrays})

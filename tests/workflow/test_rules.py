@@ -72,11 +72,11 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
             if rule.name == "maps":
                 modules = (command[1], *added("scenes").values())
             if rule.name == "ingest":
-                modules = ingest_modules("sepi.scenes")
+                modules = ingest_modules("sepi.scenes.light_field")
             if rule.name == "render":
                 modules = tuple(f"sepi.extensions.rendered.{name}" for name in ("rendering", "worlds.sticks"))
             if rule.name == "truth":
-                modules = ("sepi.truth", "sepi.scenes")
+                modules = ("sepi.truth", "sepi.scenes.light_field")
             given = code(scene(**{rule.name: name})) if callable(code) else code
             assert given == code_digest(*modules), f"{rule.name} {name}"
     others = {"ingest", "truth", "evaluate", "export", "external", "numbers", "maps", "page", "render"}
