@@ -159,7 +159,9 @@ def stage_params(stage):
     """Parameters of a stage's rule, as functions of wildcards: a change of one of them runs the job again."""
     known = {label: SETTINGS.parameters_json(stage, label) for label in SETTINGS.parameters[stage]}
     return {
+        "stage": stage,
         "choice": lambda wildcards: choice_of(wildcards[stage]),
+        "previous": lambda wildcards, input: [f"--previous={input.previous}"] if "previous" in input.keys() else [],
         "parameters": lambda wildcards: known[wildcards[stage]],
         "dates": dates_of(files_of(stage)),
         "code": lambda wildcards: code_digest(*stage_modules(stage, STAGES[stage][choice_of(wildcards[stage])])),
@@ -175,13 +177,6 @@ def stage_message(stage, title):
     """Message when a stage starts: the scene, and the choices up to this stage."""
     choices = key_of(LABELS, stage).replace("{", "{wildcards.")
     return f"{{wildcards.dataset}}/{{wildcards.scene}}: {title} ({choices})"
-
-
-# the command of every stage, after its inputs
-STAGE_FLAGS = (
-    "--choice {params.choice} --parameters {params.parameters:q} --threads {threads} "
-    "--output {output.maps:q} --timing {output.timing:q} 2> {log:q}"
-)
 
 
 def final_file(wildcards):

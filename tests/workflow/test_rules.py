@@ -63,14 +63,16 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
         if command is None:
             continue
         checked.add(rule.name)
-        assert rule.name not in STAGES or command[1] == f"sepi.{rule.name}"
-        code = dict(rule.params.items()).get("code")
+        params = dict(rule.params.items())
+        main = command[1] + params.get("stage", "")
+        assert rule.name not in STAGES or main == f"sepi.{rule.name}"
+        code = params.get("code")
         for name, chosen in STAGES.get(rule.name, {"": None}).items():
             if name == HANDED_ON:
                 continue
-            modules = (command[1],) if chosen is None else stage_modules(rule.name, chosen)
+            modules = (main,) if chosen is None else stage_modules(rule.name, chosen)
             if rule.name == "maps":
-                modules = (command[1], *added("scenes").values())
+                modules = (main, *added("scenes").values())
             if rule.name == "ingest":
                 modules = ingest_modules("sepi.scenes.light_field")
             if rule.name == "render":
