@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 
 from sepi.errors import SepiError
 from sepi.registry import added
-from sepi.variants import HANDED_ON, STAGES, VARIANTS, compared_methods
+from sepi.variants import STAGES, VARIANTS, compared_methods
 from sepi.variants.built_in import PARTS_OF_BEST, UNCORRECTED
 from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 from sepi.workflow.result_paths import SceneFiles, key_of, scene_files
@@ -185,10 +185,6 @@ class Plan:
     def stage_key(self, variant: str, stage: str) -> str:
         """Key of a variant's maps after a stage, in numbers and scores."""
         return key_of(self.variants[variant], stage)
-
-    def runs_stage(self, variant: str, stage: str) -> bool:
-        """Whether a stage of a variant is switched on."""
-        return self.variants[variant][stage] != HANDED_ON
 
     def number_inputs(self) -> list[Path]:
         """Input files of the numbers, each once."""
