@@ -16,7 +16,7 @@ from sepi.registry import added, extensions
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of, compared_methods
 from sepi.report.plan import PARTS, Plan
 from sepi.validation import require_known
-from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, stage_modules
+from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
 from sepi.workflow.config import load_settings
 from sepi.workflow.needs import stage_needs
 from sepi.workflow.result_paths import RESULTS, key_of, scene_files

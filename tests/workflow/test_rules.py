@@ -14,7 +14,7 @@ from sepi.errors import SepiError
 from sepi.registry import added
 from sepi.report.plan import PUBLISHED
 from sepi.variants import HANDED_ON, STAGES, VARIANTS
-from sepi.workflow.code_digest import code_digest, ingest_modules, stage_modules
+from sepi.workflow.code_digest import code_digest, stage_modules
 from sepi.workflow.config import load_settings
 from sepi.workflow.settings import MOST_ON_PAGE, Report
 
@@ -74,7 +74,7 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
             if rule.name == "maps":
                 modules = (main, *added("scenes").values())
             if rule.name == "ingest":
-                modules = ingest_modules("sepi.scenes.light_field")
+                modules = ("sepi.ingest", "sepi.scenes.light_field")
             if rule.name == "render":
                 modules = tuple(f"sepi.extensions.rendered.{name}" for name in ("rendering", "worlds.sticks"))
             if rule.name == "truth":
