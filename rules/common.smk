@@ -16,7 +16,7 @@ from sepi.registry import added, extensions
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of, compared_methods
 from sepi.report.plan import PARTS, Plan
 from sepi.validation import require_known
-from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, stage_modules
+from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
 from sepi.workflow.config import load_settings
 from sepi.workflow.needs import stage_needs
 from sepi.workflow.result_paths import RESULTS, key_of, scene_files
@@ -159,7 +159,9 @@ def stage_params(stage):
     """Parameters of a stage's rule, as functions of wildcards: a change of one of them runs the job again."""
     known = {label: SETTINGS.parameters_json(stage, label) for label in SETTINGS.parameters[stage]}
     return {
+        "stage": stage,
         "choice": lambda wildcards: choice_of(wildcards[stage]),
+        "previous": lambda wildcards, input: [f"--previous={input.previous}"] if "previous" in input.keys() else [],
         "parameters": lambda wildcards: known[wildcards[stage]],
         "dates": dates_of(files_of(stage)),
         "code": lambda wildcards: code_digest(*stage_modules(stage, STAGES[stage][choice_of(wildcards[stage])])),
@@ -175,13 +177,6 @@ def stage_message(stage, title):
     """Message when a stage starts: the scene, and the choices up to this stage."""
     choices = key_of(LABELS, stage).replace("{", "{wildcards.")
     return f"{{wildcards.dataset}}/{{wildcards.scene}}: {title} ({choices})"
-
-
-# the command of every stage, after its inputs
-STAGE_FLAGS = (
-    "--choice {params.choice} --parameters {params.parameters:q} --threads {threads} "
-    "--output {output.maps:q} --timing {output.timing:q} 2> {log:q}"
-)
 
 
 def final_file(wildcards):
@@ -241,8 +236,6 @@ def dates_of(files):
 def ingest_source(wildcards):
     """Source of a scene, as arguments of the ingest command."""
     scene = scene_of(wildcards)
-    if scene.source is None:
-        return ["--builtin", scene.name, "--size", str(scene.height)]
     reader = [] if scene.module is None else ["--module", scene.module]
     return [placed(scene.source) if scene.is_made else str(scene.source), *reader, *scene.flags]
 
@@ -250,8 +243,7 @@ def ingest_source(wildcards):
 def truth_source(wildcards):
     """Source of a scene's ground truth, as arguments of its command; empty without ground truth."""
     scene = scene_of(wildcards)
-    words = ingest_source(wildcards) if scene.source is None or scene.brought_truth else []
-    return words if scene.module is None else words[: -len(scene.flags) or None]
+    return ingest_source(wildcards) if scene.module or scene.brought_truth else []
 
 
 def own_truth_size(wildcards):
@@ -311,5 +303,5 @@ def minutes_for(*seconds, **more):
 
 
 def of_source(read, of_module):
-    """Function of wildcards: ``of_module`` for scenes that a module of an extension reads, else ``read``."""
+    """Function of wildcards: ``of_module`` for scenes that a module reads or renders, else ``read``."""
     return lambda wildcards, attempt: (of_module if scene_of(wildcards).module else read)(wildcards, attempt)

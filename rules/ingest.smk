@@ -19,7 +19,7 @@ rule ingest:
         source=ingest_source,
         disparity_range=ingest_range,
         dates=dates_of(source_files("files")),
-        code=lambda wildcards: code_digest(*ingest_modules(scene_of(wildcards).reader)),
+        code=lambda wildcards: code_digest("sepi.ingest", scene_of(wildcards).reader),
     message:
         "{wildcards.dataset}/{wildcards.scene}: reading the light field"
     shell:

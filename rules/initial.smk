@@ -1,4 +1,5 @@
-# Initial depth (paper, section IV-A, Eq. 1-5): for each pixel the candidate at which the views agree best.
+# Initial depth (paper, section IV-A, Eq. 1-5): for each pixel the candidate at which the views agree best. The rules of
+# the other stages follow this one.
 rule initial:
     input:
         **stage_input("initial"),
@@ -18,4 +19,8 @@ rule initial:
     message:
         stage_message("initial", "initial depth")
     shell:
-        command("sepi.initial --light-field {input.light_field:q} " + STAGE_FLAGS)
+        command(
+            "sepi.{params.stage} --light-field {input.light_field:q} {params.previous:q} --choice {params.choice} "
+            "--parameters {params.parameters:q} --threads {threads} --output {output.maps:q} "
+            "--timing {output.timing:q} 2> {log:q}"
+        )

@@ -1,5 +1,5 @@
 # Global optimisation (paper, section IV-D, Eq. 8-12) over the whole map; choice `none` has no job.
-rule optimize:
+use rule initial as optimize with:
     input:
         **stage_input("optimize"),
     output:
@@ -8,14 +8,9 @@ rule optimize:
         stage_log("logs", "optimize", "log"),
     benchmark:
         stage_log("benchmarks", "optimize", "tsv")
-    group:
-        GROUP
-    threads: threads_for
     resources:
         **stage_resources("optimize"),
     params:
         **stage_params("optimize"),
     message:
         stage_message("optimize", "global optimisation")
-    shell:
-        command("sepi.optimize --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS)

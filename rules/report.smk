@@ -93,8 +93,7 @@ rule maps:
     shell:
         command(
             "sepi.report.figures --results {params.results:q} --plan {params.plan:q} "
-            "--dataset {wildcards.dataset:q} --scene {wildcards.scene:q} --pixels {params.pixels:q} "
-            "--output {output.folder:q} {params.page:q} 2> {log:q}"
+            "--pixels {params.pixels:q} --output {output.folder:q} {params.page:q} 2> {log:q}"
         )
 
 

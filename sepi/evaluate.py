@@ -21,7 +21,7 @@ from sepi.process.command import PATH, SepiCommand, bad_thresholds
 from sepi.scoring.error_bars import ErrorBars, reliability
 from sepi.scoring.regions import edges_of
 from sepi.scoring.scores import DISCONTINUITIES, region_masks, score_regions
-from sepi.stage import ERROR_BARS, StageMaps
+from sepi.stage import StageMaps
 from sepi.validation import require_map, require_type
 
 
@@ -133,14 +133,6 @@ def _disparity(maps: FloatMap | StageMaps) -> FloatMap:
     return maps.disparity if isinstance(maps, StageMaps) else maps
 
 
-def _scored(light_field: LightField, maps: StageMaps) -> FloatMap | StageMaps:
-    """The disparity of a stage's maps, or if they are final, what :func:`sepi.estimate_depth` returns for scores."""
-    if maps.sigma is None:
-        return maps.disparity
-    final = with_unknown(light_field, maps)
-    return StageMaps(final.disparity, final.confidence, {name: final.extra[name] for name in ERROR_BARS})
-
-
 @click.command(name="python -m sepi.evaluate", cls=SepiCommand)
 @click.option("--light-field", "light_field_path", type=PATH, required=True, help="From ingest.")
 @click.option("--truth", type=PATH, help="Ground truth from sepi.truth; default: the light field's own.")
@@ -158,7 +150,9 @@ def command(
 ) -> None:
     """Score the disparity maps of stage files against the light field's ground truth, if it has one."""
     light_field = read_with_truth(light_field_path, truth)
-    maps = {map_name(stages, path): _scored(light_field, read_stage(path)) for path in paths}
+    read = ((map_name(stages, path), read_stage(path)) for path in paths)
+    # maps with error bars are final
+    maps = {name: one.disparity if one.sigma is None else with_unknown(light_field, one) for name, one in read}
     write_scores(output, evaluations_of(light_field, maps, thresholds), scene_attributes(light_field))
     if light_field.ground_truth is None:
         click.echo(f"{light_field.name}: no ground truth, no scores", err=True)

@@ -21,18 +21,14 @@ from sepi.validation import settings_of
 
 
 @click.command(name="python -m sepi.ingest", cls=SepiCommand)
-@click.argument("path", type=PATH, required=False)
+@click.argument("path", type=PATH)
 @scene_flags
-@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Setting of the module; repeatable.")
 @range_to_search
 @reading_flags
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
 @click.option("--output", type=PATH, required=True, help="HDF5 file to write.")
 def main(
-    path: Path | None,
-    builtin: str | None,
-    size: int,
-    views: int,
+    path: Path,
     module: str | None,
     settings: tuple[str, ...],
     disparity_range: tuple[float, float] | None,
@@ -42,18 +38,11 @@ def main(
 ) -> None:
     """Read the light field at PATH and write it as one HDF5 file with a disparity range."""
     use_threads(threads)
-    if (path is None) == (builtin is None):
-        raise click.UsageError("expected PATH or --builtin NAME")
-    if path is not None and module is not None:
-        light_field = import_module(module).read_scene(path, **settings_of(settings, "seed=2"))
-        light_field = replace(light_field, ground_truth=None, masks={})
-    elif path is not None:
+    if module is None:
         light_field = reading.read(path, truth=False)
     else:
-        from sepi.scenes import render
-
-        assert builtin is not None  # one of them is given
-        light_field = replace(render(builtin, size=size, views=views), ground_truth=None, masks={})
+        light_field = import_module(module).read_scene(path, **settings_of(settings, "seed=2"))
+        light_field = replace(light_field, ground_truth=None, masks={})
     light_field = settle_range(light_field, disparity_range)
     # found out here once for all stages
     write_light_field(output, light_field, comparable(light_field) is light_field)

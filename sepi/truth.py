@@ -12,6 +12,7 @@ from sepi.io.disparity_maps import TruthFile
 from sepi.io.hdf5 import read_light_field, write_truth
 from sepi.lightfield import Truth
 from sepi.process.command import PATH, SepiCommand
+from sepi.validation import settings_of
 
 
 @click.command(name="python -m sepi.truth", cls=SepiCommand)
@@ -23,10 +24,8 @@ from sepi.process.command import PATH, SepiCommand
 @click.option("--output", type=PATH, required=True, help="HDF5 file to write.")
 def main(
     path: Path | None,
-    builtin: str | None,
-    size: int,
-    views: int,
     module: str | None,
+    settings: tuple[str, ...],
     reading: Reading,
     own: TruthFile | None,
     light_field: Path | None,
@@ -38,15 +37,11 @@ def main(
     """
     truth: Truth = (None, {})
     if path is not None and module is not None:
-        truth = import_module(module).read_truth(path)
+        truth = import_module(module).read_truth(path, **settings_of(settings, "seed=2"))
     elif path is not None:
         from sepi.io.readers.formats import read_truth
 
         truth = read_truth(path, reading.options, reading.file_format)
-    elif builtin is not None:
-        from sepi.scenes.light_field import scene_truth
-
-        truth = scene_truth(builtin, size, views)
     if own is not None:
         known = None if light_field is None else read_light_field(light_field)
         part = reading.options.part if known is None or known.rig is None else None

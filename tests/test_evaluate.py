@@ -224,7 +224,8 @@ def test_a_map_that_was_not_scored_is_named(tmp_path: Path) -> None:
 def test_ground_truth_lies_apart_whatever_the_scene_is(tmp_path: Path, kind: str) -> None:
     """In the light field's own file, new ground truth would ask for all maps; lost, the scene would have no scores."""
     whole = render("dots", size=64, views=3)
-    words = {"built-in": ["--builtin", "dots", "--size", "64", "--views", "3"]}.get(kind, [str(tmp_path / kind)])
+    built_in = ["dots", "--module", "sepi.scenes.light_field", "--set", "size=64", "--set", "views=3"]
+    words = built_in if kind == "built-in" else [str(tmp_path / kind)]
     if kind == "folder":
         write_hci(whole, tmp_path / kind)
     elif kind == "file":

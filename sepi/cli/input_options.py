@@ -109,10 +109,8 @@ _TRUTH = (
 )
 
 _SCENES = (
-    click.option("--builtin", help="Built-in scene, in place of PATH."),
-    click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Built-in: pixels a side."),
-    click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Built-in: views a side."),
-    click.option("--module", help="Module of an extension that reads PATH."),
+    click.option("--module", help="Module that reads or renders PATH; for a built-in scene sepi.scenes.light_field."),
+    click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Setting of the module; repeatable."),
 )
 
 view_of_result = click.option(
@@ -141,7 +139,7 @@ def _flagged(command: Callable[..., Any], flags: Iterable[Callable[..., Any]]) -
 
 
 def scene_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the flags of built-in scenes, and of those that extensions read, to a command."""
+    """Add the flags of scenes that a module reads or renders to a command."""
     return _flagged(command, _SCENES)
 
 

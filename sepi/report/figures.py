@@ -26,7 +26,7 @@ from sepi.registry import added
 from sepi.report.drawing import write_curves, write_overview
 from sepi.report.panels import Panel, SceneResults, panels_of
 from sepi.report.pictures import disparity_limits, panel_picture, reference_picture
-from sepi.report.plan import MAIN_VARIANT, Plan
+from sepi.report.plan import Plan
 
 
 def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
@@ -68,24 +68,23 @@ def write_scene(results: SceneResults, panels: Sequence[Panel], title: str, fold
 
 @click.command(name="python -m sepi.report.figures", cls=SepiCommand)
 @click.option("--results", type=PATH, required=True, help="Folder of the results.")
-@click.option("--plan", "text", required=True, help="JSON: scenes per dataset, choices per variant and stage.")
-@click.option("--dataset", required=True, help="Dataset of the scene.")
-@click.option("--scene", required=True, help="Scene to draw.")
+@click.option("--plan", "text", required=True, help="JSON: one scene of a dataset, choices per variant and stage.")
 @click.option("--pixels", default="[]", show_default=True, help="JSON: pixels to look into, [[row, column], ...].")
 @click.option("--output", type=PATH, required=True, help="Folder to write to.")
 @click.option("--page", type=PATH, help="JSON file to write: the scene for a page.")
-def command(results: Path, text: str, dataset: str, scene: str, pixels: str, output: Path, page: Path | None) -> None:
+def command(results: Path, text: str, pixels: str, output: Path, page: Path | None) -> None:
     """Write the pictures of one scene."""
     plan = Plan.from_json(results, text)
+    ((dataset, scene),) = plan.pairs
     found = read_results(plan, dataset, scene)
-    panels, final_file = panels_of(found), plan.stage_file(dataset, scene, MAIN_VARIANT, plan.stages[-1])
+    panels = panels_of(found)
     asked = [(int(y), int(x)) for y, x in json.loads(pixels)]
     more = [import_module(module).write_scene for module in added("scenes").values()]
     # an incomplete set of pictures would count as made
     with atomic_folder(output, replace=True) as folder:
         write_scene(found, panels, f"{dataset}/{scene}", folder)
         for write in more:
-            write(folder, page, found, panels, dataset, scene, final_file, asked)
+            write(folder, page, plan, found, panels, asked)
 
 
 if __name__ == "__main__":

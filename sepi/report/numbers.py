@@ -25,7 +25,7 @@ from sepi.io.scores import Evaluation, Scores, read_evaluations, without_nan
 from sepi.report.plan import PARTS, Plan
 from sepi.report.runs import EXTERNAL, KEYS, TENTHS, Runs, read_json
 from sepi.scoring.scores import PROTOCOLS, SCORED_REGIONS, WHOLE_MAP
-from sepi.validation import require_known
+from sepi.variants import HANDED_ON
 from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 
 
@@ -94,7 +94,7 @@ def collect(plan: Plan) -> Runs:
     timings = {
         (*pair, variant, stage): _timing(plan, *pair, variant, stage)
         for pair, variant, stage in itertools.product(plan.pairs, plan.variants, plan.stages)
-        if plan.runs_stage(variant, stage)
+        if plan.variants[variant][stage] != HANDED_ON
     }
     machines: list[Any] = []
     parameters: dict[str, dict[str, list[Any]]] = {stage: {} for stage in plan.stages}
@@ -192,12 +192,8 @@ def _scores_of_scene(plan: Plan, dataset: str, scene: str) -> Iterator[_Number]:
 
 def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Evaluation]:
     """The external methods' maps, without their pixels."""
-    if not plan.external:
-        return {}
     path = plan.files(dataset, scene).external
-    maps = read_evaluations(path, with_maps=False)
-    require_known(str(path), plan.external, maps)
-    return {method: maps[method] for method in plan.external}
+    return read_evaluations(path, plan.external, with_maps=False) if plan.external else {}
 
 
 def _scores(scores: Mapping[str, Mapping[str, Scores]]) -> Iterator[tuple[str, str, str, float]]:

@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 
 from sepi.errors import SepiError
 from sepi.registry import added
-from sepi.variants import HANDED_ON, STAGES, VARIANTS, compared_methods
+from sepi.variants import STAGES, VARIANTS, compared_methods
 from sepi.variants.built_in import PARTS_OF_BEST, UNCORRECTED
 from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 from sepi.workflow.result_paths import SceneFiles, key_of, scene_files
@@ -186,20 +186,15 @@ class Plan:
         """Key of a variant's maps after a stage, in numbers and scores."""
         return key_of(self.variants[variant], stage)
 
-    def runs_stage(self, variant: str, stage: str) -> bool:
-        """Whether a stage of a variant is switched on."""
-        return self.variants[variant][stage] != HANDED_ON
-
     def number_inputs(self) -> list[Path]:
         """Input files of the numbers, each once."""
         files: list[Path] = []
         for dataset, scene in self.pairs:
+            known, of_stages = self.files(dataset, scene), itertools.product(self.variants, self.stages)
             files.append(self.scores_file(dataset, scene))
-            for variant, stage in itertools.product(self.variants, self.stages):
-                files.append(self.stage_file(dataset, scene, variant, stage, "time.json"))
+            files += [self.stage_file(dataset, scene, *one, "time.json") for one in of_stages]
             if self.report != PARTS:
-                files += [self.files(dataset, scene).light_field, self.files(dataset, scene).truth]
-                files += [self.files(dataset, scene).external] if self.external else []
+                files += [known.light_field, known.truth, *([known.external] if self.external else [])]
         return list(dict.fromkeys(files))
 
     @property
@@ -225,7 +220,5 @@ class Plan:
     def map_inputs(self, dataset: str, scene: str) -> list[Path]:
         """Input files of the pictures of a scene, each once."""
         known = self.files(dataset, scene)
-        files = [known.light_field, known.truth, known.scores(self.ending)]
-        files += self.scored_files(dataset, scene)
-        files += [self.files(dataset, scene).external] if self.external else []
-        return list(dict.fromkeys(files))
+        files = [known.light_field, known.truth, self.scores_file(dataset, scene)]
+        return [*files, *self.scored_files(dataset, scene), *([known.external] if self.external else [])]

@@ -217,7 +217,11 @@ def _environment(table: Table, section: Section, label: str) -> str:
     # LaTeX numbers tables itself
     title = "; ".join(filter(None, [re.sub(r"^Table \d+: ", "", table.title), section.heading]))
     marked = rf" {_escaped(table.marked)} (\textbf{{bold}}, \underline{{underlined}})." if table.marked else ""
-    caption = f"{_escaped(title)}. " + _with_code(table.caption, _escaped, _typewriter) + marked
+    caption = (
+        f"{_escaped(title)}. "
+        + _with_code(table.caption, _escaped, lambda name: rf"\texttt{{{_escaped(name)}}}")
+        + marked
+    )
     cells = _marked(section, _escaped, r"\textbf{{{}}}", r"\underline{{{}}}")
     averages = [row for row, kind in enumerate(section.rows) if kind.startswith("average")]
     if averages and averages[0]:
@@ -263,10 +267,6 @@ def _escaped(text: str) -> str:
 def _plain(text: str) -> str:
     """Text escaped for Markdown, in one line."""
     return _MARKUP.sub(r"\\\g<0>", " ".join(text.splitlines()))
-
-
-def _typewriter(name: str) -> str:
-    return rf"\texttt{{{_escaped(name)}}}"
 
 
 def _with_code(text: str, escaped: Callable[[str], str], code: Callable[[str], str]) -> str:

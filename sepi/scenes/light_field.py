@@ -11,6 +11,7 @@ import math
 import zlib
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -96,9 +97,14 @@ def render(
     return light_field
 
 
-def scene_truth(name: str, size: int, views: int) -> Truth:
+def read_scene(name: str | Path, size: int = 192, views: int = 9) -> LightField:
+    """The light field of :func:`render`, for a job of the workflow."""
+    return render(str(name), size=size, views=views)
+
+
+def read_truth(name: str | Path, size: int = 192, views: int = 9) -> Truth:
     """Ground truth and masks of the light field of :func:`render`, without drawing its views."""
-    _, light_field = _with_truth(name, size, views, textured=False)
+    _, light_field = _with_truth(str(name), size, views, textured=False)
     return light_field.ground_truth, light_field.masks
 
 

@@ -14,7 +14,7 @@ It does not cover:
   cannot change the maps. :func:`stage_modules` adds the module that writes them;
 - code below ``if TYPE_CHECKING:``, which never runs;
 - the ``__init__`` of a package on the way to a module, unless a name is imported from the package itself;
-- the format readers and the built-in scenes, of which a job runs only one, which :func:`ingest_modules` names;
+- the format readers and the built-in scenes, of which a job runs only one, which its rule names;
 - other libraries: a new version of NumPy reruns nothing.
 
 No stage imports another stage, so a change in one does not change the digests of others.
@@ -53,11 +53,6 @@ def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
     """Modules whose code, with imports, determines a stage's file: stage, choice, preparation of views, file format."""
     prepared = "sepi.inspection.coded_views"
     return (f"sepi.{stage}", choice.function.__module__, prepared, "sepi.io.hdf5", "sepi.io.provenance")
-
-
-def ingest_modules(reader: str) -> tuple[str, ...]:
-    """Modules that determine a light field's file: ingest, and the module that reads or renders the views."""
-    return ("sepi.ingest", reader)
 
 
 @cache

@@ -32,6 +32,7 @@ from sepi.workflow.settings import Report, Settings, stage_settings
 _RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view", "dataset", "scene", "row", "region")
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
+_RENDERER = "sepi.scenes.light_field"
 _WORDS = {"true": True, "false": False, "null": None}
 # keys whose values stay text even if they look like numbers
 _TEXTS = ("path", "truth", "images", "reference", "pattern", "variable", "include", "exclude")
@@ -222,7 +223,8 @@ def _scenes(config: _Config, more: list[Scene]) -> dict[str, Scene]:
     """Every scene, with these more, by ``DATASET/NAME``."""
     require_known("config.builtin.scenes", config.builtin.scenes, SCENES)
     size = config.builtin.size
-    scenes = [Scene("builtin", name, None, (), _BUILTIN_VIEWS, size, size) for name in config.builtin.scenes]
+    drawn = Scene("", "", Path(), (), _BUILTIN_VIEWS, size, size, flags=("--set", f"size={size}"), module=_RENDERER)
+    scenes = [replace(drawn, dataset="builtin", name=name, source=Path(name)) for name in config.builtin.scenes]
     for dataset, root in (("hci", config.hci_root), ("hci_2013", config.hci_2013_root)):
         if root:
             folder = Path(root.path).expanduser()

@@ -56,8 +56,8 @@ class Scene:
     ----------
     dataset, name : str
         Name of the scene's folder, ``results/DATASET/NAME``.
-    source : Path or None
-        Folder or file to read; None for a built-in scene.
+    source : Path
+        Folder or file to read; the name of a built-in scene.
     files : tuple of Path
         Files that ingest reads, without ground truth; a change in one of them is a change of the scene.
     views : int
@@ -73,12 +73,13 @@ class Scene:
     own_truth : TruthFile or None
         The user's ground truth, instead of the light field's.
     module : str or None
-        Module of an extension, whose ``read_scene(source, **settings)`` and ``read_truth(source)`` read the source.
+        Module whose ``read_scene(source, **settings)`` and ``read_truth(source, **settings)`` read or render the
+        source, with settings from ``--set KEY=VALUE`` among the flags; None: a reader of files.
     """
 
     dataset: str
     name: str
-    source: Path | None
+    source: Path
     files: tuple[Path, ...]
     views: int
     height: int
@@ -97,13 +98,11 @@ class Scene:
     @property
     def is_made(self) -> bool:
         """Whether a job of the workflow makes the source."""
-        return self.source is not None and self.source.is_relative_to(RESULTS)
+        return self.source.is_relative_to(RESULTS)
 
     @property
     def reader(self) -> str:
         """Module that reads the views, or renders them."""
-        if self.source is None:
-            return "sepi.scenes"
         if self.module is not None:
             return self.module
         # ingest reports an unknown format
@@ -119,13 +118,13 @@ class Scene:
         """Files with ground truth and masks that belong to the light field itself."""
         if self.module is not None:
             return self.files
-        return () if self.source is None or self._format is None else tuple(self._format.truth_files(self.source))
+        return () if self._format is None else tuple(self._format.truth_files(self.source))
 
     @cached_property
     def _format(self) -> Format | None:
         given = dict(pairwise(self.flags)).get("--format", _FORMAT_OF.get(self.dataset))
         with suppress(SepiError):
-            return None if self.source is None else format_of(self.source, given)
+            return format_of(self.source, given)
         return None
 
     def memory_mb(self, bytes_per_sample: float, bytes_per_pixel: float = 0, copies: int = 2) -> int:

@@ -37,8 +37,9 @@ class RenderedScene(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The scene's name."""
-        return exposed_name(*self)
+        """The scene's name: ``sticks``, ``sticks_low`` at a level of noise, or with another seed ``sticks_low_2``."""
+        exposure = [] if self.noise == WITHOUT_NOISE else [self.noise, *([str(self.seed)] if self.seed != 1 else [])]
+        return "_".join([self.world, *exposure])
 
 
 def rendered_scene(name: str) -> RenderedScene:
@@ -47,8 +48,3 @@ def rendered_scene(name: str) -> RenderedScene:
     found = re.fullmatch(rf"(.+?)(?:_({levels})(?:_(\d+))?)?", name)
     assert found is not None
     return RenderedScene(found[1], found[2] or WITHOUT_NOISE, int(found[3] or 1))
-
-
-def exposed_name(scene: str, noise: str = WITHOUT_NOISE, seed: int = 1) -> str:
-    """Name of a scene at a noise level: ``sticks``, ``sticks_low``, or with another seed ``sticks_low_2``."""
-    return "_".join([scene] if noise == WITHOUT_NOISE else [scene, noise, *([str(seed)] if seed != 1 else [])])

@@ -49,7 +49,7 @@ class SceneFiles:
         ending : str
         """
         key = key_of(labels, stage)
-        return self.stages / key / f"{stage_of(key)}.{ending}"
+        return self.stages / key / f"{list(STAGES)[key.count('/')]}.{ending}"
 
     def scores(self, which: str = "") -> Path:
         """The scores of the maps; with ``which``, those of the report ``_REPORT`` alone."""
@@ -81,8 +81,3 @@ def key_of(labels: Mapping[str, str], stage: str) -> str:
     while names[-1] == HANDED_ON:
         names.pop()
     return "/".join(names)
-
-
-def stage_of(key: str) -> str:
-    """The stage that made the maps of a key of :func:`key_of`."""
-    return list(STAGES)[key.count("/")]

@@ -467,7 +467,8 @@ def test_ingest_writes_the_scene_with_a_range(scene: Path) -> None:
 
 def test_ingest_renders_a_built_in_scene(tmp_path: Path) -> None:
     output = tmp_path / "lf.h5"
-    words = ("--builtin", "dots", "--size", 64, "--views", 3, "--disparity-range", -2, 2, "--output", output)
+    words = ("dots", "--module", "sepi.scenes.light_field", "--set", "size=64", "--set", "views=3")
+    words += ("--disparity-range", -2, 2, "--output", output)
     assert call(*words, of=ingest.main).exit_code == 0
     light_field = read_light_field(output)
     assert light_field.views.shape == (3, 3, 64, 64, 3)

@@ -23,6 +23,7 @@ from sepi.report.plan import Plan
 from sepi.report.runs import Runs, read_numbers
 from sepi.report.table import Table, as_csv, as_markdown
 from sepi.stage import StageMaps
+from sepi.variants import HANDED_ON
 
 SIZE = 40
 SCENES = {"builtin": ["dots", "flat"], "hci": ["cotton", "mine", "picture"]}
@@ -106,7 +107,7 @@ def with_results(made: Plan) -> Plan:
         write_light_field(made.files(dataset, name).light_field, replace(scene, ground_truth=None, masks={}))
         write_truth(made.files(dataset, name).truth, (scene.ground_truth, scene.masks))
         for variant in made.variants:
-            for stage in (stage for stage in made.stages if made.runs_stage(variant, stage)):
+            for stage in (stage for stage in made.stages if made.variants[variant][stage] != HANDED_ON):
                 maps = stage_maps(scene, variant, stage)
                 step = {"stage": stage, "choice": made.variants[variant][stage], "parameters": "{}", "made_from": "[]"}
                 write_stage(made.stage_file(dataset, name, variant, stage), maps, step)

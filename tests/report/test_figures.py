@@ -1,5 +1,6 @@
 """Pictures of a scene."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,7 +14,7 @@ from sepi.report.plan import Plan
 
 
 def draw(plan: Plan, folder: Path, dataset: str, scene: str) -> None:
-    result = run(figures.command, plan, folder, "--dataset", dataset, "--scene", scene)
+    result = run(figures.command, replace(plan, scenes={dataset: (scene,)}), folder)
     assert result.exit_code == 0, result.output
 
 

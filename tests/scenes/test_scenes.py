@@ -30,7 +30,7 @@ from sepi.scenes.definitions import (
 )
 
 # as it is drawn: the tests' other modules have it from a file
-from sepi.scenes.light_field import render, scene_truth, true_disparity
+from sepi.scenes.light_field import read_truth, render, true_disparity
 
 SIZE, VIEWS = 96, 5
 
@@ -223,7 +223,7 @@ def test_textureless_mask_is_the_bare_wall() -> None:
     values = light_field.reference_view[ndimage.binary_erosion(bare, iterations=2)]
     assert values.std(axis=0).max() < 0.015
     with unpainted():
-        assert not any(scene_truth(name, SIZE, 2)[1]["textureless"].any() for name in SCENES if name != "wall")
+        assert not any(read_truth(name, SIZE, 2)[1]["textureless"].any() for name in SCENES if name != "wall")
 
 
 @pytest.mark.parametrize("name", list(SCENES))

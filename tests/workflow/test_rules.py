@@ -14,7 +14,7 @@ from sepi.errors import SepiError
 from sepi.registry import added
 from sepi.report.plan import PUBLISHED
 from sepi.variants import HANDED_ON, STAGES, VARIANTS
-from sepi.workflow.code_digest import code_digest, ingest_modules, stage_modules
+from sepi.workflow.code_digest import code_digest, stage_modules
 from sepi.workflow.config import load_settings
 from sepi.workflow.settings import MOST_ON_PAGE, Report
 
@@ -63,20 +63,22 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
         if command is None:
             continue
         checked.add(rule.name)
-        assert rule.name not in STAGES or command[1] == f"sepi.{rule.name}"
-        code = dict(rule.params.items()).get("code")
+        params = dict(rule.params.items())
+        main = command[1] + params.get("stage", "")
+        assert rule.name not in STAGES or main == f"sepi.{rule.name}"
+        code = params.get("code")
         for name, chosen in STAGES.get(rule.name, {"": None}).items():
             if name == HANDED_ON:
                 continue
-            modules = (command[1],) if chosen is None else stage_modules(rule.name, chosen)
+            modules = (main,) if chosen is None else stage_modules(rule.name, chosen)
             if rule.name == "maps":
-                modules = (command[1], *added("scenes").values())
+                modules = (main, *added("scenes").values())
             if rule.name == "ingest":
-                modules = ingest_modules("sepi.scenes")
+                modules = ("sepi.ingest", "sepi.scenes.light_field")
             if rule.name == "render":
                 modules = tuple(f"sepi.extensions.rendered.{name}" for name in ("rendering", "worlds.sticks"))
             if rule.name == "truth":
-                modules = ("sepi.truth", "sepi.scenes")
+                modules = ("sepi.truth", "sepi.scenes.light_field")
             given = code(scene(**{rule.name: name})) if callable(code) else code
             assert given == code_digest(*modules), f"{rule.name} {name}"
     others = {"ingest", "truth", "evaluate", "export", "external", "numbers", "maps", "page", "render"}

@@ -225,8 +225,7 @@ def _problem_in(folder: Path, name: str, archive: zipfile.ZipFile | None) -> str
     path = folder / name
     try:
         info = archive.getinfo(name) if archive else None
-        if problem := _size_problem(name, info.file_size if info else path.stat().st_size):
-            return problem
+        _require_size(path, name, info.file_size if info else path.stat().st_size)
         if archive and info:
             if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
                 return f"compressed by method {info.compress_type}; expected 'deflated' or none"
@@ -247,8 +246,7 @@ def _problem_in(folder: Path, name: str, archive: zipfile.ZipFile | None) -> str
 
 
 def _read_seconds(path: Path) -> float:
-    if problem := _size_problem(RUNTIMES, path.stat().st_size):
-        raise SepiError(f"{path}: {problem}")
+    _require_size(path, RUNTIMES, path.stat().st_size)
     return _seconds(path.read_bytes().decode("ascii", "replace").strip(), path)
 
 
@@ -259,9 +257,10 @@ def _seconds(text: str, where: object) -> float:
     raise SepiError(f"{where}: expected the run time in seconds as a number, got {text!r}; it must be positive")
 
 
-def _size_problem(name: str, size: int) -> str | None:
+def _require_size(path: Path, name: str, size: int) -> None:
     most, what = _LIMITS[name.partition("/")[0]]
-    return None if size <= most else f"{size} bytes are too many for {what}"
+    if size > most:
+        raise SepiError(f"{path}: {size} bytes are too many for {what}")
 
 
 def _shown(name: str) -> str:

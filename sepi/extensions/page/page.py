@@ -14,6 +14,7 @@ from markupsafe import Markup, escape
 from matplotlib.colors import Colormap
 
 from sepi.io.files import write_whole
+from sepi.io.scores import without_nan
 from sepi.process.command import PATH, SepiCommand
 from sepi.report import charts, published
 from sepi.report.pictures import error_scale, scale_colours
@@ -80,19 +81,15 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
         rows.append(
             {
                 "scene": f"{dataset}, average of {len(scenes)}" if len(scenes) > 1 else f"{dataset}/{scenes[0]}",
-                "published": [known(figure) for figure in theirs],
-                "ours": {variant: [known(one[key].mean()) for one in ours] for variant, key in keys.items()},
+                "published": theirs,
+                "ours": {variant: [one[key].mean() for one in ours] for variant, key in keys.items()},
                 "notes": {
                     v: count_note([int(one[key].count()) for one in ours], len(scenes)) for v, key in keys.items()
                 },
             }
         )
-    return rows
-
-
-def known(figure: float) -> float | None:
-    """The figure, None for NaN."""
-    return None if math.isnan(figure) else float(figure)
+    found: list[dict[str, Any]] = without_nan(rows)
+    return found
 
 
 def missing_scenes(runs: Runs) -> dict[str, list[str]]:

@@ -17,7 +17,7 @@ from sepi.io.provenance import history_of
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.report.panels import Panel, SceneResults, first_final
 from sepi.report.pictures import disparity_limits, reference_picture
-from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
+from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT, Plan
 
 
 def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[InterestingPixel]) -> list[Probe]:
@@ -50,11 +50,9 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
 def write_scene(
     folder: Path,
     page: Path | None,
+    plan: Plan,
     results: SceneResults,
     panels: Sequence[Panel],
-    dataset: str,
-    scene: str,
-    final_file: Path,
     pixels: Sequence[tuple[int, int]],
 ) -> None:
     """Write figures of single pixels to ``folder / "pixels"``, and the scene for the page if that is made.
@@ -65,17 +63,17 @@ def write_scene(
         Folder of the scene's pictures.
     page : Path or None
         JSON file to write.
+    plan : Plan
+        Of this scene alone.
     results : SceneResults
     panels : sequence of Panel
         All of the scene.
-    dataset, scene : str
-    final_file : Path
-        File of the last stage of the paper's method.
     pixels : sequence of (int, int)
         Rows and columns that the user asks for.
     """
     asked = [InterestingPixel(y, x, "asked for") for y, x in pixels]
-    probes = scene_probes(results, final_file, asked)
+    ((dataset, scene),) = plan.pairs
+    probes = scene_probes(results, plan.stage_file(dataset, scene, MAIN_VARIANT, plan.stages[-1]), asked)
     if probes:
         write_probes(folder / "pixels", probes, reference_picture(results.light_field))
     if page is not None:

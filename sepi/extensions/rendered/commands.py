@@ -22,7 +22,7 @@ from sepi.process.threads import use_threads
 from sepi.scenes.folder import write_hci
 from sepi.validation import require_known, settings_of
 from sepi.validation.models import validated
-from sepi.workflow.rendered_scenes import NOISE_LEVELS, WITHOUT_NOISE, exposed_name
+from sepi.workflow.rendered_scenes import NOISE_LEVELS, WITHOUT_NOISE, RenderedScene
 
 _FLAGS = (
     click.Option(["--rendered"], is_flag=True, help="Path-traced scenes (Mitsuba 3, extra [render]); minutes each."),
@@ -88,7 +88,7 @@ def _write_rendered(
     options = validated(RenderOptions, settings, "--set")
     exposures = [validated(Exposure, {"noise": level, **of_sensor}, "--set") for level in levels]
     paths = {name: output / f"{name}.h5" for name in names or RENDERED}
-    require_new(output, (exposed_name(name, one.noise, one.noise_seed) for name in paths for one in exposures))
+    require_new(output, (RenderedScene(name, one.noise, one.noise_seed).name for name in paths for one in exposures))
     require_mitsuba()
     # before anything is rendered, which takes minutes
     for name, path in paths.items():

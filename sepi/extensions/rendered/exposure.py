@@ -17,7 +17,7 @@ from sepi.extensions.rendered.shapes import Points
 from sepi.extensions.rendered.world import Share
 from sepi.lightfield import DisparityRange, LightField
 from sepi.validation.models import CheckedModel, Positive, validated
-from sepi.workflow.rendered_scenes import NoiseLevel, exposed_name
+from sepi.workflow.rendered_scenes import NoiseLevel, RenderedScene
 
 # standard deviations of 3 and 9 of 255 in grey of 18 %
 WHITE: dict[NoiseLevel, float] = {"low": 2000.0, "high": 250.0}
@@ -94,7 +94,7 @@ def exposed(render: Render, exposure: Exposure) -> LightField:
         views[t, s] = _taken(light, exposure, render.light, rng)
     return LightField(
         views=views,
-        name=exposed_name(render.name, exposure.noise, exposure.noise_seed),
+        name=RenderedScene(render.name, exposure.noise, exposure.noise_seed).name,
         source="rendered",
         disparity_range=_range_of(render.disparity),
         ground_truth=render.disparity[render.centre],

@@ -169,7 +169,7 @@ def read_render(path: Path) -> Render:
         return Render(name=str(attribute(file, "render")), light=float(attribute(file, "light")), **arrays, **told)
 
 
-def read_truth(path: Path) -> tuple[FloatMap, dict[str, BoolMap]]:
+def read_truth(path: Path, **_: object) -> tuple[FloatMap, dict[str, BoolMap]]:
     """Disparity and masks of a render's reference view, read without its pictures."""
     with open_hdf5(path, "render of a scene") as file:
         centre = tuple(count // 2 for count in file["disparity"].shape[:2])

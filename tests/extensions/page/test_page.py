@@ -162,9 +162,9 @@ def test_the_command_writes_the_same_page(example: Example, tmp_path: Path) -> N
 
 def test_pictures_and_the_scene_for_the_page_come_from_one_command(example: Example, tmp_path: Path) -> None:
     """With the pixels that the configuration asks for; the scene is the same as it was the first time."""
-    words = ["--results", example.plan.results, "--plan", example.plan.to_json(), "--dataset", COTTON[0]]
-    words += ["--scene", COTTON[1], "--pixels", "[[20, 41]]", "--output", tmp_path / "pictures"]
-    words += ["--page", tmp_path / "page.json"]
+    plan = replace(example.plan, scenes={COTTON[0]: COTTON[1:]})
+    words = ["--results", plan.results, "--plan", plan.to_json(), "--pixels", "[[20, 41]]"]
+    words += ["--output", tmp_path / "pictures", "--page", tmp_path / "page.json"]
     done(*words, of=figures.command)
     (scene,) = [found for found in example.scenes if found["scene"] == "cotton"]
     assert json.loads((tmp_path / "page.json").read_text()) == scene

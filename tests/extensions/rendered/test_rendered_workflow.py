@@ -17,7 +17,7 @@ from sepi.extensions.rendered.exposure import read_scene
 from sepi.extensions.rendered.worlds import RENDERED
 from sepi.io.hdf5 import read_light_field, read_with_truth
 from sepi.scoring.scores import region_masks, score_regions
-from sepi.workflow.code_digest import imported_modules, ingest_modules
+from sepi.workflow.code_digest import imported_modules
 from sepi.workflow.config import load_settings
 from sepi.workflow.rendered_scenes import RenderedScene, rendered_scene
 
@@ -105,4 +105,4 @@ def test_a_scene_is_rendered_again_for_the_renderer_and_itself_alone() -> None:
     assert {f"sepi.extensions.rendered.{name}" for name in ("rendering", "tracing", "worlds.sticks")} <= found
     others = {f"sepi.extensions.rendered.{name}" for name in ("worlds.room", "worlds", "exposure")}
     assert not found & {*others, "sepi.process.command"}
-    assert not any("rendered" in name for name in imported_modules(*ingest_modules("sepi.scenes")))
+    assert not any("rendered" in name for name in imported_modules("sepi.ingest", "sepi.scenes"))
