@@ -12,19 +12,9 @@ from sepi.process.command import PATH, SepiCommand, progress_bar
 @click.command(cls=SepiCommand)
 @click.argument("folder", type=PATH)
 @click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-cameras for a FOLDER called NAME.")
+@click.option("--lens", default="SIMPLE_RADIAL", show_default=True, help="COLMAP's lens model: RADIAL, OPENCV, ...")
 @click.option(
-    "--lens",
-    default="SIMPLE_RADIAL",
-    show_default=True,
-    metavar="MODEL",
-    help="COLMAP's lens model: SIMPLE_PINHOLE, RADIAL, OPENCV, OPENCV_FISHEYE, ...",
-)
-@click.option(
-    "--cameras",
-    type=click.Choice(["one", "each"]),
-    default="one",
-    show_default=True,
-    help="Whether one camera took all pictures, or each has its own.",
+    "--cameras", type=click.Choice(["one", "each"]), default="one", help="One camera, or one for each picture."
 )
 @click.option("--force", is_flag=True, help="Go on even if a check of a few pictures fails.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
@@ -66,21 +56,10 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
 @click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=PATH)
 @click.argument("result_path", metavar="RESULT", type=PATH)
-@click.option(
-    "--to",
-    "kind",
-    type=click.Choice(["colmap", "nerfstudio"]),
-    default="colmap",
-    show_default=True,
-    help="Program to write for.",
-)
+@click.option("--to", "kind", type=click.Choice(["colmap", "nerfstudio"]), default="colmap", show_default=True)
 @click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
-@click.option(
-    "--min-confidence", type=float, metavar="X", help="Least confidence of points; default: the median of all pixels."
-)
-@click.option(
-    "--points", type=click.IntRange(min=0), default=10000, show_default=True, metavar="N", help="At most N points."
-)
+@click.option("--min-confidence", type=float, metavar="X", help="Least confidence of points; default: the median.")
+@click.option("--points", type=click.IntRange(min=0), default=10000, show_default=True, help="Most points.")
 @camera_flags
 @reading_flags
 def poses(

@@ -21,6 +21,7 @@ from sepi.io.files import atomic_folder, atomic_path, naming, remove_files
 from sepi.io.images import write_png
 from sepi.lightfield import FloatMap, LightField, full_scale
 from sepi.process.command import PATH, SepiCommand, progress_bar
+from sepi.stage import part_of
 
 INDEX = "focus.csv"
 """Name of the index: a row for each image."""
@@ -130,35 +131,12 @@ _STEPS = 9
 @click.argument("light_field_path", metavar="INPUT", type=PATH)
 @click.argument("result_path", metavar="[RESULT]", type=PATH, required=False)
 @click.option("-o", "--output", type=PATH, help="Folder to write; default: NAME-refocused for an INPUT called NAME.")
+@click.option("--steps", type=click.IntRange(1, 999), help=f"Pictures; default: {_STEPS} without --disparity and --at.")
+@click.option("--disparity", "disparities", type=float, multiple=True, help="Focus at this disparity; repeatable.")
 @click.option(
-    "--steps",
-    type=click.IntRange(1, 999),
-    metavar="N",
-    help=f"Pictures from the nearest to the farthest surface; default: {_STEPS} without --disparity and --at.",
+    "--at", "pixels", type=click.IntRange(min=0), nargs=2, multiple=True, metavar="X Y", help="Pixel to focus on."
 )
-@click.option(
-    "--disparity",
-    "disparities",
-    type=float,
-    multiple=True,
-    metavar="D",
-    help="Focus at this disparity, pixels per view step; repeatable.",
-)
-@click.option(
-    "--at",
-    "pixels",
-    type=click.IntRange(min=0),
-    nargs=2,
-    multiple=True,
-    metavar="X Y",
-    help="Focus on the surface at pixel X, Y, from 0 at the top left; repeatable; needs RESULT.",
-)
-@click.option(
-    "--aperture",
-    type=float,
-    metavar="R",
-    help="Radius of the aperture in view steps; a smaller one has more in focus. Default: all views.",
-)
+@click.option("--aperture", type=float, help="Radius in view steps; smaller: more in focus. Default: all views.")
 @click.option("--animation", is_flag=True, help="Also write the stack as an animation, focus.webp.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 @camera_flags
@@ -236,11 +214,7 @@ def refocus(
     if surfaces is not None:
         makers.insert(0, partial(refocusing.all_in_focus, light_field, surfaces))
     with progress_bar(light_field.name) as progress:
-
-        def part(number: int, fraction: float) -> None:
-            progress((number + fraction) / len(makers))
-
-        pictures = (make(progress=partial(part, number)) for number, make in enumerate(makers))
+        pictures = (make(progress=part_of(progress, number, len(makers))) for number, make in enumerate(makers))
         files = write_refocused(folder, rows, pictures, light_field.views.dtype, animated=animation)
     told = ", ".join(f"{at:.3g}" for at, _ in foci)
     metres = f" ({', '.join(f'{depth:.3g}' for depth in depths)} m)" if depths else ""
