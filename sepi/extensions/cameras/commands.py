@@ -24,8 +24,8 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
     Move one camera sideways past a static scene, with a constant viewing direction, along a grid, a row or any path.
     A first check of a few reduced pictures refuses a camera that hardly moved, moved forward or turned too far. The
     last lines tell how many pictures are placed, and how far the cameras stand off a plane. The focal length comes
-    from the pictures if they determine it, else from EXIF, else it is a usual one. Needs pycolmap: pip install
-    'sepi[colmap]'.
+    from the pictures if they determine it, else from EXIF, else it is a usual one. Lenses are SIMPLE_PINHOLE, RADIAL,
+    OPENCV, OPENCV_FISHEYE and others of COLMAP. Needs pycolmap: pip install 'sepi[colmap]'.
 
     \b
     Examples:

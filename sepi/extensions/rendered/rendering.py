@@ -38,16 +38,9 @@ class RenderOptions(CheckedModel):
     grid: tuple[_Rows, _Rows] = Field((9, 9), description="rows and columns of views")
     samples: int = Field(64, ge=1, le=65536, description="paths of light for each pixel; few leave their own noise")
     baseline: Positive = Field(1.0, description="distance of views, and so disparity, as part of the scene's own")
-    lens: Share = Field(
-        0.0,
-        description="radius of the lens in view steps, 0: a pinhole; a point of disparity d is 2 lens |d| pixels wide",
-    )
-    position_error: Share = Field(
-        0.0, description="standard deviation of the positions of all views but the reference view, in view steps"
-    )
-    rotation_error: Share = Field(
-        0.0, description="standard deviation of the turns of these views about each axis, in degrees"
-    )
+    lens: Share = Field(0.0, description="radius in view steps; a point of disparity d is 2 lens |d| pixels wide")
+    position_error: Share = Field(0.0, description="standard deviation of positions but the reference's, view steps")
+    rotation_error: Share = Field(0.0, description="standard deviation of these views' turns about each axis, degrees")
     seed: int = Field(0, ge=0, lt=2**31, description="of the light's paths and of these errors")
 
     @property

@@ -164,6 +164,8 @@ def refocus(
     focus_01.png ...   focal stack: pictures of a large lens, focused from near to far
     focus.csv          disparity of each picture, and its depth in metres if the camera is known
 
+    --at counts from 0 at the top left and needs RESULT; --disparity is in pixels per view step. Repeat both at will.
+
     Without RESULT, the stack covers INPUT's own or estimated disparity range; the gaps between the views show where it
     is out of focus, and there is no all_in_focus.png.
 
