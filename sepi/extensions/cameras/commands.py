@@ -109,9 +109,6 @@ def poses(
     with progress_bar(light_field.name) as progress:
         {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](folder, posed, progress)
     if not posed.metric:
-        click.echo(
-            "the camera is unknown: a nominal one sees the scene at a distance of 1 to 2; pixels fit exactly, but "
-            "positions and depth are neither in metres nor to scale"
-        )
+        click.echo("the camera is unknown: pixels fit a nominal one, but lengths are neither in metres nor to scale")
     units = posed.units.partition(",")[0]
     click.echo(f"written: {folder}/ ({len(posed.positions)} views, {posed.chosen.sum()} points, {units})")

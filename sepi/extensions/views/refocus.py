@@ -236,8 +236,7 @@ def _read_result(
     view = reading.options.view
     disparity = read_disparity_at(path, view)
     if disparity.shape != light_field.shape:
-        views = f"the views of {light_field_path} are {light_field.shape} (height, width)"
-        raise SepiError(f"{path}: is {disparity.shape}, but {views}")
+        raise SepiError(f"{path}: is {disparity.shape}, but the views of {light_field_path} are {light_field.shape}")
     if read_origin_at(path, view) is None:
         return disparity, disparity, None
     result = read_result(path, view)
