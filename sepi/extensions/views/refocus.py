@@ -206,10 +206,9 @@ def refocus(
     foci.sort(key=lambda focus: -focus[0])
     depths = [] if camera is None else camera.depth(np.array([at for at, _ in foci], np.float32)).tolist()
     rows = [{"file": ALL_IN_FOCUS}] if surfaces is not None else []
-    for name, (disparity, pixel) in zip(stack_names(len(foci)), foci, strict=True):
-        rows.append({"file": name, "disparity": f"{disparity:.6g}", **dict(zip("xy", map(str, pixel), strict=False))})
-    for row, depth in zip(rows[-len(foci) :], depths, strict=False):
-        row["depth_m"] = f"{depth:.6g}"
+    metres = [f"{depth:.6g}" for depth in depths] or [""] * len(foci)
+    for name, (disparity, pixel), depth in zip(stack_names(len(foci)), foci, metres, strict=True):
+        rows.append(dict(zip(COLUMNS, (name, f"{disparity:.6g}", depth, *map(str, pixel)), strict=False)))
     # fails before a picture is computed
     refocusing.views_within(light_field, aperture)
     makers = [partial(refocusing.refocus, light_field, at, surfaces, aperture=aperture) for at, _ in foci]
@@ -219,8 +218,8 @@ def refocus(
         pictures = (make(progress=part_of(progress, number, len(makers))) for number, make in enumerate(makers))
         files = write_refocused(folder, rows, pictures, light_field.views.dtype, animated=animation)
     told = ", ".join(f"{at:.3g}" for at, _ in foci)
-    metres = f" ({', '.join(f'{depth:.3g}' for depth in depths)} m)" if depths else ""
-    click.echo(f"focused at: {told} pixels per view step{metres}")
+    told_depths = f" ({', '.join(f'{depth:.3g}' for depth in depths)} m)" if depths else ""
+    click.echo(f"focused at: {told} pixels per view step{told_depths}")
     if surfaces is None:
         click.echo("no all_in_focus.png: it needs RESULT, which 'sepi depth' makes")
     click.echo(f"written to {folder}/: {' '.join(files)}")
