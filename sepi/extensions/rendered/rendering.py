@@ -145,13 +145,11 @@ def _stand(rig: Rig, options: RenderOptions) -> tuple[Points, Points]:
 
 def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files: Sequence[Path]) -> Render:
     """The render of all views, with their occlusion masks."""
-    views: Arrays = {}
-    for number, file in enumerate(files):
+    loaded: list[Arrays] = []
+    for file in files:
         with np.load(file) as values:
-            for part in values:
-                if number == 0:
-                    views[part] = np.empty((len(files), *values[part].shape), values[part].dtype)
-                views[part][number] = values[part]
+            loaded.append(dict(values))
+    views: Arrays = {part: np.stack([one.pop(part) for one in loaded]) for part in tuple(loaded[0])}
     upright, (positions, turns) = views.pop("upright"), _stand(rig, options)
     if options.shares_light:
         albedo, things, whole = (views.pop(part) for part in ("albedo", "things", "whole"))
