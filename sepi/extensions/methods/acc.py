@@ -50,20 +50,14 @@ import numpy.typing as npt
 from pydantic import Field
 from scipy import fft
 
-from sepi.extensions.methods.costs import (
-    GuidedFilter,
-    IntArray,
-    Previous,
-    distinctness,
-    filtered,
-    maps_of,
-    weighted_median,
-)
+from sepi.extensions.methods.costs import GuidedFilter, Previous, distinctness, filtered, maps_of, weighted_median
 from sepi.extensions.methods.markov_field import labels_of_least_energy
 from sepi.kernels import thread_count
 from sepi.lightfield import FloatArray, FloatMap, LightField, as_unit_float, without_reference
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, no_progress, require_costs
+
+IntArray = npt.NDArray[np.int64]
 
 _FARTHEST = 2.0
 """Truncation of the refinement's costs: distance from the current depth in labels."""
