@@ -16,7 +16,7 @@ from sepi.matching.memory_limit import bytes_of_bands, bytes_of_volumes, require
 from sepi.matching.unknown import with_unknown
 from sepi.process.memory import give_back_memory
 from sepi.process.workspace import Workspace
-from sepi.stage import MadeBy, Parameters, Progress, StageMaps, entry, no_progress
+from sepi.stage import MadeBy, Parameters, Progress, StageMaps, entry, no_progress, part_of
 from sepi.validation import require_type
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, Variant, stage_parameters, variant_named
 from sepi.variants.built_in import DEFAULT_VARIANT
@@ -111,10 +111,7 @@ def _after_all_stages(
 ) -> StageMaps:
     maps: StageMaps | None = None
     for number, (stage, choice) in enumerate(chosen.choices.items()):
-
-        def of_all(fraction: float, number: int = number) -> None:
-            progress((number + fraction) / len(STAGES))
-
+        of_all = part_of(progress, number, len(STAGES))
         maps = STAGES[stage][choice].run(light_field, maps, settings[stage], of_all)
         of_all(1.0)
         if stage == "occlusion":

@@ -34,6 +34,11 @@ Progress = Callable[[float], None]
 """Called with the fraction done, 0..1."""
 
 
+def part_of(progress: Progress, number: int, count: float) -> Progress:
+    """Progress of one of ``count`` equal steps, given how many are done before it."""
+    return lambda fraction: progress((number + fraction) / count)
+
+
 def no_progress(_: float) -> None:
     """Ignore progress, for callers who do not show it.
 

@@ -47,7 +47,7 @@ from sepi.matching.semi_global import (
 )
 from sepi.matching.sweep_arrays import Visibility, sampled_candidates
 from sepi.matching.view_subsets import views_without_aliases
-from sepi.stage import Needs, Progress, StageMaps
+from sepi.stage import Needs, Progress, StageMaps, part_of
 
 CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**30)
 """Coarser than the paper's: the optimisation refines the disparity with the views."""
@@ -212,7 +212,7 @@ def depth_from_visible_views(
             mean,
             parameters,
             volumes,
-            lambda fraction, i=i: progress((i + fraction) / n),  # type: ignore[misc]
+            part_of(progress, i, n),
             refined=refined,
         )
         if refined:

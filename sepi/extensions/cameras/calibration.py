@@ -25,6 +25,7 @@ from sepi.extensions.cameras.reader import read_model
 from sepi.extensions.cameras.rectification import Rectification
 from sepi.io.files import atomic_folder
 from sepi.io.images import SUFFIXES
+from sepi.io.readers.view_names import sorted_view_numbers
 from sepi.process.threads import available_cores
 from sepi.stage import Progress, no_progress
 from sepi.validation import require_known
@@ -194,9 +195,7 @@ def pictures_in(folder: Path) -> list[Path]:
     odd = next((path for path in found if not path.name.isprintable() or re.search(r"\s", path.name)), None)
     if odd is not None:
         raise SepiError(f"{odd}: the name has spaces, which COLMAP's files cannot hold; expected a name without them")
-    # words and numbers by turns, beginning with a word
-    parts = {path: re.split(r"([0-9]+)", path.name) for path in found}
-    return sorted(found, key=lambda path: [int(part) if part.isdigit() else part for part in parts[path]])
+    return [folder / name for name in sorted_view_numbers(path.name for path in found).numbers]
 
 
 def pairs_of(names: Sequence[str]) -> list[tuple[str, str]]:
@@ -242,9 +241,8 @@ def _placed(pycolmap: Any, folder: Path, database: Path, camera: Any, count: int
         if best is not None and best.num_reg_images() >= _ENOUGH * count:
             return best
     if best is None:
-        why = "the camera moved too little or along its viewing direction, or the pictures share too little"
-        told = f"no two pictures tell the positions of their cameras: {why}"
-        raise SepiError(f"{folder}: {told}; expected a sweep sideways past a scene with texture")
+        expected = "expected a sweep sideways, not forward, past a scene with texture"
+        raise SepiError(f"{folder}: no two pictures tell the positions of their cameras; {expected}")
     return best
 
 

@@ -12,19 +12,9 @@ from sepi.process.command import PATH, SepiCommand, progress_bar
 @click.command(cls=SepiCommand)
 @click.argument("folder", type=PATH)
 @click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-cameras for a FOLDER called NAME.")
+@click.option("--lens", default="SIMPLE_RADIAL", show_default=True, help="COLMAP's lens model: RADIAL, OPENCV, ...")
 @click.option(
-    "--lens",
-    default="SIMPLE_RADIAL",
-    show_default=True,
-    metavar="MODEL",
-    help="COLMAP's lens model: SIMPLE_PINHOLE, RADIAL, OPENCV, OPENCV_FISHEYE, ...",
-)
-@click.option(
-    "--cameras",
-    type=click.Choice(["one", "each"]),
-    default="one",
-    show_default=True,
-    help="Whether one camera took all pictures, or each has its own.",
+    "--cameras", type=click.Choice(["one", "each"]), default="one", help="One camera, or one for each picture."
 )
 @click.option("--force", is_flag=True, help="Go on even if a check of a few pictures fails.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
@@ -34,8 +24,8 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
     Move one camera sideways past a static scene, with a constant viewing direction, along a grid, a row or any path.
     A first check of a few reduced pictures refuses a camera that hardly moved, moved forward or turned too far. The
     last lines tell how many pictures are placed, and how far the cameras stand off a plane. The focal length comes
-    from the pictures if they determine it, else from EXIF, else it is a usual one. Needs pycolmap: pip install
-    'sepi[colmap]'.
+    from the pictures if they determine it, else from EXIF, else it is a usual one. Lenses are SIMPLE_PINHOLE, RADIAL,
+    OPENCV, OPENCV_FISHEYE and others of COLMAP. Needs pycolmap: pip install 'sepi[colmap]'.
 
     \b
     Examples:
@@ -66,21 +56,10 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
 @click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=PATH)
 @click.argument("result_path", metavar="RESULT", type=PATH)
-@click.option(
-    "--to",
-    "kind",
-    type=click.Choice(["colmap", "nerfstudio"]),
-    default="colmap",
-    show_default=True,
-    help="Program to write for.",
-)
+@click.option("--to", "kind", type=click.Choice(["colmap", "nerfstudio"]), default="colmap", show_default=True)
 @click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
-@click.option(
-    "--min-confidence", type=float, metavar="X", help="Least confidence of points; default: the median of all pixels."
-)
-@click.option(
-    "--points", type=click.IntRange(min=0), default=10000, show_default=True, metavar="N", help="At most N points."
-)
+@click.option("--min-confidence", type=float, metavar="X", help="Least confidence of points; default: the median.")
+@click.option("--points", type=click.IntRange(min=0), default=10000, show_default=True, help="Most points.")
 @camera_flags
 @reading_flags
 def poses(
@@ -130,9 +109,6 @@ def poses(
     with progress_bar(light_field.name) as progress:
         {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](folder, posed, progress)
     if not posed.metric:
-        click.echo(
-            "the camera is unknown: a nominal one sees the scene at a distance of 1 to 2; pixels fit exactly, but "
-            "positions and depth are neither in metres nor to scale"
-        )
+        click.echo("the camera is unknown: pixels fit a nominal one, but lengths are neither in metres nor to scale")
     units = posed.units.partition(",")[0]
     click.echo(f"written: {folder}/ ({len(posed.positions)} views, {posed.chosen.sum()} points, {units})")

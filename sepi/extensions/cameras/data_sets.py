@@ -41,7 +41,6 @@ References
 """
 
 import json
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -86,16 +85,12 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
             stereo = f"{name}.png.geometric.bin"
             _write_maps(temporary / "stereo/depth_maps" / stereo, posed.depth(carried)[None])
             _write_maps(temporary / "stereo/normal_maps" / stereo, posed.normals(view, carried))
-        for name, lines in {
-            "sparse/0/cameras.txt": _cameras(posed),
-            "sparse/0/images.txt": _images(posed, sees),
-            "sparse/0/points3D.txt": _points(posed, sees),
-            "stereo/fusion.cfg": (f"{name}.png" for name in posed.names),
-        }.items():
-            with atomic_path(temporary / name) as path, path.open("w", encoding="ascii") as file:
-                file.writelines(f"{line}\n" for line in lines)
-        for path in (temporary / "sparse/0").iterdir():
-            shutil.copyfile(path, temporary / "sparse" / path.name)
+        write_whole(temporary / "stereo/fusion.cfg", "".join(f"{name}.png\n" for name in posed.names))
+        model = {"cameras": _cameras(posed), "images": _images(posed, sees), "points3D": _points(posed, sees)}
+        for name, lines in model.items():
+            text = "".join(f"{line}\n" for line in lines)
+            for place in ("sparse/0", "sparse"):
+                write_whole(temporary / place / f"{name}.txt", text)
 
 
 def _pictured(folder: Path, posed: PosedViews, mask: str, progress: Progress) -> Iterator[tuple[int, str, FloatMap]]:

@@ -9,7 +9,6 @@ A camera at ``dz`` in front of the reference camera, with the focal length ``f (
 sees. This factor is 1 at the depth ``Z0`` in the middle of the scene, and close to 1 near it.
 """
 
-from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import cv2
@@ -257,24 +256,22 @@ def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
     low, high = np.ceil(border.min(axis=0) - _OUTSIDE), np.floor(border.max(axis=0) + _OUTSIDE)
     larger = float((high - low).max()) / max(reference.lens.width, reference.lens.height)
     if not larger <= _MOST_LARGER:
-        large = f"{larger:.3g} times as large" if np.isfinite(larger) else "without bounds"
-        expected = "expected focal lengths and distortion that fit its size, and are much the same for all cameras"
-        raise SepiError(f"{seeing.model.path}: {reference.name}: would be {large} once rectified; {expected}")
+        told = f"would be {larger:.3g} times as large once rectified; expected a lens that fits its size"
+        raise SepiError(f"{seeing.model.path}: {reference.name}: {told}")
     stride = max(1.0, float((high - low).max()) / _LATTICE)
     counts = np.maximum(2, np.ceil((high - low) / stride).astype(int) + 1)
     across, down = (np.round(np.linspace(low[n], high[n], counts[n])) for n in (0, 1))
     lattice = _lattice(across, down)
     part = largest_rectangle(seeing.has(own, lattice).reshape(len(down), len(across)))
     if part is not None:
-        box = _grown(seeing, [*down[list(part[:2])], *across[list(part[2:])]], stride)
+        box = _grown(seeing, np.array([*down[list(part[:2])], *across[list(part[2:])]]), stride)
         height, width = (int(end - begin) + 1 for begin, end in (box[:2], box[2:]))
         within = lattice[((lattice >= (box[2], box[0])) & (lattice <= (box[3], box[1]))).all(axis=1)]
         kept = [n for n in range(number) if n == own or seeing.has(n, within).mean() >= _LEAST_SHOWN]
         share = min(height / reference.lens.height, width / reference.lens.width)
         if len(kept) > 1 and share >= _LEAST_PART and min(height, width) >= MIN_SIZE:
             return Frame((seeing.principal[0] - box[2], seeing.principal[1] - box[0]), (height, width)), kept
-    hardly = f"the cameras share hardly anything of the picture of {reference.name}"
-    raise SepiError(f"{seeing.model.path}: {hardly}; they look in too different directions, or stand too far apart")
+    raise SepiError(f"{seeing.model.path}: the cameras share hardly anything of {reference.name}; expected one scene")
 
 
 def _lattice(across: npt.NDArray[Any], down: npt.NDArray[Any]) -> Floats:
@@ -299,31 +296,28 @@ def largest_rectangle(inside: npt.NDArray[np.bool_]) -> tuple[int, int, int, int
     return best
 
 
-def _grown(seeing: Seeing, box: list[float], stride: float) -> list[float]:
-    """A box ``[top, bottom, left, right]`` grown or shrunk at its sides to the pixels that the reference view has."""
+# how the sides of a box (top, bottom, left, right) move outward
+_OUTWARD = np.array([-1, 1, -1, 1])
 
-    def seen(side: int, box: list[float]) -> bool:
+
+def _grown(seeing: Seeing, box: Floats, stride: float) -> Floats:
+    """A box (top, bottom, left, right) grown or shrunk at its sides to the pixels that the reference view has."""
+
+    def seen(side: int, box: Floats) -> bool:
         down, across = np.arange(box[0], box[1] + 1), np.arange(box[2], box[3] + 1)
-        at = np.array([box[side]])
-        line = _lattice(across, at) if side < 2 else _lattice(at, down)
+        line = _lattice(across, box[[side]]) if side < 2 else _lattice(box[[side]], down)
         return bool(seeing.has(seeing.plane.reference, line).all())
-
-    def moved(box: list[float], sides: Iterable[int], outward: int) -> list[float]:
-        return [at + (outward * (-1, 1, -1, 1)[side] if side in sides else 0) for side, at in enumerate(box)]
 
     # for a side that bulges between the samples
     for _ in range(int(2 * stride) + 2):
-        short = [side for side in range(4) if not seen(side, box)]
-        if not short:
+        whole = np.array([seen(side, box) for side in range(4)])
+        if whole.all():
             break
-        box = moved(box, short, -1)
-    growing = [0, 1, 2, 3]
+        box = box - _OUTWARD * ~whole
     for _ in range(int(stride) + 1):
-        for side in list(growing):
-            if seen(side, tried := moved(box, [side], 1)):
-                box = tried
-            else:
-                growing.remove(side)
+        for side in range(4):
+            tried = box + _OUTWARD * (np.arange(4) == side)
+            box = tried if seen(side, tried) else box
     return box
 
 
@@ -378,6 +372,5 @@ def _masked(seeing: Seeing, view: int) -> npt.NDArray[np.uint8]:
         return np.zeros((lens.height, lens.width), np.uint8)
     mask = read_picture(path)
     if mask.shape[:2] != (lens.height, lens.width):
-        expected = f"expected a mask as large as its picture, {lens.width}x{lens.height}"
-        raise SepiError(f"{path}: {mask.shape[1]}x{mask.shape[0]} pixels; {expected}")
+        raise SepiError(f"{path}: {mask.shape[1]}x{mask.shape[0]} pixels; its picture has {lens.width}x{lens.height}")
     return np.asarray(mask.reshape(lens.height, lens.width, -1)[..., 0] == 0, np.uint8)

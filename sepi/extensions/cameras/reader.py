@@ -18,11 +18,6 @@ from sepi.lightfield import DisparityRange, LightField
 _FLAT = 1e-3
 
 
-def matches(path: Path) -> bool:
-    """Whether a path holds calibrated cameras."""
-    return cameras_in(path) is not None
-
-
 def read(path: Path, options: ReadOptions, inverse_depths: tuple[float, float] | None = None) -> LightField:
     """Rectified light field of calibrated cameras.
 
@@ -62,9 +57,8 @@ def with_depths(path: Path, light_field: LightField, options: ReadOptions, given
 
 def files_of(path: Path, options: ReadOptions) -> tuple[Sequence[Path], Sequence[Path]]:
     """Files that are read, and pictures of the light field's size; the pictures may lie in another folder."""
-    found = cameras_in(path)
-    assert found is not None
     model = read_model(path, options.images, options.part)
+    found = model.path
     described = sorted(path for path in found.iterdir() if path.stem in MODEL_FILES) if found.is_dir() else [found]
     return (*described, *model.files), [picture.file for picture in model.pictures]
 
@@ -73,7 +67,7 @@ FORMATS = {
     "cameras": Format(
         "calibrated cameras",
         "COLMAP model, transforms.json, cameras.csv or cameras.yaml",
-        matches,
+        lambda path: cameras_in(path) is not None,
         read,
         ("images", "reference"),
         scales=False,

@@ -53,15 +53,11 @@ from scipy import fft
 from sepi.extensions.methods.costs import GuidedFilter, Previous, distinctness, filtered, maps_of, weighted_median
 from sepi.extensions.methods.markov_field import labels_of_least_energy
 from sepi.kernels import thread_count
-from sepi.lightfield import FloatMap, LightField, as_unit_float, without_reference
+from sepi.lightfield import FloatArray, FloatMap, LightField, as_unit_float, without_reference
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, no_progress, require_costs
 
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
-
-_AT_ONCE = 8
-"""Candidates that are transformed together."""
 
 _FARTHEST = 2.0
 """Truncation of the refinement's costs: distance from the current depth in labels."""
@@ -264,10 +260,8 @@ def phase_shifted(pictures: FloatMap, offsets: FloatArray, farthest: float | Non
     size, spectrum = pictures.shape[1:], fft.rfft2(pictures)
     rows, columns = (_phases(length, offsets[:, axis]) for axis, length in enumerate(size))
     columns = columns[:, : spectrum.shape[2]]
-    for begin in range(0, len(offsets), _AT_ONCE):
-        part = slice(begin, begin + _AT_ONCE)
-        turned = spectrum * (rows[part, None, :, None] * columns[part, None, None])
-        yield from fft.irfft2(turned, s=size, overwrite_x=True, workers=thread_count())
+    for down, across in zip(rows, columns, strict=True):
+        yield fft.irfft2(spectrum * (down[:, None] * across), s=size, overwrite_x=True, workers=thread_count())
 
 
 def _phases(length: int, offsets: npt.NDArray[np.float64]) -> npt.NDArray[np.complex64]:

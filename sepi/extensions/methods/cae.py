@@ -70,9 +70,7 @@ class CaeParameters(CandidateParameters):
     colour_sigma: float = Field(0.1, ge=1e-3, le=10, description="difference of colours, 0..1, at which weights fall")
     colour_constraint: float = Field(1.0, ge=0, description="defocus added for a sub-patch without the pixel's colour")
     filter_radius: int = Field(5, ge=1, le=50, description="window of 2 r + 1 pixels in which costs are filtered")
-    filter_epsilon: float = Field(
-        1e-4, gt=0, description="variance of colours, 0..1, above which the filter keeps edges"
-    )
+    filter_epsilon: float = Field(1e-4, gt=0, description="variance of colours, 0..1, above which filtered edges stay")
 
 
 def cae(light_field: LightField, previous: Previous, parameters: CaeParameters, progress: Progress) -> StageMaps:

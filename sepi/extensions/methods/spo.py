@@ -49,13 +49,16 @@ from sepi.kernels import spo as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
-from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, relative_confidence
+from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, part_of, relative_confidence
 
 _HALF_WIDTH = 3.0
 """Half width of the parallelogram in scales."""
 
 _ROUNDING = 1e-4
 """Distances up to this are rounding errors: the halves have the same colours."""
+
+Direction = tuple[BoolMap, bool]
+"""Views (T, S) of EPIs, and whether the EPIs are vertical; else they are along image rows."""
 
 
 class SpoParameters(CandidateParameters):
@@ -82,12 +85,9 @@ def spo(light_field: LightField, previous: Previous, parameters: SpoParameters, 
     directions = views_of_directions(light_field)
     merged = np.zeros((len(disparities), *light_field.shape), np.float32)
     confidence = np.zeros(light_field.shape, np.float32)
-    for number, (views, down) in enumerate(directions):
-
-        def of_all(fraction: float, number: int = number) -> None:
-            progress((number + fraction) / len(directions))
-
-        distances = side_distances(light_field, views, down, disparities, parameters, of_all)
+    for number, direction in enumerate(directions):
+        of_all = part_of(progress, number, len(directions))
+        distances = side_distances(light_field, direction, disparities, parameters, of_all)
         weight = peak_weight(distances, parameters.peak)
         distances *= weight
         merged += distances
@@ -100,8 +100,8 @@ def spo(light_field: LightField, previous: Previous, parameters: SpoParameters, 
     return StageMaps(disparity_of(volume, least_costs(volume)), relative_confidence(confidence), cost_volume=volume)
 
 
-def views_of_directions(light_field: LightField) -> list[tuple[BoolMap, bool]]:
-    """Views ``(T, S)`` whose EPIs are used, and whether the EPIs are vertical, for each direction."""
+def views_of_directions(light_field: LightField) -> list[Direction]:
+    """The directions of the EPIs that are used."""
     present, (t, s) = light_field.present, light_field.reference_position
     row, column = np.zeros((2, *light_field.grid), bool)
     row[t], column[:, s] = present[t], present[:, s]
@@ -110,21 +110,14 @@ def views_of_directions(light_field: LightField) -> list[tuple[BoolMap, bool]]:
 
 
 def side_distances(
-    light_field: LightField,
-    views: BoolMap,
-    down: bool,
-    disparities: FloatMap,
-    parameters: SpoParameters,
-    progress: Progress,
+    light_field: LightField, direction: Direction, disparities: FloatMap, parameters: SpoParameters, progress: Progress
 ) -> FloatMap:
     """Differences between the sides of each candidate's line in the EPIs of one direction.
 
     Parameters
     ----------
     light_field : LightField
-    views : ndarray, shape (T, S), bool
-    down : bool
-        Whether the EPIs are vertical; otherwise they are along image rows.
+    direction : Direction
     disparities : ndarray, shape (K,), float32
         The candidates, pixels per view step.
     parameters : SpoParameters
@@ -135,16 +128,15 @@ def side_distances(
     ndarray, shape (K, H, W), float32
         0..1.
     """
+    views, down = direction
     sheared_views = ShearedViews(light_field, views)
     shares = column_weights(parameters.scale) / np.float32(len(sheared_views.positions))
     found = np.empty((len(disparities), *light_field.shape), np.float32)
-    turned = np.empty(light_field.shape[::-1], np.float32)
     for k, sheared in sheared_views.over(disparities, progress):
-        if down:
-            kernels.half_distances(np.ascontiguousarray(sheared.swapaxes(2, 3)), shares, parameters.bins, turned)
-            found[k] = turned.T
-        else:
-            kernels.half_distances(sheared, shares, parameters.bins, found[k])
+        lines = np.ascontiguousarray(sheared.swapaxes(2, 3)) if down else sheared
+        of_lines = np.empty(lines.shape[2:], np.float32)
+        kernels.half_distances(lines, shares, parameters.bins, of_lines)
+        found[k] = of_lines.T if down else of_lines
     return found
 
 

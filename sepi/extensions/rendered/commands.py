@@ -27,18 +27,8 @@ from sepi.workflow.rendered_scenes import NOISE_LEVELS, WITHOUT_NOISE, RenderedS
 _FLAGS = (
     click.Option(["--rendered"], is_flag=True, help="Path-traced scenes (Mitsuba 3, extra [render]); minutes each."),
     click.Option(["--samples"], type=click.IntRange(min=1), help="With --rendered: paths for each pixel; default: 64."),
-    click.Option(
-        ["--noise", "levels"],
-        type=click.Choice(NOISE_LEVELS),
-        multiple=True,
-        help="With --rendered: noise of the sensor; repeatable, a folder for each; default: off.",
-    ),
-    click.Option(
-        ["--set", "settings"],
-        multiple=True,
-        metavar="KEY=VALUE",
-        help="With --rendered: lens=0.5, vignetting=0.4, ...; repeatable. docs/reproduce/rendered.md lists them.",
-    ),
+    click.Option(["--noise", "levels"], type=click.Choice(NOISE_LEVELS), multiple=True, help="With --rendered."),
+    click.Option(["--set", "settings"], multiple=True, metavar="KEY=VALUE", help="With --rendered: lens=0.5, ..."),
     click.Option(["--all-views"], is_flag=True, help="With --rendered: also write a disparity map for each view."),
 )
 
@@ -53,7 +43,8 @@ def extended(command: SepiCommand) -> SepiCommand:
         """Scenes of --rendered are path-traced, with plain walls, gloss, mirrors and glass.
 
         They have 512 pixels unless --size says otherwise; a file NAME.h5 beside the folder has their light, and
-        disparity, normals and masks of every view.
+        disparity, normals and masks of every view. Repeat --noise for a folder of each level of the sensor's noise
+        (default: off), and --set for each key that docs/reproduce/rendered.md lists.
 
         \b
         Example:
@@ -69,9 +60,8 @@ def extended(command: SepiCommand) -> SepiCommand:
         else:
             usual = context.get_parameter_source("size") is ParameterSource.DEFAULT
             values = {"grid": [given["views"]] * 2, "size": 512 if usual else given["size"]}
+            values |= {} if own["samples"] is None else {"samples": own["samples"]}
             values |= settings_of(own["settings"], "lens=0.5")
-            if own["samples"] is not None:
-                values.setdefault("samples", own["samples"])
             levels = dict.fromkeys(own["levels"] or (WITHOUT_NOISE,))
             _write_rendered(given["names"], given["output"], values, levels, own["all_views"])
 
@@ -89,7 +79,6 @@ def _write_rendered(
     exposures = [validated(Exposure, {"noise": level, **of_sensor}, "--set") for level in levels]
     paths = {name: output / f"{name}.h5" for name in names or RENDERED}
     require_new(output, (RenderedScene(name, one.noise, one.noise_seed).name for name in paths for one in exposures))
-    require_mitsuba()
     # before anything is rendered, which takes minutes
     for name, path in paths.items():
         if path.is_file():

@@ -15,8 +15,6 @@ from sepi.workflow.datasets import Scene
 from sepi.workflow.rendered_scenes import DATASET, NOISE_LEVELS, WITHOUT_NOISE, RenderedScene
 from sepi.workflow.result_paths import RESULTS
 
-_MODULE = "sepi.extensions.rendered.exposure"
-
 
 class Dataset(ADataset):
     """Keys of ``rendered``."""
@@ -27,7 +25,9 @@ class Dataset(ADataset):
     )
     apart = True
 
-    scenes: list[str] = Field(list(RENDERED), description="rendered scenes to use, in the order of the tables")
+    scenes: list[str] = Field(
+        list(RENDERED), min_length=1, description="rendered scenes to use, in the order of the tables"
+    )
     size: int = Field(512, ge=64, le=2048, description="height and width of a view in pixels")
     views: int = Field(9, ge=3, le=17, description="rows and columns of views")
     samples: int = Field(64, ge=1, le=4096, description="traced paths per pixel; fewer are faster but noisier")
@@ -65,7 +65,8 @@ class Dataset(ADataset):
     def _scene(self, name: RenderedScene) -> Scene:
         file, size = render_file(name.world), self.size
         flags = ("--set", f"noise={name.noise}", "--set", f"seed={name.seed}")
-        return Scene(DATASET, name.name, file, (file,), self.views**2, size, size, flags=flags, module=_MODULE)
+        module = "sepi.extensions.rendered.exposure"
+        return Scene(DATASET, name.name, file, (file,), self.views**2, size, size, flags=flags, module=module)
 
 
 def render_file(world: str) -> Path:

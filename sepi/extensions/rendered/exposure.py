@@ -32,9 +32,7 @@ class Exposure(CheckedModel):
     noise: NoiseLevel = Field("off", description="of a sensor that holds 2,000 (low) or 250 (high) electrons at white")
     noise_seed: int = Field(1, ge=1, lt=2**31, description="of the noise, and of what differs from view to view")
     vignetting: float = Field(0.0, ge=0, le=1, description="part of the light that the corners lack")
-    exposure_spread: Share = Field(
-        0.0, description="standard deviation of the exposures of all views but the reference view, in stops"
-    )
+    exposure_spread: Share = Field(0.0, description="standard deviation of exposures but the reference view's, stops")
     bits: Literal[8, 16] = Field(8, description="of each value")
     gamma: Positive | None = Field(None, description="values are light to the power 1 / gamma; 1: linear; null: sRGB")
 

@@ -3,7 +3,6 @@
 A pattern has 1024 texels a side by default, and repeats without a seam.
 """
 
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -32,24 +31,15 @@ def field(seed: int, finest: float, coarsest: float, texels: int = TEXELS, stret
         Factor by which structures are longer across than down.
     """
     white = np.random.default_rng(seed).standard_normal((texels, texels), np.float32)
-    amplitude = _amplitude(finest, coarsest, texels, stretch)
-    cores = threads_used()
-    spectrum = fft.rfft2(white, workers=cores) * amplitude
-    found: Field = fft.irfft2(spectrum, s=(texels, texels), workers=cores).astype(np.float64)
-    found /= found.std()
-    return found
-
-
-@lru_cache(maxsize=16)
-def _amplitude(finest: float, coarsest: float, texels: int, stretch: float) -> FloatArray:
-    # negative frequencies have the amplitudes of positive ones
-    down = np.arange(texels)
-    frequency = np.hypot(np.fft.rfftfreq(texels)[:, None], stretch * np.fft.rfftfreq(texels)[None, :])
+    frequency = np.hypot(np.fft.fftfreq(texels)[:, None], stretch * np.fft.rfftfreq(texels))
     fourth = np.square(np.square(frequency))
     with np.errstate(divide="ignore"):
-        found = np.where(frequency > 0, 1 / frequency, 0)
-    found *= np.exp(-fourth * finest**4) * (1 - np.exp(-fourth * coarsest**4))
-    return found.astype(np.float32)[np.minimum(down, texels - down)]
+        amplitude = np.where(frequency > 0, 1 / frequency, 0)
+    amplitude *= np.exp(-fourth * finest**4) * (1 - np.exp(-fourth * coarsest**4))
+    spectrum = fft.rfft2(white, workers=threads_used()) * amplitude.astype(np.float32)
+    found: Field = fft.irfft2(spectrum, s=(texels, texels), workers=threads_used()).astype(np.float64)
+    found /= found.std()
+    return found
 
 
 def noise(

@@ -38,16 +38,9 @@ class RenderOptions(CheckedModel):
     grid: tuple[_Rows, _Rows] = Field((9, 9), description="rows and columns of views")
     samples: int = Field(64, ge=1, le=65536, description="paths of light for each pixel; few leave their own noise")
     baseline: Positive = Field(1.0, description="distance of views, and so disparity, as part of the scene's own")
-    lens: Share = Field(
-        0.0,
-        description="radius of the lens in view steps, 0: a pinhole; a point of disparity d is 2 lens |d| pixels wide",
-    )
-    position_error: Share = Field(
-        0.0, description="standard deviation of the positions of all views but the reference view, in view steps"
-    )
-    rotation_error: Share = Field(
-        0.0, description="standard deviation of the turns of these views about each axis, in degrees"
-    )
+    lens: Share = Field(0.0, description="radius in view steps; a point of disparity d is 2 lens |d| pixels wide")
+    position_error: Share = Field(0.0, description="standard deviation of positions but the reference's, view steps")
+    rotation_error: Share = Field(0.0, description="standard deviation of these views' turns about each axis, degrees")
     seed: int = Field(0, ge=0, lt=2**31, description="of the light's paths and of these errors")
 
     @property
@@ -152,13 +145,11 @@ def _stand(rig: Rig, options: RenderOptions) -> tuple[Points, Points]:
 
 def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files: Sequence[Path]) -> Render:
     """The render of all views, with their occlusion masks."""
-    views: Arrays = {}
-    for number, file in enumerate(files):
+    loaded: list[Arrays] = []
+    for file in files:
         with np.load(file) as values:
-            for part in values:
-                if number == 0:
-                    views[part] = np.empty((len(files), *values[part].shape), values[part].dtype)
-                views[part][number] = values[part]
+            loaded.append(dict(values))
+    views: Arrays = {part: np.stack([one.pop(part) for one in loaded]) for part in tuple(loaded[0])}
     upright, (positions, turns) = views.pop("upright"), _stand(rig, options)
     if options.shares_light:
         albedo, things, whole = (views.pop(part) for part in ("albedo", "things", "whole"))

@@ -37,6 +37,6 @@ rule render:
 # The rendered scenes in every level of noise: tables by property, page and images
 rule rendered:
     input:
-        lambda wildcards: rendered_files(),
+        lambda wildcards: report_files(DATASET),
     message:
         "all rendered scenes are made"

@@ -15,13 +15,6 @@ def without_renderer(wildcards):
     return []
 
 
-def rendered_files():
-    """All files of the report on rendered scenes."""
-    if not SETTINGS.scenes_of(DATASET):
-        sys.exit("sepi: config.rendered.scenes: names no scene; leave the key out for all scenes")
-    return report_files(DATASET)
-
-
 def of_render(ask):
     """Function of wildcards: memory or time of a render of this size."""
     size = RENDERING.size

@@ -25,7 +25,7 @@ from sepi.kernels import all_views as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.matching.carried_map import TOLERANCE, corner_disparities
 from sepi.pipeline import estimate_depth
-from sepi.stage import Progress, StageMaps, no_progress
+from sepi.stage import Progress, StageMaps, no_progress, part_of
 from sepi.validation import require_map, require_type
 from sepi.variants import Variant
 from sepi.variants.built_in import DEFAULT_VARIANT
@@ -202,10 +202,7 @@ def maps_of_all_views(
     total = len(anchors) + 0.1 * len(places)
     found = []
     for number, position in enumerate(anchors):
-
-        def of_all(fraction: float, number: int = number) -> None:
-            progress((number + fraction) / total)
-
+        of_all = part_of(progress, number, total)
         known = maps if number == 0 else None
         found.append(known or estimate_depth(light_field.seen_from(position), variant, parameters, of_all, memory))
         of_all(1.0)

@@ -21,6 +21,7 @@ from sepi.io.files import atomic_folder, atomic_path, naming, remove_files
 from sepi.io.images import write_png
 from sepi.lightfield import FloatMap, LightField, full_scale
 from sepi.process.command import PATH, SepiCommand, progress_bar
+from sepi.stage import part_of
 
 INDEX = "focus.csv"
 """Name of the index: a row for each image."""
@@ -130,35 +131,12 @@ _STEPS = 9
 @click.argument("light_field_path", metavar="INPUT", type=PATH)
 @click.argument("result_path", metavar="[RESULT]", type=PATH, required=False)
 @click.option("-o", "--output", type=PATH, help="Folder to write; default: NAME-refocused for an INPUT called NAME.")
+@click.option("--steps", type=click.IntRange(1, 999), help=f"Pictures; default: {_STEPS} without --disparity and --at.")
+@click.option("--disparity", "disparities", type=float, multiple=True, help="Focus at this disparity; repeatable.")
 @click.option(
-    "--steps",
-    type=click.IntRange(1, 999),
-    metavar="N",
-    help=f"Pictures from the nearest to the farthest surface; default: {_STEPS} without --disparity and --at.",
+    "--at", "pixels", type=click.IntRange(min=0), nargs=2, multiple=True, metavar="X Y", help="Pixel to focus on."
 )
-@click.option(
-    "--disparity",
-    "disparities",
-    type=float,
-    multiple=True,
-    metavar="D",
-    help="Focus at this disparity, pixels per view step; repeatable.",
-)
-@click.option(
-    "--at",
-    "pixels",
-    type=click.IntRange(min=0),
-    nargs=2,
-    multiple=True,
-    metavar="X Y",
-    help="Focus on the surface at pixel X, Y, from 0 at the top left; repeatable; needs RESULT.",
-)
-@click.option(
-    "--aperture",
-    type=float,
-    metavar="R",
-    help="Radius of the aperture in view steps; a smaller one has more in focus. Default: all views.",
-)
+@click.option("--aperture", type=float, help="Radius in view steps; smaller: more in focus. Default: all views.")
 @click.option("--animation", is_flag=True, help="Also write the stack as an animation, focus.webp.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 @camera_flags
@@ -185,6 +163,8 @@ def refocus(
     all_in_focus.png   mean of all views that see a pixel: as sharp as the view, less noise
     focus_01.png ...   focal stack: pictures of a large lens, focused from near to far
     focus.csv          disparity of each picture, and its depth in metres if the camera is known
+
+    --at counts from 0 at the top left and needs RESULT; --disparity is in pixels per view step. Repeat both at will.
 
     Without RESULT, the stack covers INPUT's own or estimated disparity range; the gaps between the views show where it
     is out of focus, and there is no all_in_focus.png.
@@ -226,25 +206,20 @@ def refocus(
     foci.sort(key=lambda focus: -focus[0])
     depths = [] if camera is None else camera.depth(np.array([at for at, _ in foci], np.float32)).tolist()
     rows = [{"file": ALL_IN_FOCUS}] if surfaces is not None else []
-    for name, (disparity, pixel) in zip(stack_names(len(foci)), foci, strict=True):
-        rows.append({"file": name, "disparity": f"{disparity:.6g}", **dict(zip("xy", map(str, pixel), strict=False))})
-    for row, depth in zip(rows[-len(foci) :], depths, strict=False):
-        row["depth_m"] = f"{depth:.6g}"
+    metres = [f"{depth:.6g}" for depth in depths] or [""] * len(foci)
+    for name, (disparity, pixel), depth in zip(stack_names(len(foci)), foci, metres, strict=True):
+        rows.append(dict(zip(COLUMNS, (name, f"{disparity:.6g}", depth, *map(str, pixel)), strict=False)))
     # fails before a picture is computed
     refocusing.views_within(light_field, aperture)
     makers = [partial(refocusing.refocus, light_field, at, surfaces, aperture=aperture) for at, _ in foci]
     if surfaces is not None:
         makers.insert(0, partial(refocusing.all_in_focus, light_field, surfaces))
     with progress_bar(light_field.name) as progress:
-
-        def part(number: int, fraction: float) -> None:
-            progress((number + fraction) / len(makers))
-
-        pictures = (make(progress=partial(part, number)) for number, make in enumerate(makers))
+        pictures = (make(progress=part_of(progress, number, len(makers))) for number, make in enumerate(makers))
         files = write_refocused(folder, rows, pictures, light_field.views.dtype, animated=animation)
     told = ", ".join(f"{at:.3g}" for at, _ in foci)
-    metres = f" ({', '.join(f'{depth:.3g}' for depth in depths)} m)" if depths else ""
-    click.echo(f"focused at: {told} pixels per view step{metres}")
+    told_depths = f" ({', '.join(f'{depth:.3g}' for depth in depths)} m)" if depths else ""
+    click.echo(f"focused at: {told} pixels per view step{told_depths}")
     if surfaces is None:
         click.echo("no all_in_focus.png: it needs RESULT, which 'sepi depth' makes")
     click.echo(f"written to {folder}/: {' '.join(files)}")
@@ -260,8 +235,7 @@ def _read_result(
     view = reading.options.view
     disparity = read_disparity_at(path, view)
     if disparity.shape != light_field.shape:
-        views = f"the views of {light_field_path} are {light_field.shape} (height, width)"
-        raise SepiError(f"{path}: is {disparity.shape}, but {views}")
+        raise SepiError(f"{path}: is {disparity.shape}, but the views of {light_field_path} are {light_field.shape}")
     if read_origin_at(path, view) is None:
         return disparity, disparity, None
     result = read_result(path, view)

@@ -78,10 +78,10 @@ def test_the_direction_with_the_texture_decides() -> None:
         disparities = parameters.candidates(light_field)
         along, down = (
             peak_weight(
-                side_distances(light_field, views, down, disparities, parameters, no_progress),
+                side_distances(light_field, direction, disparities, parameters, no_progress),
                 parameters.peak,
             )[beside]
-            for views, down in views_of_directions(light_field)
+            for direction in views_of_directions(light_field)
         )
         assert np.median(along) > 3 * np.median(down)
         found = filtered(light_field, spo(light_field, None, parameters, no_progress))

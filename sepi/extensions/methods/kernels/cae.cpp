@@ -79,11 +79,7 @@ void constrained_least_patch(Array<const float, 3> response, Array<const float, 
     });
 }
 
-const Submodule submodule("cae", {
-    {"LEVELS", LEVELS},
-    {"PATCH", PATCH},
-    {"constrained_entropies", &constrained_entropies},
-    {"constrained_least_patch", &constrained_least_patch},
-});
+const Submodule submodule("cae", {{"LEVELS", LEVELS}, {"PATCH", PATCH}, {"constrained_entropies", &constrained_entropies},
+                                  {"constrained_least_patch", &constrained_least_patch}});
 
 }  // namespace sepi::cae

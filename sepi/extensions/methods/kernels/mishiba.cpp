@@ -78,9 +78,6 @@ void median_pass(Array<const std::int32_t, 2> current, Array<const std::int32_t,
     });
 }
 
-const Submodule submodule("mishiba", {
-    {"keep_least", &keep_least},
-    {"median_pass", &median_pass},
-});
+const Submodule submodule("mishiba", {{"keep_least", &keep_least}, {"median_pass", &median_pass}});
 
 }  // namespace sepi::mishiba
