@@ -32,14 +32,7 @@ DETAIL_UNIT = 1 / 32000
 # an edge of the base, colours in 0..1
 _RADIUS, _WIDTH, _EDGE = 4, 4.0, 0.05
 
-ColourScale = Annotated[
-    float,
-    Field(
-        ge=1e-6,
-        le=2,
-        description="residual of the colours at which their cost is one half; RGB distance, colours in 0..1",
-    ),
-]
+ColourScale = Annotated[float, Field(ge=1e-6, le=2, description="residual at which colours cost half; RGB distance")]
 """A parameter whose default is not the same for every sweep."""
 
 
@@ -47,12 +40,7 @@ class BaseDetailParameters(SofteningParameters):
     """Parameters of the decomposition, and of how well colours and detail must fit."""
 
     colour_scale: ColourScale = 0.0316
-    detail_scale: float = Field(
-        0.0038,
-        ge=1e-6,
-        le=2,
-        description="residual of the detail at which its cost is one half; RGB distance, colours in 0..1",
-    )
+    detail_scale: float = Field(0.0038, ge=1e-6, le=2, description="residual at which detail costs half; RGB distance")
     use_detail: bool = Field(True, description="whether the detail is compared, or colours alone")
     detail_share: float = Field(0.6, gt=0, le=1, description="share of the detail in the cost")
 
