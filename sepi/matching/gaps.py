@@ -16,7 +16,7 @@ from pydantic import Field
 from sepi.kernels import gaps as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale, without_reference
 from sepi.matching.denoising import guide_of
-from sepi.matching.nearest_surfaces import nearest_surfaces
+from sepi.matching.nearest_surfaces import SeenViews
 from sepi.matching.row_bands import row_bands
 from sepi.stage import OcclusionMarginParameters
 
@@ -108,8 +108,7 @@ def compared_depths(
     sums = np.zeros((3, *disparity.shape), np.float32)
     farthest = float(max(np.abs(disparity).max(), np.abs(other).max()))
     for begin, end, rows in row_bands(light_field, others, farthest, _BYTES_PER_PIXEL):
-        nearest = nearest_surfaces(light_field, other if occluders is None else occluders, others, rows)
-        asked = (others, light_field.baselines, nearest, rows.low, occlusion_margin)
+        asked = SeenViews.of(light_field, other if occluders is None else occluders, others, rows, occlusion_margin)
         kernels.compare_depths(views, unit, *depths, asked, most, begin, end, sums)
     return sums
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.kernels import splines as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField, without_reference
+from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail
 from sepi.matching.row_bands import Rows
 from sepi.process.workspace import forget, kept
@@ -28,24 +28,15 @@ class SplineViews(NamedTuple):
         no share.
     unit : float32
         What they are multiplied with.
-    low : int
-        The row after the margin.
     reference : ndarray, shape (H, W, 4), float32
         Colours and detail of the reference view.
-    places : ndarray, shape (N, 2), int64
-        Row and column in the grid of each view that is compared, but for the reference view.
-    baselines : ndarray, shape (N, 2), float32
-        Theirs, down and across, in view steps.
     scales2, shares : ndarray, shape (2,), float32
         Square of the robust scale, and share in the cost, of colours and of detail.
     """
 
     splines: npt.NDArray[np.int16]
     unit: np.float32
-    low: int
     reference: FloatMap
-    places: npt.NDArray[np.int64]
-    baselines: FloatMap
     scales2: FloatMap
     shares: FloatMap
 
@@ -55,7 +46,6 @@ def spline_views(
     parameters: BaseDetailParameters,
     rows: Rows,
     present: BoolMap,
-    room: npt.NDArray[np.int16] | None = None,
 ) -> SplineViews:
     """Splines of some rows of the views' colours and, where it has a share, detail.
 
@@ -66,8 +56,6 @@ def spline_views(
     rows : Rows
     present : ndarray, shape (T, S), bool
         The views of which they are wanted.
-    room : ndarray, optional
-        Obsolete splines of as many rows of the same views, whose memory is reused.
 
     Returns
     -------
@@ -77,7 +65,7 @@ def spline_views(
     # what the convolution reaches; mirrored at the picture's ends
     reach = MARGIN + kernels.REACH
     wider = Rows(max(0, min(rows.low - reach, height - reach - 1)), min(height, rows.high + reach + 1))
-    splines, colours, detail = _splines_so_far(light_field, parameters, rows, present, room)
+    splines, colours, detail = _splines_so_far(light_field, parameters, rows, present)
     reference = light_field.reference_position
     wanted = detail.copy()
     # which is compared with the mean
@@ -100,15 +88,11 @@ def spline_views(
     if rows == (0, height) and parameters.use_detail and (present == light_field.present).all():
         # the splines of all views take its place
         forget_detail(light_field)
-    others = without_reference(light_field, present)
     scales = parameters.colour_scale, parameters.detail_scale
     return SplineViews(
         splines,
         SPLINE_UNIT,
-        rows.low,
         own,
-        np.argwhere(others),
-        light_field.baselines[others].astype(np.float32),
         np.array([views.squared_scale(scale) for scale in scales], np.float32),
         parameters.shares,
     )
@@ -124,15 +108,12 @@ def _splines_so_far(
     parameters: BaseDetailParameters,
     rows: Rows,
     present: BoolMap,
-    room: npt.NDArray[np.int16] | None,
 ) -> tuple[npt.NDArray[np.int16], BoolMap, BoolMap]:
     """Array for splines, with those computed so far, and the views that still lack colours and detail."""
     height, width = light_field.shape
     # untouched pages take no memory
     shape = (*light_field.grid, rows.high - rows.low + 2 * MARGIN, width + 2 * MARGIN, 4)
     with_detail = present if parameters.use_detail else np.zeros_like(present)
-    if room is not None:
-        return room, present, with_detail
     if rows != (0, height):
         return np.zeros(shape, np.int16), present, with_detail
 

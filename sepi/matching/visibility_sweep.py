@@ -35,7 +35,7 @@ from sepi.matching.base_detail import (
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.denoising import DenoisedLightField, guide_of
 from sepi.matching.gaps import GapParameters, with_open_gaps
-from sepi.matching.nearest_surfaces import EMPTY, nearest_surfaces, z_buffers
+from sepi.matching.nearest_surfaces import EMPTY, SeenViews, nearest_surfaces, z_buffers
 from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.semi_global import (
     ROWS_AT_ONCE,
@@ -228,14 +228,14 @@ def occluded_in_any_view(
     -------
     ndarray, shape (H, W), bool
     """
-    baselines = light_field.baselines
+    places, baselines = np.argwhere(present), light_field.baselines[present]
     occluded = np.zeros(light_field.shape, bool)
     for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()), BYTES_PER_PIXEL):
-        nearest = z_buffers(disparity, baselines[present], *rows)
+        nearest = z_buffers(disparity, baselines, *rows)
         if light_field.missing is not None:
             # where a view has no pixels, nothing in it can occlude
             nearest[light_field.missing[:, :, rows.low : rows.high][present]] = EMPTY
-        asked = (present, baselines, nearest, rows.low, occlusion_margin)
+        asked = SeenViews(places, baselines, nearest, rows.low, occlusion_margin)
         kernels.occluded_in_any_view(disparity, asked, begin, end, occluded)
     return occluded
 

@@ -312,16 +312,16 @@ void z_buffers(Array<const float, 2> disparity, Strided<const double, 2> baselin
 }
 
 // Set pixels of out (H, W), in rows begin..end, that something nearer occludes in at least one view.
-void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &views, Index begin, Index end, Array<bool, 2> out) {
+void occluded_in_any_view(Array<const float, 2> disparity, const SeenViews &views, Index begin, Index end, Array<bool, 2> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for(begin, end, [&](Index y) {
-        views.for_each([&](Index, Index, Array<const float, 2> nearest, double down, double across) {
+        for (Index n = 0; n < views.number(); ++n) {
             for (Index x = 0; x < W; ++x) {
                 const float d = disparity(y, x);
-                const Index row = y - Index(std::nearbyint(d * down)), column = x - Index(std::nearbyint(d * across));
-                if (row >= 0 && column >= 0 && row < H && column < W) out(y, x) |= nearest(row - views.low, column) > d + views.margin;
+                const Index row = y - Index(std::nearbyint(d * views.baselines(n, 0))), column = x - Index(std::nearbyint(d * views.baselines(n, 1)));
+                if (row >= 0 && column >= 0 && row < H && column < W) out(y, x) |= views.nearest(n, row - views.low, column) > d + views.margin;
             }
-        });
+        }
     });
 }
 
