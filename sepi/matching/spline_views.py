@@ -42,10 +42,7 @@ class SplineViews(NamedTuple):
 
 
 def spline_views(
-    light_field: LightField,
-    parameters: BaseDetailParameters,
-    rows: Rows,
-    present: BoolMap,
+    light_field: LightField, parameters: BaseDetailParameters, rows: Rows, present: BoolMap
 ) -> SplineViews:
     """Splines of some rows of the views' colours and, where it has a share, detail.
 
@@ -65,22 +62,18 @@ def spline_views(
     # what the convolution reaches; mirrored at the picture's ends
     reach = MARGIN + kernels.REACH
     wider = Rows(max(0, min(rows.low - reach, height - reach - 1)), min(height, rows.high + reach + 1))
-    splines, colours, detail = _splines_so_far(light_field, parameters, rows, present)
+    splines, made = _splines_so_far(light_field, parameters, rows)
+    colours, detail = missing = np.stack([present, present & parameters.use_detail]) & ~made
     reference = light_field.reference_position
     wanted = detail.copy()
     # which is compared with the mean
     wanted[reference] = True
-    try:
-        views = base_detail_decomposition(light_field, parameters, wider, wanted, again=True)
-        colour_unit, detail_unit = float(views.colour_unit / SPLINE_UNIT), float(views.detail_unit / SPLINE_UNIT)
-        kernels.view_splines(
-            views.colours, colour_unit, views.detail, detail_unit, views.low, colours, detail, rows.low, splines
-        )
-    except BaseException:
-        # they are taken for made
-        forget_splines(light_field)
-        forget_detail(light_field)
-        raise
+    views = base_detail_decomposition(light_field, parameters, wider, wanted, again=True)
+    colour_unit, detail_unit = float(views.colour_unit / SPLINE_UNIT), float(views.detail_unit / SPLINE_UNIT)
+    kernels.view_splines(
+        views.colours, colour_unit, views.detail, detail_unit, views.low, colours, detail, rows.low, splines
+    )
+    made |= missing
     own = np.zeros((height, width, 4), np.float32)
     own[..., :3] = views.guide
     if views.detail.size:
@@ -88,14 +81,7 @@ def spline_views(
     if rows == (0, height) and parameters.use_detail and (present == light_field.present).all():
         # the splines of all views take its place
         forget_detail(light_field)
-    scales = parameters.colour_scale, parameters.detail_scale
-    return SplineViews(
-        splines,
-        SPLINE_UNIT,
-        own,
-        np.array([views.squared_scale(scale) for scale in scales], np.float32),
-        parameters.shares,
-    )
+    return SplineViews(splines, SPLINE_UNIT, own, views.scales2(parameters), parameters.shares)
 
 
 def forget_splines(light_field: LightField) -> None:
@@ -104,27 +90,19 @@ def forget_splines(light_field: LightField) -> None:
 
 
 def _splines_so_far(
-    light_field: LightField,
-    parameters: BaseDetailParameters,
-    rows: Rows,
-    present: BoolMap,
-) -> tuple[npt.NDArray[np.int16], BoolMap, BoolMap]:
-    """Array for splines, with those computed so far, and the views that still lack colours and detail."""
+    light_field: LightField, parameters: BaseDetailParameters, rows: Rows
+) -> tuple[npt.NDArray[np.int16], BoolMap]:
+    """Array for splines, with those computed so far, and the views (2, T, S) of which it has colours, and detail."""
     height, width = light_field.shape
-    # untouched pages take no memory
     shape = (*light_field.grid, rows.high - rows.low + 2 * MARGIN, width + 2 * MARGIN, 4)
-    with_detail = present if parameters.use_detail else np.zeros_like(present)
+
+    def nothing() -> tuple[npt.NDArray[np.int16], BoolMap]:
+        # untouched pages take no memory
+        return np.zeros(shape, np.int16), np.zeros((2, *light_field.grid), bool)
+
     if rows != (0, height):
-        return np.zeros(shape, np.int16), present, with_detail
-
-    def so_far() -> tuple[npt.NDArray[np.int16], BoolMap]:
-        return kept(light_field, "splines", lambda: (np.zeros(shape, np.int16), np.zeros((2, *light_field.grid), bool)))
-
+        return nothing()
     # callers without detail expect its channel to be empty
-    if not parameters.use_detail and so_far()[1][1].any():
+    if not parameters.use_detail and kept(light_field, "splines", nothing)[1][1].any():
         forget_splines(light_field)
-    splines, made = so_far()
-    wanted = np.stack([present, with_detail])
-    missing = wanted & ~made
-    made |= wanted
-    return splines, *missing
+    return kept(light_field, "splines", nothing)

@@ -277,8 +277,7 @@ def _sweep(
         views = base_detail_decomposition(light_field, parameters, band.rows, present)
         if mean is not None:
             views = compared_with(views, mean, parameters, band.rows)
-        scales = parameters.colour_scale, parameters.detail_scale
-        scales2 = np.array([views.squared_scale(scale) for scale in scales], np.float32)
+        scales2 = views.scales2(parameters)
         for begin in range(band.begin, band.end, ROWS_AT_ONCE):
             end = min(band.end, begin + ROWS_AT_ONCE)
             room = costs.room(end - begin)
