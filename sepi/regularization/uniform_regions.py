@@ -239,11 +239,7 @@ def _most_apart(variance: FloatMap, parameters: UniformPlanesParameters) -> Floa
 
 
 def _alike(
-    mean: FloatMap,
-    region: BoolMap,
-    variance: FloatMap,
-    confidence: FloatMap,
-    parameters: UniformPlanesParameters,
+    mean: FloatMap, region: BoolMap, variance: FloatMap, confidence: FloatMap, parameters: UniformPlanesParameters
 ) -> tuple[BoolMap, FloatMap]:
     """Pixels of the colour that the region has within reach, and how much of the reach the region fills."""
     size = 2 * (parameters.window_radius + parameters.growth) + 1
