@@ -49,7 +49,7 @@ def mixture_evidence(
     searched = parameters.boundary_step, parameters.clean_radius
     alpha = parameters.alpha_contrast, parameters.alpha_threshold
     # a hundredth of full scale counts as equal even without noise
-    kernels.mixture_evidence(disparity, around, guide, *searched, *alpha, 1e-4 + noise, evidence)
+    kernels.mixture_evidence(disparity, *around, guide, *searched, *alpha, 1e-4 + noise, evidence)
     return evidence * _trust(guide)
 
 

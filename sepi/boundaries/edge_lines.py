@@ -7,8 +7,6 @@ beside a step are tried, in steps of direction and offset, straight ones and one
 belongs to the surface that holds its middle according to the cheapest edge.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 import numpy.typing as npt
 
@@ -47,17 +45,22 @@ def line_evidence(disparity: FloatMap, rim: Rim, costs: FloatMap) -> FloatMap:
     evidence = np.empty(len(pixels), np.float32)
     middle = (rim.near + rim.far) * np.float32(0.5)
     edges = _edges(kernels.STEPS * (costs.shape[1] - 1))
-    kernels.evidence_of_lines(disparity, middle, number, above, edges, pixels, evidence)
+    kernels.evidence_of_lines(disparity, middle, number, above, *edges, pixels, evidence)
     return evidence
 
 
-class Edges(NamedTuple):
-    """Edges through a patch.
+def _edges(steps: int) -> tuple[npt.NDArray[np.uint8], BoolMap, FloatMap, FloatMap]:
+    """Edges of all directions and offsets, straight and bent round the nearer surface.
 
-    Attributes
+    Parameters
     ----------
+    steps : int
+        In which shares go from 0 to 1.
+
+    Returns
+    -------
     shares : ndarray, shape (M, 9), uint8
-        Of the nearer surface in its pixels, row after row, in steps.
+        Of the nearer surface in the pixels of a patch, row after row, in steps.
     is_near : ndarray, shape (M,), bool
         Whether its middle is the nearer surface's.
     costs : ndarray, shape (M,), float32
@@ -65,15 +68,6 @@ class Edges(NamedTuple):
     weights : ndarray, shape (9,), float32
         Of the pixels.
     """
-
-    shares: npt.NDArray[np.uint8]
-    is_near: BoolMap
-    costs: FloatMap
-    weights: FloatMap
-
-
-def _edges(steps: int) -> Edges:
-    """Edges of all directions and offsets, straight and bent round the nearer surface; ``steps`` steps are 1."""
     down, across = (part.ravel() for part in np.mgrid[-1:2, -1:2])
     angle = 2 * np.pi * np.arange(_DIRECTIONS)[:, None] / _DIRECTIONS
     along, beside = np.sin(angle) * down + np.cos(angle) * across, np.cos(angle) * down - np.sin(angle) * across
@@ -81,7 +75,7 @@ def _edges(steps: int) -> Edges:
     distance = bent[:, :, None] + _OFFSETS[:, None]
     count = _DIRECTIONS * len(_OFFSETS)
     shares = np.clip(0.5 + distance.reshape(-1, len(down)) / _BLUR, 0, 1)
-    return Edges(
+    return (
         # halves of a step are such in all directions, however they are rounded
         np.floor(np.round(shares * steps, 6) + 0.5).astype(np.uint8),
         np.tile(_OFFSETS > 0, 2 * _DIRECTIONS),

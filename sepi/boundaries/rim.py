@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatArray, FloatMap
+from sepi.lightfield import BoolMap, FloatMap
+from sepi.matching.nearest_surfaces import SeenViews
 
 
 class RimViews(NamedTuple):
@@ -18,28 +19,16 @@ class RimViews(NamedTuple):
         Rows of the pixels, their channels side by side.
     channels : int
         C, 1 or 3.
-    units : ndarray, shape (N,), float32
+    units : ndarray, shape (V,), float32
         What the pixels of each view that is compared are multiplied with to be 0..1, and as bright as the reference.
-    places : ndarray, shape (N, 2), int64
-        Row and column in the grid of each view that is compared.
-    baselines : ndarray, shape (N, 2), float64
-        Theirs, down and across, in view steps.
-    nearest : ndarray, shape (N, n, W), float32
-        z-buffers of the map, its nearer surfaces widened by a pixel, so that no mixed pixel counts as background.
-    low : int
-        First row of ``nearest``.
-    margin : float32
-        By how much an occluder must be nearer, pixels per view step.
+    seen : SeenViews
+        By the map, its nearer surfaces widened by a pixel, so that no mixed pixel counts as background.
     """
 
     lines: npt.NDArray[Any]
     channels: int
     units: FloatMap
-    places: npt.NDArray[np.int64]
-    baselines: FloatArray
-    nearest: FloatMap
-    low: int
-    margin: np.float32
+    seen: SeenViews
 
 
 class Sides(NamedTuple):

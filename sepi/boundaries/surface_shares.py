@@ -21,7 +21,7 @@ from sepi.image.noise import noise_of_reference_view
 from sepi.kernels import background as background_kernels
 from sepi.kernels import surface_shares as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale
-from sepi.matching.nearest_surfaces import nearest_surfaces
+from sepi.matching.nearest_surfaces import SeenViews
 from sepi.matching.row_bands import row_bands
 from sepi.matching.view_subsets import spread_views
 
@@ -87,25 +87,26 @@ def share_costs(
     # no farther surface within a pixel, so none shows through
     clean = disparity - around.farthest < parameters.boundary_step
     sides = Sides(disparity, guide, clean, parameters.clean_radius)
-    views = _views_alike(light_field, sides, parameters)
-    if not len(views.places):
+    present, units = _views_alike(light_field, sides, parameters)
+    if not len(units):
         # they say nothing for either surface
         return found
     scales2 = _LEAST_SCALE**2 + 2 * noise_of_reference_view(light_field) ** 2, parameters.share_scale**2
-    present = np.zeros(light_field.grid, bool)
-    present[tuple(views.places.T)] = True
+    baselines, margin = np.abs(light_field.baselines[present]), parameters.occlusion_margin
     # how far from a pixel the pieces of background lie that views show with it
     step = np.where(rim.inside, rim.near - rim.far, 0)
-    moved = np.ceil(step * np.abs(views.baselines).max()) + 2
-    rows_moved = math.ceil(float(step.max()) * float(np.abs(views.baselines[:, 0]).max())) + 1
+    moved = np.ceil(step * baselines.max()) + 2
+    rows_moved = math.ceil(float(step.max()) * float(baselines[:, 0].max())) + 1
     farthest = float(np.abs(disparity).max())
     height, width = light_field.shape
-    layer, wanted = _more_distant_layer(disparity, rim, views.margin, moved)
+    layer, wanted = _more_distant_layer(disparity, rim, margin, moved)
     shown = (layer == disparity) & ~rim.inside
     background = np.zeros((height, width, 4), np.float32)
+    # kernels take rows whose numbers lie side by side
+    colours = np.ascontiguousarray(light_field.views)
+    lines = colours.reshape(*colours.shape[:3], -1), colours.shape[4]
     for begin, end, rows in row_bands(light_field, present, farthest, BYTES_PER_PIXEL, rows_moved, MOST_BYTES):
-        nearest = nearest_surfaces(light_field, around.nearest, present, rows)
-        views = views._replace(nearest=nearest, low=rows.low)
+        views = RimViews(*lines, units, SeenViews.of(light_field, around.nearest, present, rows, margin))
         first, last = max(0, begin - rows_moved), min(height, end + rows_moved)
         background_kernels.background_of(views, layer, wanted, shown, first, last, background)
         of_band = slice(*np.searchsorted(pixels, (begin * width, end * width)))
@@ -115,25 +116,21 @@ def share_costs(
     return found
 
 
-def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryParameters) -> RimViews:
-    """The views that are compared, as bright as the reference, without those that show it badly or are much darker.
+def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryParameters) -> tuple[BoolMap, FloatMap]:
+    """The views that are compared (T, S), without those that show it badly or are much darker, and their units.
 
     Lenses darken and blur views towards the edge of the grid; shares would take that for another surface.
     """
     present = spread_views(light_field, parameters.share_views)
-    places, baselines = np.argwhere(present), light_field.baselines[present]
-    brightness, residual = view_brightness(light_field, sides, places)
+    brightness, residual = view_brightness(light_field, sides, np.argwhere(present))
     alike = (brightness > 1 / _MOST_DARKENING) & (brightness < _MOST_DARKENING)
     showing = np.isfinite(residual)
     usual = float(np.median(residual[showing])) if showing.any() else 0.0
     alike &= showing & (residual <= 2 * usual + _LEAST_SCALE)
     units = (1 / full_scale(light_field.views.dtype) / brightness[alike]).astype(np.float32)
-    # kernels take rows whose numbers lie side by side
-    pixels = np.ascontiguousarray(light_field.views)
-    lines = pixels.reshape(*pixels.shape[:3], -1)
-    margin = np.float32(parameters.occlusion_margin)
-    nothing = np.empty((0, 0, pixels.shape[3]), np.float32)
-    return RimViews(lines, pixels.shape[4], units, places[alike], baselines[alike], nothing, 0, margin)
+    chosen = np.zeros_like(present)
+    chosen[present] = alike
+    return chosen, units
 
 
 def view_brightness(
@@ -182,7 +179,7 @@ def view_brightness(
     return brightness, residual
 
 
-def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32, moved: FloatMap) -> tuple[FloatMap, BoolMap]:
+def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: float, moved: FloatMap) -> tuple[FloatMap, BoolMap]:
     """The map with the more distant surface of the next step in place of all that is nearer, and how far it is known.
 
     That is so many pixels from a step. Of steps that are equally near the most distant surface is taken.

@@ -138,10 +138,7 @@ def adjacency(segments: Superpixels) -> Adjacency:
     """Pairs of superpixels that touch, with the length and the middle of their border."""
     labels = segments.labels
     pieces = []
-    for a, b, offset in (
-        (labels[:, :-1], labels[:, 1:], (0.5, 0.0)),
-        (labels[:-1], labels[1:], (0.0, 0.5)),
-    ):
+    for a, b, offset in ((labels[:, :-1], labels[:, 1:], (0.5, 0.0)), (labels[:-1], labels[1:], (0.0, 0.5))):
         y, x = np.nonzero(a != b)
         low, high = np.minimum(a[y, x], b[y, x]), np.maximum(a[y, x], b[y, x])
         pieces.append(np.stack([low, high, x + offset[0], y + offset[1]], axis=1))

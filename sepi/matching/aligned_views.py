@@ -10,15 +10,14 @@ and in strong noise every error would stay.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from sepi.kernels import gauss_newton as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, without_reference
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
-from sepi.matching.nearest_surfaces import nearest_surfaces
-from sepi.matching.row_bands import Band, Rows, row_bands
+from sepi.matching.nearest_surfaces import SeenViews
+from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.spline_views import SplineViews, forget_splines, spline_views
 
 LEAST_OTHERS = 8
@@ -26,22 +25,6 @@ LEAST_OTHERS = 8
 
 BYTES_PER_PIXEL = 2 * 4 + 2 + 4
 """Of a pixel of a view: four coefficients, the detail, and the z-buffer."""
-
-
-class Seeing(NamedTuple):
-    """Where the views are occluded.
-
-    Attributes
-    ----------
-    nearest : ndarray, shape (N, n, W), float32
-        Nearest disparity in each compared view (:func:`sepi.matching.nearest_surfaces.nearest_surfaces`); rows start
-        at the splines' ``low``.
-    occlusion_margin : float32
-        By how much an occluder must be nearer, pixels per view step.
-    """
-
-    nearest: FloatMap
-    occlusion_margin: np.float32
 
 
 class AlignedViews:
@@ -69,10 +52,10 @@ class AlignedViews:
         self._parameters = parameters
         self.present = light_field.present if present is None else present
         self._others = without_reference(light_field, self.present)
-        self._margin = np.float32(occlusion_margin)
+        self._margin = occlusion_margin
         # of the whole picture, where there is memory for it
         self._splines: SplineViews | None = None
-        self._nearest: tuple[FloatMap, FloatMap] | None = None
+        self._seen: tuple[FloatMap, SeenViews] | None = None
 
     def mean(self, disparity: FloatMap) -> FloatMap:
         """Mean of the views that see each pixel.
@@ -89,36 +72,35 @@ class AlignedViews:
         """
         mean = np.empty((*disparity.shape, 4), np.float32)
 
-        def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
-            kernels.mean_of_views(views, seeing, disparity, band.begin, band.end, mean)
+        def add(views: SplineViews, seen: SeenViews, band: Band) -> None:
+            kernels.mean_of_views(views, seen, disparity, band.begin, band.end, mean)
 
         self.in_bands(disparity, add)
         return mean
 
-    def in_bands(self, disparity: FloatMap, add: Callable[[SplineViews, Seeing, Band], None]) -> None:
+    def in_bands(self, disparity: FloatMap, add: Callable[[SplineViews, SeenViews, Band], None]) -> None:
         """Call ``add`` with the splines of the views, and what hides them, for each band of rows."""
         field = self._light_field
         bands = row_bands(field, self.present, float(np.abs(disparity).max()), BYTES_PER_PIXEL)
         if len(bands) == 1:
             if self._splines is None:
                 self._splines = spline_views(field, self._parameters, bands[0].rows, self.present)
-            if self._nearest is None or self._nearest[0] is not disparity:
-                self._nearest = None
-                self._nearest = disparity, nearest_surfaces(field, disparity, self._others, bands[0].rows)
-            add(self._splines, Seeing(self._nearest[1], self._margin), bands[0])
+            if self._seen is None or self._seen[0] is not disparity:
+                self._seen = None
+                self._seen = disparity, self._seen_views(disparity, bands[0])
+            add(self._splines, self._seen[1], bands[0])
             return
         forget_splines(field)
-        # as tall as the tallest, so that each takes the place of the one before
-        height, tallest = field.shape[0], max(band.rows.high - band.rows.low for band in bands)
-        room = None
         for band in bands:
-            low = min(band.rows.low, height - tallest)
-            rows = Rows(low, low + tallest)
-            splines = spline_views(field, self._parameters, rows, self.present, room)
-            room = splines.splines
-            add(splines, Seeing(nearest_surfaces(field, disparity, self._others, rows), self._margin), band)
+            views = spline_views(field, self._parameters, band.rows, self.present)
+            add(views, self._seen_views(disparity, band), band)
+            # before the next ones are made
+            del views
         # a band may need all rows
         forget_splines(field)
+
+    def _seen_views(self, disparity: FloatMap, band: Band) -> SeenViews:
+        return SeenViews.of(self._light_field, disparity, self._others, band.rows, self._margin)
 
     def forget_detail(self) -> None:
         """Free the detail of the views when later steps need only their splines."""

@@ -32,14 +32,7 @@ DETAIL_UNIT = 1 / 32000
 # an edge of the base, colours in 0..1
 _RADIUS, _WIDTH, _EDGE = 4, 4.0, 0.05
 
-ColourScale = Annotated[
-    float,
-    Field(
-        ge=1e-6,
-        le=2,
-        description="residual of the colours at which their cost is one half; RGB distance, colours in 0..1",
-    ),
-]
+ColourScale = Annotated[float, Field(ge=1e-6, le=2, description="residual at which colours cost half; RGB distance")]
 """A parameter whose default is not the same for every sweep."""
 
 
@@ -47,12 +40,7 @@ class BaseDetailParameters(SofteningParameters):
     """Parameters of the decomposition, and of how well colours and detail must fit."""
 
     colour_scale: ColourScale = 0.0316
-    detail_scale: float = Field(
-        0.0038,
-        ge=1e-6,
-        le=2,
-        description="residual of the detail at which its cost is one half; RGB distance, colours in 0..1",
-    )
+    detail_scale: float = Field(0.0038, ge=1e-6, le=2, description="residual at which detail costs half; RGB distance")
     use_detail: bool = Field(True, description="whether the detail is compared, or colours alone")
     detail_share: float = Field(0.6, gt=0, le=1, description="share of the detail in the cost")
 
@@ -105,9 +93,10 @@ class BaseDetail(NamedTuple):
     reference_detail: npt.NDArray[np.int16]
     edge: float
 
-    def squared_scale(self, scale: float) -> float:
-        """Square of a robust scale, widened by the noise."""
-        return scale**2 + self.noise
+    def scales2(self, parameters: BaseDetailParameters) -> FloatMap:
+        """Squares of the robust scales of colours and of detail, widened by the noise; shape (2,), float32."""
+        scales = parameters.colour_scale, parameters.detail_scale
+        return np.array([scale**2 + self.noise for scale in scales], np.float32)
 
 
 def base_detail_decomposition(
@@ -141,10 +130,12 @@ def base_detail_decomposition(
     present = light_field.present if present is None else present
     unit = np.float32(1 / full_scale(views.dtype))
     noise = reference_noise(light_field)
-    detail, missing = _detail_so_far(light_field, parameters, rows, present)
+    detail, made = _detail_so_far(light_field, parameters, rows)
+    missing = present & ~made
     edge = float(np.hypot(_EDGE, 3 * noise))
     if detail.size and missing.any():
         kernels.detail_of_views(views, float(unit), missing, rows.low, *_window(edge), DETAIL_UNIT, detail)
+        made |= missing
     return BaseDetail(
         views,
         unit,
@@ -205,19 +196,17 @@ def _all_rows_fit(light_field: LightField) -> bool:
 
 
 def _detail_so_far(
-    light_field: LightField, parameters: BaseDetailParameters, rows: Rows, present: BoolMap
+    light_field: LightField, parameters: BaseDetailParameters, rows: Rows
 ) -> tuple[npt.NDArray[np.int16], BoolMap]:
-    """Array for the detail of some rows, with what is computed so far, and the views that still lack it."""
+    """Array for the detail, with what is computed so far, and the views (T, S) that it has; the array may be empty."""
     height, width = light_field.shape
-    with_detail = parameters.use_detail
-    # untouched pages take no memory
-    shape = (*light_field.grid, rows.high - rows.low if with_detail else 0, width)
-    if not with_detail or rows != (0, height):
-        return np.zeros(shape, np.int16), present
-    detail, made = kept(light_field, "detail", lambda: (np.zeros(shape, np.int16), np.zeros(light_field.grid, bool)))
-    missing = present & ~made
-    made |= present
-    return detail, missing
+    shape = (*light_field.grid, (rows.high - rows.low) * parameters.use_detail, width)
+
+    def nothing() -> tuple[npt.NDArray[np.int16], BoolMap]:
+        # untouched pages take no memory
+        return np.zeros(shape, np.int16), np.zeros(light_field.grid, bool)
+
+    return kept(light_field, "detail", nothing) if parameters.use_detail and rows == (0, height) else nothing()
 
 
 def reference_noise(light_field: LightField) -> float:

@@ -99,7 +99,7 @@ def expected_costs(
         chosen = compared & subset[groups]
         if not chosen.any():
             continue
-        sums: FloatArray = down[candidates.row[chosen]] * across[candidates.column[chosen]]
+        sums: FloatArray = down[chosen] * across[chosen]
         for power, anywhere in enumerate(ANYWHERE, start=1):
             moments[power - 1, n, : sums.shape[1]] = (sums**power).mean(axis=0) - anywhere
     variance = expected_variance(light_field, noise) * _not_cut_off(light_field) / squared_scale

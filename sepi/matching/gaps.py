@@ -16,7 +16,7 @@ from pydantic import Field
 from sepi.kernels import gaps as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale, without_reference
 from sepi.matching.denoising import guide_of
-from sepi.matching.nearest_surfaces import nearest_surfaces
+from sepi.matching.nearest_surfaces import SeenViews
 from sepi.matching.row_bands import row_bands
 from sepi.stage import OcclusionMarginParameters
 
@@ -32,12 +32,8 @@ class GapParameters(OcclusionMarginParameters):
     """Parameters of what is seen through gaps."""
 
     gaps: bool = Field(True, description="whether surfaces seen through gaps get a depth of their own")
-    gap_step: float = Field(
-        0.6, gt=0, description="least depth step from the gap's border to the surface behind, pixels per view step"
-    )
-    gap_reach: int = Field(
-        32, ge=1, le=200, description="distance within which a farther surface of the same colour is searched, pixels"
-    )
+    gap_step: float = Field(0.6, gt=0, description="least depth step in a gap, pixels per view step")
+    gap_reach: int = Field(32, ge=1, le=200, description="reach of the search for its colour behind it, in pixels")
     gap_colour: float = Field(0.06, gt=0, le=2, description="largest RGB distance of the same colour, colours in 0..1")
     gap_gain: float = Field(0.5, gt=0, lt=1, description="share of squared residual that the farther depth may leave")
 
@@ -112,8 +108,7 @@ def compared_depths(
     sums = np.zeros((3, *disparity.shape), np.float32)
     farthest = float(max(np.abs(disparity).max(), np.abs(other).max()))
     for begin, end, rows in row_bands(light_field, others, farthest, _BYTES_PER_PIXEL):
-        nearest = nearest_surfaces(light_field, other if occluders is None else occluders, others, rows)
-        asked = (others, light_field.baselines, nearest, rows.low, occlusion_margin)
+        asked = SeenViews.of(light_field, other if occluders is None else occluders, others, rows, occlusion_margin)
         kernels.compare_depths(views, unit, *depths, asked, most, begin, end, sums)
     return sums
 

@@ -25,8 +25,9 @@ from sepi.image.noise import variance_of_residuals
 from sepi.kernels import gauss_newton as kernels
 from sepi.kernels import splines, surface_windows
 from sepi.lightfield import FloatMap
-from sepi.matching.aligned_views import AlignedViews, Seeing
+from sepi.matching.aligned_views import AlignedViews
 from sepi.matching.base_detail import reference_noise
+from sepi.matching.nearest_surfaces import SeenViews
 from sepi.matching.row_bands import Band
 from sepi.matching.spline_views import SplineViews
 
@@ -97,7 +98,7 @@ class GaussNewton(AlignedViews):
         """
         gradient, curvature = self._sums(2, disparity, mean, *(slopes or spline_derivatives(mean)))
         # the next map differs
-        self._nearest = None
+        self._seen = None
         return gradient, curvature
 
     def with_evidence(self, mean: FloatMap, disparity: FloatMap) -> tuple[FloatMap, FloatMap, Evidence]:
@@ -121,8 +122,8 @@ class GaussNewton(AlignedViews):
         """The first sums of ``kernels/gauss_newton.cpp``, with a mean and its derivatives."""
         sums = np.empty((number, *disparity.shape), np.float32)
 
-        def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
-            kernels.equations_of_views(views, seeing, disparity, mean, down, across, band.begin, band.end, sums)
+        def add(views: SplineViews, seen: SeenViews, band: Band) -> None:
+            kernels.equations_of_views(views, seen, disparity, mean, down, across, band.begin, band.end, sums)
 
         self.in_bands(disparity, add)
         return sums

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple, Self
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ import numpy.typing as npt
 
 from sepi.kernels import LANES
 from sepi.kernels import visibility as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatArray, FloatMap, LightField
 from sepi.matching.row_bands import Rows
 
 EMPTY: float = kernels.EMPTY
@@ -18,6 +19,36 @@ EMPTY: float = kernels.EMPTY
 
 MISSING: float = kernels.MISSING
 """The same where the view shows nothing: not even a view that hides a pixel counts less."""
+
+
+class SeenViews(NamedTuple):
+    """Views that are compared, and what hides pixels of the reference view in them.
+
+    Attributes
+    ----------
+    places : ndarray, shape (V, 2), int64
+        Row and column of each view in the grid.
+    baselines : ndarray, shape (V, 2), float64
+        Theirs, down and across, in view steps.
+    nearest : ndarray, shape (V, n, W), float32
+        From :func:`nearest_surfaces`.
+    low : int
+        First row of ``nearest``.
+    margin : float
+        By how much an occluder must be nearer, pixels per view step.
+    """
+
+    places: npt.NDArray[np.int64]
+    baselines: FloatArray
+    nearest: FloatMap
+    low: int
+    margin: float
+
+    @classmethod
+    def of(cls, light_field: LightField, disparity: FloatMap, present: BoolMap, rows: Rows, margin: float) -> Self:
+        """The views ``present`` (T, S), by a map of what may occlude something; rows of the splines or detail."""
+        nearest = nearest_surfaces(light_field, disparity, present, rows)
+        return cls(np.argwhere(present), light_field.baselines[present], nearest, rows.low, margin)
 
 
 def nearest_surfaces(light_field: LightField, disparity: FloatMap | None, present: BoolMap, rows: Rows) -> FloatMap:

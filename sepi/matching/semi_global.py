@@ -40,13 +40,8 @@ ROWS_AT_ONCE = 64
 # largest factor of the window's radius, for few views
 _MOST_WIDENED = 2
 
-SmallPenalty = Annotated[
-    float, Field(ge=0, description="cost of a change by one candidate along a path; more below 25 views")
-]
-LargePenalty = Annotated[
-    float,
-    Field(ge=0, description="cost of a larger change where the colour does not change; more below 25 views"),
-]
+SmallPenalty = Annotated[float, Field(ge=0, description="cost of a change by one candidate; more below 25 views")]
+LargePenalty = Annotated[float, Field(ge=0, description="cost of larger changes within a colour; more below 25 views")]
 """Parameters whose default is not the same for every sweep."""
 
 
@@ -59,9 +54,7 @@ class SmoothingParameters(Parameters):
     )
     small_penalty: SmallPenalty = 0.03
     large_penalty: LargePenalty = 1.0
-    colour_weakening: float = Field(
-        65.0, ge=0, description="how much a colour change weakens the larger penalty, per sum of RGB differences"
-    )
+    colour_weakening: float = Field(65.0, ge=0, description="by how much RGB differences weaken the larger penalty")
 
     def for_views(self, views: int, compared: int) -> Self:
         """These parameters for few views: as given from :data:`ENOUGH_VIEWS` on.

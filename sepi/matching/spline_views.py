@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.kernels import splines as kernels
-from sepi.lightfield import BoolMap, FloatMap, LightField, without_reference
+from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail
 from sepi.matching.row_bands import Rows
 from sepi.process.workspace import forget, kept
@@ -28,34 +28,21 @@ class SplineViews(NamedTuple):
         no share.
     unit : float32
         What they are multiplied with.
-    low : int
-        The row after the margin.
     reference : ndarray, shape (H, W, 4), float32
         Colours and detail of the reference view.
-    places : ndarray, shape (N, 2), int64
-        Row and column in the grid of each view that is compared, but for the reference view.
-    baselines : ndarray, shape (N, 2), float32
-        Theirs, down and across, in view steps.
     scales2, shares : ndarray, shape (2,), float32
         Square of the robust scale, and share in the cost, of colours and of detail.
     """
 
     splines: npt.NDArray[np.int16]
     unit: np.float32
-    low: int
     reference: FloatMap
-    places: npt.NDArray[np.int64]
-    baselines: FloatMap
     scales2: FloatMap
     shares: FloatMap
 
 
 def spline_views(
-    light_field: LightField,
-    parameters: BaseDetailParameters,
-    rows: Rows,
-    present: BoolMap,
-    room: npt.NDArray[np.int16] | None = None,
+    light_field: LightField, parameters: BaseDetailParameters, rows: Rows, present: BoolMap
 ) -> SplineViews:
     """Splines of some rows of the views' colours and, where it has a share, detail.
 
@@ -66,8 +53,6 @@ def spline_views(
     rows : Rows
     present : ndarray, shape (T, S), bool
         The views of which they are wanted.
-    room : ndarray, optional
-        Obsolete splines of as many rows of the same views, whose memory is reused.
 
     Returns
     -------
@@ -77,22 +62,18 @@ def spline_views(
     # what the convolution reaches; mirrored at the picture's ends
     reach = MARGIN + kernels.REACH
     wider = Rows(max(0, min(rows.low - reach, height - reach - 1)), min(height, rows.high + reach + 1))
-    splines, colours, detail = _splines_so_far(light_field, parameters, rows, present, room)
+    splines, made = _splines_so_far(light_field, parameters, rows)
+    colours, detail = missing = np.stack([present, present & parameters.use_detail]) & ~made
     reference = light_field.reference_position
     wanted = detail.copy()
     # which is compared with the mean
     wanted[reference] = True
-    try:
-        views = base_detail_decomposition(light_field, parameters, wider, wanted, again=True)
-        colour_unit, detail_unit = float(views.colour_unit / SPLINE_UNIT), float(views.detail_unit / SPLINE_UNIT)
-        kernels.view_splines(
-            views.colours, colour_unit, views.detail, detail_unit, views.low, colours, detail, rows.low, splines
-        )
-    except BaseException:
-        # they are taken for made
-        forget_splines(light_field)
-        forget_detail(light_field)
-        raise
+    views = base_detail_decomposition(light_field, parameters, wider, wanted, again=True)
+    colour_unit, detail_unit = float(views.colour_unit / SPLINE_UNIT), float(views.detail_unit / SPLINE_UNIT)
+    kernels.view_splines(
+        views.colours, colour_unit, views.detail, detail_unit, views.low, colours, detail, rows.low, splines
+    )
+    made |= missing
     own = np.zeros((height, width, 4), np.float32)
     own[..., :3] = views.guide
     if views.detail.size:
@@ -100,18 +81,7 @@ def spline_views(
     if rows == (0, height) and parameters.use_detail and (present == light_field.present).all():
         # the splines of all views take its place
         forget_detail(light_field)
-    others = without_reference(light_field, present)
-    scales = parameters.colour_scale, parameters.detail_scale
-    return SplineViews(
-        splines,
-        SPLINE_UNIT,
-        rows.low,
-        own,
-        np.argwhere(others),
-        light_field.baselines[others].astype(np.float32),
-        np.array([views.squared_scale(scale) for scale in scales], np.float32),
-        parameters.shares,
-    )
+    return SplineViews(splines, SPLINE_UNIT, own, views.scales2(parameters), parameters.shares)
 
 
 def forget_splines(light_field: LightField) -> None:
@@ -120,30 +90,19 @@ def forget_splines(light_field: LightField) -> None:
 
 
 def _splines_so_far(
-    light_field: LightField,
-    parameters: BaseDetailParameters,
-    rows: Rows,
-    present: BoolMap,
-    room: npt.NDArray[np.int16] | None,
-) -> tuple[npt.NDArray[np.int16], BoolMap, BoolMap]:
-    """Array for splines, with those computed so far, and the views that still lack colours and detail."""
+    light_field: LightField, parameters: BaseDetailParameters, rows: Rows
+) -> tuple[npt.NDArray[np.int16], BoolMap]:
+    """Array for splines, with those computed so far, and the views (2, T, S) of which it has colours, and detail."""
     height, width = light_field.shape
-    # untouched pages take no memory
     shape = (*light_field.grid, rows.high - rows.low + 2 * MARGIN, width + 2 * MARGIN, 4)
-    with_detail = present if parameters.use_detail else np.zeros_like(present)
-    if room is not None:
-        return room, present, with_detail
+
+    def nothing() -> tuple[npt.NDArray[np.int16], BoolMap]:
+        # untouched pages take no memory
+        return np.zeros(shape, np.int16), np.zeros((2, *light_field.grid), bool)
+
     if rows != (0, height):
-        return np.zeros(shape, np.int16), present, with_detail
-
-    def so_far() -> tuple[npt.NDArray[np.int16], BoolMap]:
-        return kept(light_field, "splines", lambda: (np.zeros(shape, np.int16), np.zeros((2, *light_field.grid), bool)))
-
+        return nothing()
     # callers without detail expect its channel to be empty
-    if not parameters.use_detail and so_far()[1][1].any():
+    if not parameters.use_detail and kept(light_field, "splines", nothing)[1][1].any():
         forget_splines(light_field)
-    splines, made = so_far()
-    wanted = np.stack([present, with_detail])
-    missing = wanted & ~made
-    made |= wanted
-    return splines, *missing
+    return kept(light_field, "splines", nothing)

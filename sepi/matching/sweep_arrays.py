@@ -42,27 +42,21 @@ class ViewStack(NamedTuple):
 class Candidates(NamedTuple):
     """Candidate disparities, and the positions of a reference pixel's samples in each view.
 
-    Views with the same baseline down, such as those of one row of the grid, share an entry; likewise across.
-
     Attributes
     ----------
     disparities : ndarray, shape (K,), float32
         Uniform, rising, pixels per view step.
-    row, column : ndarray, shape (T, S), int64
-        Number of each view's entry down, 0..V-1, and across, 0..U-1.
-    down, across : ndarray, shape (V, K) and (U, K), int64
+    down, across : ndarray, shape (T, S, K), int64
         Whole pixels from a reference pixel to its sample; monotonic along the candidates.
-    fy, fx : ndarray, shape (V, K) and (U, K), float32
+    fy, fx : ndarray, shape (T, S, K), float32
         Fractional pixels beyond, 0..1.
-    sy, sx : ndarray, shape (V,) and (U,), float32
+    sy, sx : ndarray, shape (T, S), float32
         Shift of the sample in pixels per unit of disparity.
     reach : float
         Distance to the farthest sample along either axis, pixels.
     """
 
     disparities: FloatMap
-    row: npt.NDArray[np.int64]
-    column: npt.NDArray[np.int64]
     down: npt.NDArray[np.int64]
     fy: FloatMap
     across: npt.NDArray[np.int64]
@@ -137,12 +131,11 @@ class Visibility(NamedTuple):
 
 def sampled_candidates(disparities: FloatMap, baselines: FloatArray) -> Candidates:
     """Candidates ``(K,)`` and their sample positions in views of these baselines ``(T, S, 2)``."""
-    (down, row), (across, column) = (np.unique(baselines[..., axis], return_inverse=True) for axis in (0, 1))
+    down, across = np.moveaxis(baselines, 2, 0)
     entries = (*sample_offsets(disparities, down), *sample_offsets(disparities, across))
     moves = (-down).astype(np.float32), (-across).astype(np.float32)
     reach = float(np.abs(disparities[[0, -1]]).max() * np.abs(baselines).max())
-    grid = baselines.shape[:2]
-    return Candidates(disparities, row.reshape(grid), column.reshape(grid), *entries, *moves, reach)
+    return Candidates(disparities, *entries, *moves, reach)
 
 
 def sample_offsets(disparities: FloatMap, baselines: FloatArray) -> tuple[npt.NDArray[np.int64], FloatMap]:

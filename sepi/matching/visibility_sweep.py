@@ -35,7 +35,7 @@ from sepi.matching.base_detail import (
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.denoising import DenoisedLightField, guide_of
 from sepi.matching.gaps import GapParameters, with_open_gaps
-from sepi.matching.nearest_surfaces import EMPTY, nearest_surfaces, z_buffers
+from sepi.matching.nearest_surfaces import EMPTY, SeenViews, nearest_surfaces, z_buffers
 from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.semi_global import (
     ROWS_AT_ONCE,
@@ -73,9 +73,7 @@ BYTES_PER_PIXEL = 2 + 4
 """Per pixel of a view: the detail, and the z-buffer."""
 
 
-FirstViews = Annotated[
-    int, Field(ge=2, description="least number of views for all maps but the last; of a single row, 25 or all")
-]
+FirstViews = Annotated[int, Field(ge=2, description="least number of views for earlier maps; of a row, 25 or all")]
 
 
 class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, SmoothingParameters):
@@ -104,19 +102,8 @@ class VisibleViewsParameters(VisibilitySweepParameters, GapParameters):
     views: int = Field(41, ge=2, description="least number of views for the last map")
     sampling: float = Field(1.0, ge=1, le=8, description="distance of its candidates, steps of num_disparities")
     passes: int = Field(3, ge=1, le=10, description="number of times that visibility and depth are computed in turn")
-    mean_noise: float = Field(
-        0.02,
-        ge=0,
-        le=1,
-        description="least noise at which views are compared with the mean of the views instead of the reference "
-        "view; standard deviation of one channel, colours in 0..1",
-    )
-    searched_views: int = Field(
-        13,
-        ge=2,
-        description="least number of views that compare all candidates; the others compare those near the earlier "
-        "map. All views if they are noisy",
-    )
+    mean_noise: float = Field(0.02, ge=0, le=1, description="noise from which views are compared with their mean, 0..1")
+    searched_views: int = Field(13, ge=2, description="least number of views that compare all candidates; all if noisy")
     occluded_view_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is occluded")
 
     @property
@@ -241,14 +228,14 @@ def occluded_in_any_view(
     -------
     ndarray, shape (H, W), bool
     """
-    baselines = light_field.baselines
+    places, baselines = np.argwhere(present), light_field.baselines[present]
     occluded = np.zeros(light_field.shape, bool)
     for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()), BYTES_PER_PIXEL):
-        nearest = z_buffers(disparity, baselines[present], *rows)
+        nearest = z_buffers(disparity, baselines, *rows)
         if light_field.missing is not None:
             # where a view has no pixels, nothing in it can occlude
             nearest[light_field.missing[:, :, rows.low : rows.high][present]] = EMPTY
-        asked = (present, baselines, nearest, rows.low, occlusion_margin)
+        asked = SeenViews(places, baselines, nearest, rows.low, occlusion_margin)
         kernels.occluded_in_any_view(disparity, asked, begin, end, occluded)
     return occluded
 
@@ -290,8 +277,7 @@ def _sweep(
         views = base_detail_decomposition(light_field, parameters, band.rows, present)
         if mean is not None:
             views = compared_with(views, mean, parameters, band.rows)
-        scales = parameters.colour_scale, parameters.detail_scale
-        scales2 = np.array([views.squared_scale(scale) for scale in scales], np.float32)
+        scales2 = views.scales2(parameters)
         for begin in range(band.begin, band.end, ROWS_AT_ONCE):
             end = min(band.end, begin + ROWS_AT_ONCE)
             room = costs.room(end - begin)

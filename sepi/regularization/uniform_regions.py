@@ -61,19 +61,11 @@ class UniformPlanesParameters(OcclusionMarginParameters, SofteningParameters, Bo
     colour_scale: float = Field(
         0.0316, ge=1e-6, le=2, description="residual at which a view counts half in the mean; RGB distance, 0..1"
     )
-    views: int | None = Field(
-        25, ge=2, description="least number of views to average; at least 25 if they are noisy; null: all"
-    )
+    views: int | None = Field(25, ge=2, description="least number of views to average; if noisy at least 25; null: all")
     window_radius: int = Field(4, ge=1, le=20, description="gradients are averaged over 2 r + 1 pixels")
-    noise_factor: float = Field(
-        4.0, gt=0, description="squared gradient below which a region is uniform, as a multiple of what noise explains"
-    )
-    growth: int = Field(
-        8, ge=0, le=50, description="how far a region grows over pixels of its colour, beyond the window, in pixels"
-    )
-    colour_tolerance: float = Field(
-        0.0102, ge=0, le=1, description="RGB distance that counts as the region's colour, colours in 0..1"
-    )
+    noise_factor: float = Field(4.0, gt=0, description="squared gradient of uniform regions, in units of noise")
+    growth: int = Field(8, ge=0, le=50, description="how far regions grow over their colour, in pixels")
+    colour_tolerance: float = Field(0.0102, ge=0, le=1, description="RGB distance that counts as one colour, 0..1")
     grow_confidence: float = Field(0.75, ge=0, le=1, description="confidence from which a region does not take a pixel")
     min_area: int = Field(50, ge=1, description="least area of a region that may get a plane, in pixels")
     border_confidence: float = Field(0.3, ge=0, le=1, description="confidence above which a border pixel counts")
@@ -247,11 +239,7 @@ def _most_apart(variance: FloatMap, parameters: UniformPlanesParameters) -> Floa
 
 
 def _alike(
-    mean: FloatMap,
-    region: BoolMap,
-    variance: FloatMap,
-    confidence: FloatMap,
-    parameters: UniformPlanesParameters,
+    mean: FloatMap, region: BoolMap, variance: FloatMap, confidence: FloatMap, parameters: UniformPlanesParameters
 ) -> tuple[BoolMap, FloatMap]:
     """Pixels of the colour that the region has within reach, and how much of the reach the region fills."""
     size = 2 * (parameters.window_radius + parameters.growth) + 1

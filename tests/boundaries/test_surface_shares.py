@@ -17,7 +17,7 @@ from sepi.boundaries.surface_shares import view_brightness
 from sepi.kernels import background as background_kernels
 from sepi.kernels import surface_shares as kernels
 from sepi.lightfield import FloatMap, LightField
-from sepi.matching.nearest_surfaces import nearest_surfaces
+from sepi.matching.nearest_surfaces import SeenViews
 from sepi.matching.row_bands import Rows
 from sepi.process.workspace import Workspace
 from sepi.scenes import render
@@ -170,11 +170,11 @@ class Twin:
     def seen(self, d: float, y: int, x: int) -> list[tuple[int, npt.NDArray[np.float64]]]:
         """Views that show a pixel, and the colours they show."""
         found = []
-        for n, ((t, s), (v, u)) in enumerate(zip(self.views.places, self.views.baselines, strict=True)):
+        for n, ((t, s), (v, u)) in enumerate(zip(self.views.seen.places, self.views.seen.baselines, strict=True)):
             down, across = y - d * v, x - d * u
             if min(down, across) < 0 or down > self.H - 1 or across > self.W - 1:
                 continue
-            if self.views.nearest[n, y - round(d * v), x - round(d * u)] <= d + self.views.margin:
+            if self.views.seen.nearest[n, y - round(d * v), x - round(d * u)] <= d + self.views.seen.margin:
                 found.append((n, cubic(self.pixels[t, s], down, across) * self.views.units[n]))
         return found
 
@@ -215,7 +215,7 @@ class Twin:
         near, far = float(rim.near[y, x]), float(rim.far[y, x])
         colours, behind, noise = [], [], []
         for n, colour in self.seen(near, y, x):
-            v, u = self.views.baselines[n]
+            v, u = self.views.seen.baselines[n]
             down, across = y - (near - far) * v, x - (near - far) * u
             if min(down, across) < 0 or down > self.H - 1 or across > self.W - 1:
                 continue
@@ -246,7 +246,7 @@ class Twin:
             cost = (residual2 / (residual2 + scale2 + (1 - a) ** 2 * N)).sum() + held * ((F - own) ** 2).sum() / scale2
             costs[k] = cost / C.size
         # but the reference view, which always fits
-        alone = [colour for n, colour in self.seen(far, y, x) if self.views.baselines[n].any()]
+        alone = [colour for n, colour in self.seen(far, y, x) if self.views.seen.baselines[n].any()]
         if not rim.is_near[y, x] and len(alone) >= kernels.FEWEST_ALONE:
             residual2 = (np.array(alone) - guide[y, x]) ** 2
             cost = (residual2 / (residual2 + scale2)).mean()
@@ -298,19 +298,10 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
         if rim.inside[y, x]:
             np.testing.assert_allclose([rim.near[y, x], rim.far[y, x]], [near, far], rtol=1e-5)
             assert rim.is_near[y, x] == (disparity[y, x] > (near + far) / 2)
-    nearest = nearest_surfaces(field, cv2.dilate(disparity, AROUND), present, Rows(0, 12))
+    seen = SeenViews.of(field, cv2.dilate(disparity, AROUND), present, Rows(0, 12), 0.15)
     unit = np.float32(1 / 255 if dtype == np.uint8 else 1)
     units = random.uniform(0.9, 1.1, present.sum()).astype(np.float32) * unit
-    rim_views = RimViews(
-        views.reshape(*views.shape[:3], -1),
-        views.shape[4],
-        units,
-        np.argwhere(present),
-        field.baselines[present],
-        nearest,
-        0,
-        np.float32(0.15),
-    )
+    rim_views = RimViews(views.reshape(*views.shape[:3], -1), views.shape[4], units, seen)
     clean = disparity - surroundings(disparity).farthest < 0.3
     sides = Sides(disparity, field.reference_view, clean, 4)
     twin = Twin(rim_views, rim, sides)
@@ -347,7 +338,7 @@ def test_fewer_views_tell_a_background_that_the_reference_view_shows() -> None:
     def found(step: int, shown: bool) -> FloatMap:
         few = places[::step]
         nearest = np.zeros((len(few), *layer.shape), np.float32)
-        views = RimViews(lines, 3, np.ones(len(few), np.float32), few, few * 0.0, nearest, 0, np.float32(0.1))
+        views = RimViews(lines, 3, np.ones(len(few), np.float32), SeenViews(few, few * 0.0, nearest, 0, 0.1))
         background = np.empty((*layer.shape, 4), np.float32)
         wanted, asked = np.ones(layer.shape, bool), np.full(layer.shape, shown)
         background_kernels.background_of(views, layer, wanted, asked, 0, 6, background)
@@ -382,4 +373,4 @@ def test_brightness_is_that_of_what_a_view_shows() -> None:
     sides = Sides(still, picture, still == 0, 4)
     for marked, kept in ((missing, 3), (None, 2)):
         field = LightField(views, "half shown", missing=marked)
-        assert len(views_alike(field, sides, USUAL).places) == kept
+        assert len(views_alike(field, sides, USUAL)[1]) == kept

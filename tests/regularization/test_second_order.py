@@ -66,7 +66,7 @@ def sums_twin(light_field, decomposed, parameters, disparity, margin):
         ),
     ):
         planes = values * unit
-        scale2 = decomposed.squared_scale(scale)
+        scale2 = scale**2 + decomposed.noise
         own = planes[t0, s0].astype(float)
         samples = []
         for t, s in np.argwhere(light_field.present):

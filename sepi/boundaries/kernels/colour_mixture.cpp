@@ -3,14 +3,6 @@
 
 namespace sepi::colour_mixture {
 
-// The least and the largest disparity of each pixel and its eight neighbours: the fields of
-// sepi.boundaries.rim.Surroundings, in their order; (H, W).
-struct Surroundings {
-    Array<const float, 2> farthest, nearest;
-
-    bool fields(auto visit) { return visit(farthest, nearest); }
-};
-
 constexpr double WIDTH = 1;            // of the window's weights, pixels
 constexpr double APART = 0.019;        // squared distance of a colour from all mixtures at which it counts 1/e, in units of their variance
 constexpr double RAMP = 0.07;          // distance of the share below the threshold at which the evidence is full
@@ -21,21 +13,22 @@ struct Side {
     double weight = 0, colour[3] = {}, colour2 = 0;
 };
 
-// Evidence that the nearer surface fills little of a pixel, 0..1, into out (H, W) if above 0; guide (H, W, 3).
-void mixture_evidence(Array<const float, 2> disparity, const Surroundings &around, Strided<const float, 3> guide, double discontinuity, Index radius,
+// Evidence that the nearer surface fills little of a pixel, 0..1, into out (H, W) if above 0; guide (H, W, 3). farthest and
+// nearest (H, W) are the least and the largest disparity of each pixel and its eight neighbours.
+void mixture_evidence(Array<const float, 2> disparity, Array<const float, 2> farthest, Array<const float, 2> nearest, Strided<const float, 3> guide, double discontinuity, Index radius,
                       double contrast, double threshold, double least_variance, Array<float, 2> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     std::vector<double> weights;  // by squared distance
     for (Index distance2 = 0; distance2 <= 2 * radius * radius; ++distance2) weights.push_back(std::exp(double(-distance2) / (2 * WIDTH * WIDTH)));
 
     parallel_for_pixels(H, W, [&](Index y, Index x) {
-        const float lowest = around.farthest(y, x), highest = around.nearest(y, x);
+        const float lowest = farthest(y, x), highest = nearest(y, x);
         const double middle = double(lowest + highest) / 2;
         if (highest - lowest < discontinuity || disparity(y, x) <= middle) return;
         Side sides[2];
         for_window(y, x, radius, H, W, [&](Index row, Index column) {
             const float d = disparity(row, column);
-            const bool clean = around.farthest(row, column) > middle || around.nearest(row, column) <= middle;
+            const bool clean = farthest(row, column) > middle || nearest(row, column) <= middle;
             // other surfaces than the two do not count
             if (!clean || d > highest + discontinuity || d < lowest - discontinuity) return;
             const double weight = weights[(row - y) * (row - y) + (column - x) * (column - x)];

@@ -212,7 +212,7 @@ struct ShownPixel {
         number = 0;
         for (Index view = 0; view < views.number(); ++view) {
             // the reference view itself always fits
-            if (views.baselines(view, 0) == 0 && views.baselines(view, 1) == 0) continue;
+            if (views.seen.baselines(view, 0) == 0 && views.seen.baselines(view, 1) == 0) continue;
             if (const auto place = samples_of.place_seen(view, far, y, x)) take(view, *place);
         }
         if (number < FEWEST_ALONE) return UNKNOWN;

@@ -1,7 +1,7 @@
 // A map and its views as arguments; positions of a pixel in the views, and colours interpolated between their pixels.
 #pragma once
 
-#include "kernels/kernel.hpp"
+#include "matching/kernels/seen_views.hpp"
 
 namespace sepi {
 
@@ -9,14 +9,10 @@ namespace sepi {
 struct RimViews {
     std::variant<Array<const std::uint8_t, 4>, Array<const std::uint16_t, 4>, Array<const float, 4>> lines;  // (T, S, H, W C)
     Index channels;
-    Array<const float, 1> units;            // (N,)
-    Strided<const std::int64_t, 2> places;  // (N, 2)
-    Strided<const double, 2> baselines;     // (N, 2)
-    Array<const float, 3> nearest;          // (N, n, W)
-    Index low;                              // first row of nearest
-    float margin;
+    Array<const float, 1> units;  // (V,)
+    SeenViews seen;
 
-    bool fields(auto visit) { return visit(lines, channels, units, places, baselines, nearest, low, margin); }
+    bool fields(auto visit) { return visit(lines, channels, units, seen); }
 
     Index number() const { return units.shape[0]; }
 };
@@ -39,8 +35,8 @@ struct ViewSamples {
 
     // Position of a pixel of disparity d in a view, if inside, before its last row and column.
     [[gnu::always_inline]] std::optional<Place> place_in(Index view, float d, Index y, Index x) const {
-        const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
-        const Index W = views.nearest.shape[2];
+        const double down = double(y) - d * views.seen.baselines(view, 0), across = double(x) - d * views.seen.baselines(view, 1);
+        const Index W = views.seen.nearest.shape[2];
         if (!place_within(down, across, H, W)) return std::nullopt;
         const Index row = std::min(Index(down), H - 2), column = std::min(Index(across), W - 2);
         return Place{row, column, down - double(row), across - double(column)};
@@ -51,13 +47,13 @@ struct ViewSamples {
         const auto place = place_in(view, d, y, x);
         if (!place) return place;
         const auto [row, column] = place->nearest(y, x);
-        return views.nearest(view, row - views.low, column) <= d + views.margin ? place : std::nullopt;
+        return views.seen.nearest(view, row - views.seen.low, column) <= d + views.seen.margin ? place : std::nullopt;
     }
 
     // Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since bilinear interpolation
     // lowers peaks that are two pixels wide.
     std::array<float, 3> sample(Index view, const Place &place) const {
-        const Index t = views.places(view, 0), s = views.places(view, 1);
+        const Index t = views.seen.places(view, 0), s = views.seen.places(view, 1);
         auto colour = std::visit([&](const auto &lines) { return cubic_sample(lines[t][s], place); }, views.lines);
         for (auto &channel : colour) channel *= views.units(view);
         return colour;

@@ -47,9 +47,11 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
 // the number of views. asked: views in which nothing hides the farther depth. Pixels with equal depths are left out. The
 // residual of one view has an upper limit.
 void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float,
-                    3> reference, const AskedViews &asked, float most, Index begin, Index end, Array<float, 3> sums) {
+                    3> reference, const SeenViews &asked, float most, Index begin, Index end, Array<float, 3> sums) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
-    const auto add_view = [&](const auto &view, Array<const float, 2> nearest, double down, double across, Index y, const std::vector<Index> &columns) {
+    const auto add_view = [&](const auto &view, Index n, Index y, const std::vector<Index> &columns) {
+        const auto nearest = asked.nearest[n];
+        const double down = asked.baselines(n, 0), across = asked.baselines(n, 1);
         for (const Index x : columns) {
             const float d = disparity(y, x), f = farther(y, x);
             const auto there = place_within(double(y) - f * down, double(x) - f * across, H, W);
@@ -64,9 +66,8 @@ void compare_depths(const Views &views, float unit, Array<const float, 2> dispar
         std::vector<Index> columns;
         for (Index x = 0; x < W; ++x)
             if (disparity(y, x) != farther(y, x)) columns.push_back(x);
-        asked.for_each([&](Index t, Index s, Array<const float, 2> nearest, double down, double across) {
-            std::visit([&](const auto &some) { add_view(some[t][s], nearest, down, across, y, columns); }, views);
-        });
+        for (Index n = 0; n < asked.number(); ++n)
+            std::visit([&](const auto &some) { add_view(some[asked.places(n, 0)][asked.places(n, 1)], n, y, columns); }, views);
     });
 }
 

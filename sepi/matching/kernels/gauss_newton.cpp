@@ -10,25 +10,15 @@ namespace sepi::gauss_newton {
 // Pixels of a row computed together, so that their data stays in the first cache.
 constexpr Index AT_ONCE = 128;
 
-// Views for an iteration: the fields of sepi.matching.spline_views.SplineViews, in their order.
+// Views for an iteration: the fields of sepi.matching.spline_views.SplineViews, in their order. The row after the margin is
+// the first of the z-buffers.
 struct SplineViews {
     Array<const std::int16_t, 5> splines;    // (T, S, n + 2 SPLINE_MARGIN, W + 2 SPLINE_MARGIN, 4)
     float unit;                              // factor of the splines
-    Index low;                               // the row after the margin
     Array<const float, 3> reference;         // (H, W, 4)
-    Strided<const std::int64_t, 2> places;   // (N, 2), grid positions of the compared views
-    Array<const float, 2> baselines;         // (N, 2), their baselines, down and across
     Array<const float, 1> scales2, shares;   // of colours and of detail
 
-    bool fields(auto visit) { return visit(splines, unit, low, reference, places, baselines, scales2, shares); }
-};
-
-// Where views are hidden: the fields of sepi.matching.aligned_views.Seeing.
-struct Seeing {
-    Array<const float, 3> nearest;  // (N, n, W), of the compared views, rows from the splines' low on
-    float occlusion_margin;
-
-    bool fields(auto visit) { return visit(nearest, occlusion_margin); }
+    bool fields(auto visit) { return visit(splines, unit, reference, scales2, shares); }
 };
 
 using Four = std::array<Float8, 4>;
@@ -67,14 +57,14 @@ Four transposed_halves(const Four &rows) {
 // View number n; pictures (H, W).
 struct View {
     const SplineViews &views;
-    const Seeing &seeing;
+    const SeenViews &seen;
     const Index n, H, W;
-    const Index t = views.places(n, 0), s = views.places(n, 1);
-    const float down = views.baselines(n, 0), across = views.baselines(n, 1);
+    const Index t = seen.places(n, 0), s = seen.places(n, 1);
+    const float down = float(seen.baselines(n, 0)), across = float(seen.baselines(n, 1));
     const float bottom = float(H - 1), right = float(W - 1), unit = views.unit / (float(ONE) * float(ONE));
-    const std::int32_t low = std::int32_t(views.low);
-    const std::int32_t pitch = std::int32_t(views.splines.strides[2]), width = std::int32_t(seeing.nearest.strides[1]);
-    const float *const nearest = seeing.nearest.at(n);
+    const std::int32_t low = std::int32_t(seen.low);
+    const std::int32_t pitch = std::int32_t(views.splines.strides[2]), width = std::int32_t(seen.nearest.strides[1]);
+    const float *const nearest = seen.nearest.at(n);
     // from the one before the picture on
     const std::int16_t *const coefficients = views.splines.at(t, s, SPLINE_MARGIN - 1, SPLINE_MARGIN - 1);
 
@@ -101,15 +91,15 @@ struct View {
     Float8 sample(const Pixels &pixels, Four &channels) const {
         float found[LANES];
         for (int i = 0; i < LANES; ++i) found[i] = nearest[pixels.nearest[i]];
-        const Int8 seen = pixels.inside & (load(found) <= pixels.disparity + seeing.occlusion_margin);
-        if (!any(seen)) return Float8{};
+        const Int8 shown = pixels.inside & (load(found) <= pixels.disparity + seen.margin);
+        if (!any(shown)) return Float8{};
         Four halves;
         for (int i = 0; i < 4; ++i) {
             const Float8 a = products(pixels, i), b = products(pixels, i + 4);
             halves[i] = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11) + __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
         }
         channels = transposed_halves(halves);
-        return seen ? spread(1) : Float8{};
+        return shown ? spread(1) : Float8{};
     }
 
     // Sums of the first two columns of coefficients, of four channels, and of the others, weighted for pixel i. Neither is
@@ -147,7 +137,7 @@ Float8 dot(const Four &a, const Four &b) { return a[0] * b[0] + a[1] * b[1] + a[
 // For each eight pixels of the rows first..last: begin their sums, add the samples of each view that sees one of them, and
 // write the result, at their row, column and number.
 template <class Sums, class Begin, class Add, class Write>
-void over_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index first, Index last, Begin begin, Add add, Write write) {
+void over_views(const SplineViews &views, const SeenViews &seen, Array<const float, 2> disparity, Index first, Index last, Begin begin, Add add, Write write) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for(first, last, [&](Index y) {
         std::array<Sums, AT_ONCE / LANES> all;
@@ -163,13 +153,13 @@ void over_views(const SplineViews &views, const Seeing &seeing, Array<const floa
                 std::memcpy(&sums.disparity, disparity.at(y, x), count * sizeof(float));
                 begin(sums, y, x, count);
             });
-            for (Index n = 0; n < views.places.shape[0]; ++n) {
-                const View view{views, seeing, n, H, W};
+            for (Index n = 0; n < seen.number(); ++n) {
+                const View view{views, seen, n, H, W};
                 each([&](Sums &sums, Index, Index) { view.find(y, sums); });
                 each([&](Sums &sums, Index, Index) {
                     Four channels;
-                    const Float8 seen = view.sample(sums, channels);
-                    if (any(seen > 0.0f)) add(sums, view, seen, channels);
+                    const Float8 shown = view.sample(sums, channels);
+                    if (any(shown > 0.0f)) add(sums, view, shown, channels);
                 });
             }
             each([&](const Sums &sums, Index x, Index count) { write(sums, y, x, count); });
@@ -178,13 +168,13 @@ void over_views(const SplineViews &views, const Seeing &seeing, Array<const floa
 }
 
 // Mean of the views that see each pixel, with less weight for views unlike the reference view, into out (H, W, 4).
-void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index begin, Index end, Array<float, 3> out) {
+void mean_of_views(const SplineViews &views, const SeenViews &seen, Array<const float, 2> disparity, Index begin, Index end, Array<float, 3> out) {
     struct Mean : Pixels {
         Four channels;           // times their weights
         Float8 colours, detail;  // weights
     };
     over_views<Mean>(
-        views, seeing, disparity, begin, end,
+        views, seen, disparity, begin, end,
         [&](Mean &sums, Index y, Index x, Index count) {
             // the reference view itself counts in full
             sums.channels = sums.own = load_channels(views.reference, y, x, count);
@@ -208,7 +198,7 @@ void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const f
 // Sums of each pixel, into out (2 or 14, H, W): gradient and curvature, whose ratio is the update towards less cost. If
 // wanted, also the same over the views to the left, to the right, above and below only, misfit, agreement, agreement of
 // the detail, and number of views. mean (H, W, 4) is the views' mean, down and across its derivatives.
-void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Array<const float, 3> mean,
+void equations_of_views(const SplineViews &views, const SeenViews &seen, Array<const float, 2> disparity, Array<const float, 3> mean,
                         Array<const float, 3> down, Array<const float, 3> across, Index begin, Index end, Array<float, 3> out) {
     // slope and curvature, of colours and of detail; and further sums
     struct Equations : Pixels {
@@ -220,7 +210,7 @@ void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<co
     const float colours = views.shares(0) / views.scales2(0), detail = views.shares(1) / views.scales2(1);
     const auto both = [=](const Four &of) { return std::array{colours * of[0] + detail * of[2], colours * of[1] + detail * of[3]}; };
     over_views<Equations>(
-        views, seeing, disparity, begin, end,
+        views, seen, disparity, begin, end,
         [&](Equations &pixels, Index y, Index x, Index count) {
             pixels.own = load_channels(mean, y, x, count);
             pixels.down = load_channels(down, y, x, count);

@@ -1,7 +1,7 @@
 // Views of any picture type, and operations on their rows that kernels share.
 #pragma once
 
-#include "kernels/kernel.hpp"
+#include "seen_views.hpp"
 
 namespace sepi {
 
@@ -14,26 +14,6 @@ constexpr Index SPLINE_MARGIN = 2;
 inline std::array<Index, 5> shape_of(const Views &views) {
     return std::visit([](const auto &some) { return some.shape; }, views);
 }
-
-// Views for the occlusion of reference pixels: mask asked (T, S), baselines (T, S, 2), and z-buffers (V, n, W) of the views
-// asked, rows from low on. An occluder is nearer by more than margin.
-struct AskedViews {
-    Array<const bool, 2> asked;
-    Strided<const double, 3> baselines;
-    Array<const float, 3> nearest;
-    Index low;
-    float margin;
-
-    bool fields(auto visit) { return visit(asked, baselines, nearest, low, margin); }
-
-    // Calls body(t, s, nearest, down, across) for each.
-    template <class Body>
-    void for_each(const Body &body) const {
-        for (Index t = 0, n = 0; t < asked.shape[0]; ++t)
-            for (Index s = 0; s < asked.shape[1]; ++s)
-                if (asked(t, s)) body(t, s, nearest[n++], baselines(t, s, 0), baselines(t, s, 1));
-    }
-};
 
 // Calls body(t, s, first, number) for groups of the n rows of each view of a grid.
 template <class Body>

@@ -80,9 +80,9 @@ struct ComparedView {
     std::vector<float> distances;  // of each candidate from the origin of its segment
 
     ComparedView(const Candidates &candidates, Index t, Index s) : t(t), s(s), distances(candidates.disparities.shape[0]) {
-        const Index r = candidates.row(t, s), c = candidates.column(t, s), K = candidates.disparities.shape[0];
-        const auto *down = candidates.down.at(r), *across = candidates.across.at(c);
-        const float *fy = candidates.fy.at(r), *fx = candidates.fx.at(c), *disparities = candidates.disparities.data;
+        const Index K = candidates.disparities.shape[0];
+        const auto *down = candidates.down.at(t, s), *across = candidates.across.at(t, s);
+        const float *fy = candidates.fy.at(t, s), *fx = candidates.fx.at(t, s), *disparities = candidates.disparities.data;
         const auto as_before = [=](Index k) {
             return down[k - 1] == down[k] && across[k - 1] == across[k] && (fy[k - 1] == 0) == (fy[k] == 0) &&
                    (fx[k - 1] == 0) == (fx[k] == 0);
@@ -92,7 +92,7 @@ struct ComparedView {
             // disparity 0, which lies at an end of a segment, becomes its origin, and so is exact
             const Index origin = disparities[here] >= 0 ? here : next - 1;
             for (Index n = here; n < next; ++n) distances[n] = disparities[n] - disparities[origin];
-            segments.push_back({here, next, down[here], across[here], {fy[origin], fx[origin], candidates.sy(r), candidates.sx(c)}});
+            segments.push_back({here, next, down[here], across[here], {fy[origin], fx[origin], candidates.sy(t, s), candidates.sx(t, s)}});
         }
     }
 };

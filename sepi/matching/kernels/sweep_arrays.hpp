@@ -19,16 +19,15 @@ struct ViewStack {
 
 // Candidate disparities, and the positions of a reference pixel's samples in each view.
 struct Candidates {
-    Array<const float, 1> disparities;        // (K,)
-    Array<const std::int64_t, 2> row, column;  // (T, S)
-    Array<const std::int64_t, 2> down;         // (V, K)
-    Array<const float, 2> fy;                  // (V, K)
-    Array<const std::int64_t, 2> across;       // (U, K)
-    Array<const float, 2> fx;                  // (U, K)
-    Array<const float, 1> sy, sx;              // (V,) and (U,)
+    Array<const float, 1> disparities;   // (K,)
+    Array<const std::int64_t, 3> down;   // (T, S, K)
+    Array<const float, 3> fy;            // (T, S, K)
+    Array<const std::int64_t, 3> across;  // (T, S, K)
+    Array<const float, 3> fx;            // (T, S, K)
+    Array<const float, 2> sy, sx;        // (T, S)
     double reach;
 
-    bool fields(auto visit) { return visit(disparities, row, column, down, fy, across, fx, sy, sx, reach); }
+    bool fields(auto visit) { return visit(disparities, down, fy, across, fx, sy, sx, reach); }
 };
 
 // Aggregation window, 2 radius + 1 pixels wide, with weights by colour.

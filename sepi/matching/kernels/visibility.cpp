@@ -155,8 +155,7 @@ struct VisibleRow {
             for (Index s = 0; s < views.present.shape[1]; ++s) {
                 number += views.present(t, s);
                 if (!views.present(t, s) || (t == views.t0 && s == views.s0)) continue;
-                const Index r = candidates.row(t, s);
-                const auto [low, high] = std::minmax<Index>({y + candidates.down(r, 0), y + candidates.down(r, K - 1)});
+                const auto [low, high] = std::minmax<Index>({y + candidates.down(t, s, 0), y + candidates.down(t, s, K - 1)});
                 const Index first = std::clamp<Index>(low, 0, H - 2), last = std::clamp<Index>(high, 0, H - 2) + 2;
                 load_view(t, s, first, last);
                 add_view(t, s, visibility.nearest[number], first, y, visibility.searched(t, s) ? everywhere : likely);
@@ -218,15 +217,15 @@ struct VisibleRow {
 
     // Add one view, whose rows from low on are loaded, to row y, in the columns of every candidate.
     void add_view(Index t, Index s, Array<const float, 2> nearest, Index low, Index y, const std::vector<Columns> &columns) {
-        const Index r = candidates.row(t, s), c = candidates.column(t, s), pitch = width;
+        const Index pitch = width;
         const bool some_hide = nearest.shape[1] > 0, searched = visibility.searched(t, s);
         const Float8 hidden = spread(visibility.occluded_view_weight);
         const float margin = visibility.occlusion_margin, steepness = 1 / std::max(margin, LEAST_MARGIN);
         const std::array scale2{colour_scale2, detail_scale2}, share{shares(0), shares(1)};
         for (Index k = 0; k < K; ++k) {
-            const auto [top, fy] = upper_row(y, candidates.down(r, k), candidates.fy(r, k), H);
-            const Index left = candidates.across(c, k);
-            const float fx = candidates.fx(c, k);
+            const auto [top, fy] = upper_row(y, candidates.down(t, s, k), candidates.fy(t, s, k), H);
+            const Index left = candidates.across(t, s, k);
+            const float fx = candidates.fx(t, s, k);
             // on the last column, the next one has weight 0
             const Index within = std::max<Index>(0, -left), beyond = std::min(W, fx == 0 ? W - left : W - 1 - left);
             if (top < 0 || top > H - 2) continue;
@@ -242,7 +241,7 @@ struct VisibleRow {
             const Int8 bows = pair_of(bow(whole_part(fx)), bow(whole_part(fy)));
             // occlusion grows from half a margin to one and a half, since disparities are uncertain
             const Float8 limit = spread(candidates.disparities(k) + 1.5f * margin), number = spread(float(k));
-            const Index lower_row = top - views.low + is_nearer_next(candidates.down(r, k), fy);
+            const Index lower_row = top - views.low + is_nearer_next(candidates.down(t, s, k), fy);
             for (const auto &[begin, end] : columns[k]) {
                 const Index first = std::max(begin, within), last = std::min(end, beyond);
                 const float *before = some_hide ? nearest.at(lower_row, first + left + is_nearer_next(left, fx)) : nullptr;
@@ -290,8 +289,9 @@ struct VisibleRow {
     // Largest number of rows of a view that are needed.
     Index height() const {
         Index moved = 0;
-        for (Index r = 0; r < candidates.down.shape[0]; ++r)
-            moved = std::max(moved, std::abs(candidates.down(r, K - 1) - candidates.down(r, 0)));
+        for (Index t = 0; t < candidates.down.shape[0]; ++t)
+            for (Index s = 0; s < candidates.down.shape[1]; ++s)
+                moved = std::max(moved, std::abs(candidates.down(t, s, K - 1) - candidates.down(t, s, 0)));
         return moved + 2;
     }
 };
@@ -312,16 +312,18 @@ void z_buffers(Array<const float, 2> disparity, Strided<const double, 2> baselin
 }
 
 // Set pixels of out (H, W), in rows begin..end, that something nearer occludes in at least one view.
-void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &views, Index begin, Index end, Array<bool, 2> out) {
+void occluded_in_any_view(Array<const float, 2> disparity, const SeenViews &views, Index begin, Index end, Array<bool, 2> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for(begin, end, [&](Index y) {
-        views.for_each([&](Index, Index, Array<const float, 2> nearest, double down, double across) {
+        for (Index n = 0; n < views.number(); ++n) {
+            const auto nearest = views.nearest[n];
+            const double down = views.baselines(n, 0), across = views.baselines(n, 1);
             for (Index x = 0; x < W; ++x) {
                 const float d = disparity(y, x);
                 const Index row = y - Index(std::nearbyint(d * down)), column = x - Index(std::nearbyint(d * across));
                 if (row >= 0 && column >= 0 && row < H && column < W) out(y, x) |= nearest(row - views.low, column) > d + views.margin;
             }
-        });
+        }
     });
 }
 
