@@ -259,6 +259,7 @@ class TestOwnLightFields:
             assert scene.flags == ("--format", kind, "--view", "0,1")
 
 
+@pytest.mark.extension("formats")
 def test_archive_files_are_scenes_by_their_own_or_their_folders_name(tmp_path: Path) -> None:
     for name in ("buddha.h5", "mona/lf.h5"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
