@@ -115,13 +115,6 @@ _SCENES = (
     click.option("--module", help="Module of an extension that reads PATH."),
 )
 
-view_of_result = click.option(
-    "--view",
-    type=Pair("ROW,COLUMN"),
-    metavar="ROW,COLUMN",
-    help="View to use, after 'sepi depth --all-views'; default: that of the result.",
-)
-
 range_to_search = click.option(
     "--disparity-range",
     nargs=2,

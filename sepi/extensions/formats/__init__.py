@@ -1,4 +1,4 @@
-"""Readers of single programs and devices: MATLAB, HCI 2013, lenslet pictures, mosaics, TIFF stacks, OpenLF."""
+"""Readers of single programs and devices, from MATLAB to OpenLF, and the writers of maps and points on request."""
 
 from sepi.registry import Extension
 
@@ -9,4 +9,10 @@ _MODULES = {
     **dict.fromkeys(("eslf", "mosaic", "tiff-stack", "openlf"), "readers"),
 }
 
-EXTENSION = Extension(readers={word: f"{__name__}.{module}" for word, module in _MODULES.items()})
+EXTENSION = Extension(
+    readers={word: f"{__name__}.{module}" for word, module in _MODULES.items()},
+    commands={
+        "convert": (f"{__name__}.convert", "Write a map of a result as OpenEXR, TIFF or PFM."),
+        "points": (f"{__name__}.convert", "Write the point cloud of a result."),
+    },
+)
