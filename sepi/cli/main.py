@@ -21,9 +21,8 @@ _MODULES = {
     "check": ("info", "Check the order of the views of the light field INPUT."),
     "depth": ("depth", "Compute the disparity map of the light field INPUT."),
     "evaluate": ("evaluate", "Score a disparity map against ground truth."),
-    "export": ("export", "Save the light field INPUT as read, so that it needs no flags."),
     "info": ("info", "Show what is known about the light field INPUT."),
-    "scenes": ("export", "Write scenes with exact ground truth."),
+    "scenes": ("scenes", "Write scenes with exact ground truth."),
 }
 """Command to its module in this folder, and its line in the list of commands."""
 

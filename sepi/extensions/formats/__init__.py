@@ -1,4 +1,4 @@
-"""Readers of single programs and devices, from MATLAB to OpenLF, and the writers of maps and points on request."""
+"""Readers of single programs and devices, from MATLAB to OpenLF, and writers that a command asks for."""
 
 from sepi.registry import Extension
 
@@ -13,6 +13,7 @@ EXTENSION = Extension(
     readers={word: f"{__name__}.{module}" for word, module in _MODULES.items()},
     commands={
         "convert": (f"{__name__}.convert", "Write a map of a result as OpenEXR, TIFF or PFM."),
+        "export": (f"{__name__}.export", "Save the light field INPUT as read, so that it needs no flags."),
         "points": (f"{__name__}.convert", "Write the point cloud of a result."),
     },
 )
