@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.hdf5 import has_dataset, number_of, open_hdf5, read_dataset
+from sepi.io.hdf5 import attribute, has_dataset, open_hdf5, read_dataset
 from sepi.io.readers.arrays import light_field_from_array
 from sepi.io.readers.formats import Format, size_in_hdf5
 from sepi.io.readers.options import ReadOptions
@@ -66,6 +66,22 @@ def read(path: Path, options: ReadOptions) -> LightField:
         return replace(light_field, notes=(*light_field.notes, note))
     ground_truth = None if depth is None else _disparity(depth, camera)
     return replace(light_field, camera=camera, ground_truth=ground_truth)
+
+
+def number_of(holder: h5py.Group, key: str) -> float:
+    """Number in an attribute, even as text or in an array of one; NaN if there is no such attribute.
+
+    Raises
+    ------
+    SepiError
+        If the attribute is not one number.
+    """
+    given = attribute(holder, key) if key in holder.attrs else math.nan
+    try:
+        (value,) = np.ravel(given).astype(float)
+        return float(value)
+    except (TypeError, ValueError) as error:
+        raise SepiError(f"expected the attribute '{key}' to be a number, got {given!r}") from error
 
 
 def _is_layout(shape: tuple[int, ...]) -> bool:
