@@ -121,13 +121,5 @@ def _disparity(depth: DepthMap, camera: Camera) -> FloatMap:
     return disparity
 
 
-FORMATS = {
-    "hci-2013": Format(
-        "HCI 2013 HDF5",
-        "with LF (T, S, H, W, 3)",
-        matches,
-        read,
-        truth_files=lambda path: (path,),
-        size_of=size_in_hdf5,
-    )
-}
+_FORM = "HCI 2013 HDF5", "with LF (T, S, H, W, 3)"
+FORMATS = {"hci-2013": Format(*_FORM, matches, read, truth_files=lambda path: (path,), size_of=size_in_hdf5)}
