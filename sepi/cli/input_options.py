@@ -113,13 +113,6 @@ _SCENES = (
     click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Setting of the module; repeatable."),
 )
 
-view_of_result = click.option(
-    "--view",
-    type=Pair("ROW,COLUMN"),
-    metavar="ROW,COLUMN",
-    help="View to use, after 'sepi depth --all-views'; default: that of the result.",
-)
-
 range_to_search = click.option(
     "--disparity-range",
     nargs=2,

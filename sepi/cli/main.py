@@ -19,13 +19,10 @@ for _name, _value in _SETTINGS.items():
 
 _MODULES = {
     "check": ("info", "Check the order of the views of the light field INPUT."),
-    "convert": ("convert", "Write a map of a result as OpenEXR, TIFF or PFM."),
     "depth": ("depth", "Compute the disparity map of the light field INPUT."),
     "evaluate": ("evaluate", "Score a disparity map against ground truth."),
-    "export": ("export", "Save the light field INPUT as read, so that it needs no flags."),
     "info": ("info", "Show what is known about the light field INPUT."),
-    "points": ("convert", "Write the point cloud of a result."),
-    "scenes": ("export", "Write scenes with exact ground truth."),
+    "scenes": ("scenes", "Write scenes with exact ground truth."),
 }
 """Command to its module in this folder, and its line in the list of commands."""
 

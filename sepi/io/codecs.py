@@ -13,7 +13,7 @@ import os
 import re
 import struct
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from pathlib import Path
 from types import ModuleType
@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError, printable
-from sepi.io.files import atomic_path, naming
+from sepi.io.files import atomic_path
 from sepi.lightfield import FloatMap
 
 if TYPE_CHECKING:
@@ -188,9 +188,6 @@ def write_tiff(path: Path, values: FloatMap, comment: str) -> None:
         )
 
 
-EXR = (".exr",)
-"""Suffixes of file names, in lower case."""
-
 EXR_SIGNATURE = b"v/1\x01"
 """First bytes of an OpenEXR."""
 
@@ -278,30 +275,6 @@ def _quiet() -> Iterator[None]:
             with open(os.devnull, "wb") as nothing:
                 os.dup2(nothing.fileno(), 2)
         yield
-
-
-def write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> None:
-    """Write maps as channels of an OpenEXR file, losslessly compressed; equal content gives equal bytes.
-
-    Parameters
-    ----------
-    path : Path
-    channels : mapping of str to ndarray, shape (H, W), float32
-        Name to map, all of one shape; NaN and infinity stay. Programs know the names ``Z`` (depth) and ``Y`` (grey).
-    comment : str
-        Meaning and unit of the numbers.
-
-    Raises
-    ------
-    SepiError
-        If the package OpenEXR is not installed, or the file cannot be written.
-    """
-    with naming(path):
-        exr = open_exr()
-    header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage, "comments": comment}
-    pixels = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
-    with atomic_path(path) as temporary, exr.File(header, pixels) as file:
-        file.write(str(temporary))
 
 
 _GAP = rb"(?:\s|#[^\n]*\n)++"

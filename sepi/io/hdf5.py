@@ -16,7 +16,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -300,22 +299,6 @@ def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
         raise SepiError(f"attribute '{printable(key)}': expected numbers, or text of fixed length")
     value = holder.attrs[key]
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
-
-
-def number_of(holder: h5py.Group, key: str) -> float:
-    """Number in an attribute, even as text or in an array of one; NaN if there is no such attribute.
-
-    Raises
-    ------
-    SepiError
-        If the attribute is not one number.
-    """
-    given = attribute(holder, key) if key in holder.attrs else math.nan
-    try:
-        (value,) = np.ravel(given).astype(float)
-        return float(value)
-    except (TypeError, ValueError) as error:
-        raise SepiError(f"expected the attribute '{key}' to be a number, got {given!r}") from error
 
 
 def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDArray[Any]:

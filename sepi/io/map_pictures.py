@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.io.images import write_png
-from sepi.lightfield import BoolMap, FloatMap, as_unit_float
+from sepi.lightfield import BoolMap, FloatMap
 from sepi.validation import require_map
 
 Picture = npt.NDArray[np.uint8]
@@ -57,17 +57,10 @@ def colour_code(values: FloatMap, unknown: BoolMap | None = None) -> Picture:
     finite = np.isfinite(values)
     # unknown pixels do not count in the scale
     counted = finite if unknown is None else finite & ~unknown
-    return in_colours(np.where(finite, _spread(values, counted), np.nan), unknown)
+    return in_colours(np.where(finite, spread(values, counted), np.nan), unknown)
 
 
-def colour_and_depth(picture: npt.NDArray[np.generic], disparity: FloatMap, unknown: BoolMap) -> Picture:
-    """View and disparity side by side, RGB (H, 2 W, 3), as light field displays take it; far is black, near white."""
-    colours = np.broadcast_to(levels(as_unit_float(picture)), (*disparity.shape, 3))
-    depth = levels(_spread(disparity, ~unknown & np.isfinite(disparity)))
-    return np.hstack([colours, np.repeat(depth[:, :, None], 3, axis=2)])
-
-
-def _spread(values: FloatMap, counted: BoolMap) -> npt.NDArray[np.floating[Any]]:
+def spread(values: FloatMap, counted: BoolMap) -> npt.NDArray[np.floating[Any]]:
     """Map scaled so that 0..1 spans the ``counted`` values, except a few outliers."""
     low, high = np.quantile(values[counted], (BEYOND, 1 - BEYOND)) if counted.any() else (0.0, 0.0)
     # a constant map becomes 0.5

@@ -24,7 +24,7 @@ RUNTIME = "runtime.txt"
 """Run time in seconds, if it is given."""
 
 ALL_VIEWS = "all_views.h5"
-"""Maps of all views, which the command writes on request (:mod:`sepi.io.all_views`)."""
+"""Maps of all views, which an extension writes on request."""
 
 _SOME = (RUNTIME, ALL_VIEWS, "depth.pfm", "depth_sigma.pfm", "sigma.pfm", "sigma.png", "interval.npz")
 

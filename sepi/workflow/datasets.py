@@ -19,9 +19,10 @@ from sepi.errors import SepiError
 from sepi.io.disparity_maps import TruthFile
 from sepi.io.images import SUFFIXES
 from sepi.io.readers import exported, hci
-from sepi.io.readers.formats import Format, format_of, size_of
+from sepi.io.readers.formats import FORMATS, Format, format_of, size_of
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import view_files
+from sepi.validation import require_known
 from sepi.validation.models import CheckedModel
 from sepi.workflow.result_paths import RESULTS
 
@@ -221,8 +222,9 @@ def scenes_in(
     if not (os.path.isdir(root) or (os.path.isfile(root) and is_archive)):
         raise SepiError(f"{where}: no folder '{root}'")
     if is_archive:
-        expected = f"HDF5 files with a dataset {hci.VIEWS_2013}"
-        scenes = [_archive_scene(dataset, path) for path in _places(root.resolve(), hci.matches_2013, _LEVELS + 1)]
+        require_known(f"{where}: format", [_FORMAT_OF[dataset]], FORMATS)
+        expected, is_file = "HDF5 files with a dataset LF", FORMATS[_FORMAT_OF[dataset]].matches
+        scenes = [_archive_scene(dataset, path) for path in _places(root.resolve(), is_file, _LEVELS + 1)]
     else:
         expected = f"folders with {VIEW_PATTERN}"
         folders = _places(root.resolve(), lambda path: any(path.glob(VIEW_PATTERN)), _LEVELS)

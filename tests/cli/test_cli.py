@@ -175,6 +175,7 @@ def test_depth_in_metres_with_the_cameras_geometry(scene: Path) -> None:
     assert "missing: --sensor-size" in call("depth", scene, *flags[:-2]).stderr
 
 
+@pytest.mark.extension("formats")
 @pytest.mark.usefixtures("flat")
 def test_a_crop_is_remembered_by_its_result(scene: Path) -> None:
     """Flags of a camera that come later are those of the whole picture, too."""
@@ -189,6 +190,7 @@ def test_a_crop_is_remembered_by_its_result(scene: Path) -> None:
     np.testing.assert_array_equal(read_pfm(Path("later.pfm")), read_pfm(Path("now/depth.pfm")))
 
 
+@pytest.mark.extension("formats")
 def test_a_camera_that_contradicts_the_disparities_is_told(pyramids: Path, result: Path, tmp_path: Path) -> None:
     """Metres for millimetres, or focus at infinity, put most of a scene beyond infinity."""
     for baseline, focus, told in ((0.05, 8, True), (50, "inf", True), (50, 1.5, False)):

@@ -9,7 +9,6 @@ from click.testing import Result
 from error_lines import done
 
 from sepi.cli.evaluate import NO_INTERVAL
-from sepi.io.all_views import write_all_views
 from sepi.io.disparity_maps import write_pfm
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import write_png
@@ -94,8 +93,11 @@ def test_a_crop_has_the_error_bars_of_its_pixels(files: StageMaps) -> None:
     assert told["paper"]["all"]["coverage"] == pytest.approx(100 * 28 / 50)
 
 
+@pytest.mark.extension("views")
 def test_maps_of_all_views_have_those_of_the_view(files: StageMaps) -> None:
     """With the view that is meant, and without one those of the reference view, as its disparity is read."""
+    from sepi.extensions.views.files import write_all_views
+
     light_field = render("dots", size=64, views=3)
     views = [
         ((t, s), {**files.all(), "extended": np.zeros((64, 64), bool), "low": files.low - np.float32(t)})

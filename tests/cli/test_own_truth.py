@@ -65,6 +65,7 @@ def test_a_map_is_scored_against_a_file(seen: LightField) -> None:
     assert f"{expected['paper']['all']['badpix_0.25']:.3f}" in row.split()
 
 
+@pytest.mark.extension("formats")
 def test_export_keeps_it_for_every_command(seen: LightField) -> None:
     """Named once, it needs no flags any more: neither file, nor scale, nor view."""
     flags = ("--truth", "truth.png", "--truth-scale", SCALE, "--view", "1,2", "--disparity-range", -3, 3)

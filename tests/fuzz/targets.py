@@ -24,13 +24,14 @@ from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.extensions.benchmark.hci_submission import SHAPE as SUBMITTED
 from sepi.extensions.benchmark.hci_submission import problems_of
+from sepi.extensions.formats.exported import write_exported
 from sepi.io.all_views import read_error_bars_at
 from sepi.io.disparity_maps import TruthFile, is_disparity, read_disparity, write_pfm
 from sepi.io.hdf5 import read_light_field as read_own
 from sepi.io.hdf5 import read_stage, write_light_field, write_stage
 from sepi.io.images import picture_header, png_texts, read_picture, write_png
 from sepi.io.provenance import history_of, read_origin
-from sepi.io.readers.exported import MANIFEST, write_exported
+from sepi.io.readers.exported import MANIFEST
 from sepi.io.readers.formats import format_of, read, size_of
 from sepi.io.readers.options import ReadOptions
 from sepi.io.result_folder import read_result, write_result

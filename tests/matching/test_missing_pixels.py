@@ -10,7 +10,6 @@ import sepi
 from sepi.boundaries.decision import assigned_to_surfaces
 from sepi.boundaries.parameters import BoundaryParameters
 from sepi.io.hdf5 import read_light_field, write_light_field
-from sepi.io.readers.exported import write_exported
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField, as_unit_float
 from sepi.matching.base_detail import BaseDetailParameters
@@ -167,7 +166,7 @@ def test_pixels_that_only_the_reference_shows_or_not_even_it_are_unknown() -> No
     assert unknown[16:].sum() == 16
 
 
-@pytest.mark.parametrize("kind", ["h5", "folder"])
+@pytest.mark.parametrize("kind", ["h5", pytest.param("folder", marks=pytest.mark.extension("formats"))])
 def test_files_and_turned_grids_keep_the_marks(tmp_path: Path, kind: str) -> None:
     """Exported and read again, made-up pixels are compared."""
     light_field = turned(render("dots", size=SIZE, views=3), 10)
@@ -176,6 +175,8 @@ def test_files_and_turned_grids_keep_the_marks(tmp_path: Path, kind: str) -> Non
         write_light_field(path, light_field)
         np.testing.assert_array_equal(read_light_field(path).missing, light_field.missing)
     else:
+        from sepi.extensions.formats.exported import write_exported
+
         write_exported(path, light_field)
     np.testing.assert_array_equal(sepi.read_light_field(path).missing, light_field.missing)
     flipped = sepi.read_light_field(path, options=ReadOptions(order="flip-columns"), check_order=False)

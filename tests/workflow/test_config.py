@@ -13,7 +13,6 @@ import yaml
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import TruthFile
 from sepi.io.images import write_png
-from sepi.io.readers.exported import write_exported
 from sepi.scenes import render
 from sepi.workflow.config import load_settings
 from sepi.workflow.config_file import default_yaml
@@ -156,8 +155,11 @@ class TestFolderOfScenes:
         assert [path.name for path in scene.files] == [*views, "parameters.cfg"]
         assert [path.name for path in scene.truth] == truth
 
+    @pytest.mark.extension("formats")
     def test_ground_truth_of_an_exported_folder_is_what_its_file_names(self, tmp_path: Path) -> None:
         """Its pictures may have any names: a changed mask would compute all maps anew, a changed truth no score."""
+        from sepi.extensions.formats.exported import write_exported
+
         light_field = render("dots", size=64, views=3)
         write_exported(tmp_path / "dots", light_field)
         scene = load_settings({"light_fields": {"dots": {"path": str(tmp_path / "dots")}}}).scene("own", "dots")
@@ -259,6 +261,7 @@ class TestOwnLightFields:
             assert scene.flags == ("--format", kind, "--view", "0,1")
 
 
+@pytest.mark.extension("formats")
 def test_archive_files_are_scenes_by_their_own_or_their_folders_name(tmp_path: Path) -> None:
     for name in ("buddha.h5", "mona/lf.h5"):
         (tmp_path / name).parent.mkdir(exist_ok=True)

@@ -1,12 +1,19 @@
 """The commands ``sepi calibrate`` and ``sepi poses``."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
 from sepi.errors import SepiError
 from sepi.process.command import PATH, SepiCommand, progress_bar
+
+if TYPE_CHECKING:
+    from sepi.lightfield import FloatMap
 
 
 @click.command(cls=SepiCommand)
@@ -88,7 +95,6 @@ def poses(
     from sepi.cli.input_options import camera_of, read_light_field_of
     from sepi.extensions.cameras.data_sets import write_colmap, write_nerfstudio
     from sepi.extensions.cameras.posed_views import PosedViews
-    from sepi.io.all_views import surfaces_of
     from sepi.io.result_folder import read_result
 
     light_field = read_light_field_of(light_field_path, result_path, reading, bare=False)
@@ -102,9 +108,9 @@ def poses(
         camera=camera_of(result_path, reading.options.view, result, geometry),
         min_confidence=min_confidence,
         max_points=points,
-        surfaces=surfaces_of(result_path),
+        surfaces=_surfaces_of(result_path),
         sigma=result.sigma,
-        sigmas=surfaces_of(result_path, "sigma"),
+        sigmas=_surfaces_of(result_path, "sigma"),
     )
     with progress_bar(light_field.name) as progress:
         {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](folder, posed, progress)
@@ -112,3 +118,27 @@ def poses(
         click.echo("the camera is unknown: pixels fit a nominal one, but lengths are neither in metres nor to scale")
     units = posed.units.partition(",")[0]
     click.echo(f"written: {folder}/ ({len(posed.positions)} views, {posed.chosen.sum()} points, {units})")
+
+
+def _surfaces_of(path: Path, name: str = "disparity") -> Callable[[tuple[int, int]], FloatMap] | None:
+    """Function from a view to its map, (H, W) float32, NaN where unknown; None without maps of all views.
+
+    Parameters
+    ----------
+    path : Path
+        As for :func:`sepi.read_result`.
+    name : str
+        ``"disparity"`` or ``"sigma"``.
+    """
+    import numpy as np
+
+    from sepi.io.result_folder import all_views_file, read_result
+
+    if all_views_file(path, (0, 0)) is None or getattr(read_result(path), name) is None:
+        return None
+
+    def surface(view: tuple[int, int]) -> FloatMap:
+        result = read_result(path, view)
+        return np.where(result.unknown, np.float32(np.nan), getattr(result, name))
+
+    return surface

@@ -36,9 +36,10 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError, printable
+from sepi.extensions.formats.hci_2013 import number_of
 from sepi.io.codecs import TIFF, TIFF_SIGNATURES, directory_of, open_tiff, page_pixels, tiff_form
 from sepi.io.files import DEFLATE_RATIO, naming, reading
-from sepi.io.hdf5 import has_dataset, number_of, open_hdf5, read_dataset
+from sepi.io.hdf5 import has_dataset, open_hdf5, read_dataset
 from sepi.io.images import SUFFIXES, picture_header, read_picture
 from sepi.io.readers.arrays import Array, light_field_from_array
 from sepi.io.readers.formats import Format

@@ -10,7 +10,7 @@ import numpy as np
 from click.core import ParameterSource
 
 from sepi.camera import camera_from
-from sepi.cli.export import list_scenes, require_new
+from sepi.cli.scenes import list_scenes, require_new
 from sepi.errors import SepiError
 from sepi.extensions.rendered.exposure import Exposure, exposed
 from sepi.extensions.rendered.render_file import Render, read_render

@@ -49,7 +49,7 @@ def _write_all_views(
 ) -> None:
     """Write the maps of all views beside a result."""
     from sepi.extensions.views.all_views import maps_of_all_views
-    from sepi.io.all_views import write_all_views
+    from sepi.extensions.views.files import write_all_views
     from sepi.io.provenance import result_attributes
     from sepi.io.result_files import ALL_VIEWS
     from sepi.io.result_folder import write_as_taken

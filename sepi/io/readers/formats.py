@@ -123,7 +123,8 @@ def _size_of_array(arrays_in: Callable[[Path], Arrays], path: Path) -> Size:
 
 
 # no digest check for many files: whoever reads the views checks the file
-_size_in_hdf5 = partial(_size_of_array, partial(hdf5_arrays, check=False))
+size_in_hdf5 = partial(_size_of_array, partial(hdf5_arrays, check=False))
+"""Size of the light field in an HDF5 file, from the shapes of its arrays."""
 
 
 def format_of_arrays(
@@ -166,16 +167,6 @@ _OWN = {
         loose=True,
     ),
     "numpy": format_of_arrays("NumPy file", ".npy or .npz", array_files.matches_numpy, array_files.numpy_arrays),
-    # before other arrays, and after MATLAB's, which have a header or suffix of their own
-    "hci-2013": Format(
-        "HCI 2013 HDF5",
-        "with LF (T, S, H, W, 3)",
-        hci.matches_2013,
-        hci.read_2013,
-        loose=True,
-        truth_files=lambda path: (path,),
-        size_of=_size_in_hdf5,
-    ),
     "hdf5": format_of_arrays(
         "HDF5 file", "with an array of all views", array_files.matches_hdf5, hdf5_arrays, loose=True
     ),
@@ -188,7 +179,7 @@ _OWN = {
         scales=False,
         loose=True,
         truth_files=lambda path: (path,),
-        size_of=_size_in_hdf5,
+        size_of=size_in_hdf5,
     ),
 }
 FORMATS: Known[Format] = Known("readers", _OWN, lambda name, module: import_module(module).FORMATS[name])

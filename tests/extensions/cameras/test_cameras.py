@@ -25,7 +25,7 @@ from sepi.extensions.cameras.files import rotation_of
 from sepi.extensions.cameras.posed_views import PosedViews
 from sepi.extensions.cameras.reader import read_model
 from sepi.extensions.cameras.rectification import Rectification, light_field_of
-from sepi.io.all_views import write_all_views
+from sepi.extensions.views.files import write_all_views
 from sepi.io.disparity_maps import read_pfm
 from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import origin_attributes

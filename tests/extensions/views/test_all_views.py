@@ -17,7 +17,7 @@ import sepi
 from bench.all_views import disagreement, moved_pixels
 from sepi.camera import Camera
 from sepi.extensions.views.all_views import AllViews, estimate_all_views
-from sepi.io.all_views import write_all_views
+from sepi.extensions.views.files import write_all_views
 from sepi.io.disparity_maps import read_pfm, write_pfm
 from sepi.io.hdf5 import read_attributes, write_light_field
 from sepi.io.provenance import result_attributes

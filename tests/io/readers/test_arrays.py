@@ -353,8 +353,8 @@ WRITERS = {
     "v73.mat": _mat_7_3,
     "old.h5": _hci_2013,
 }
-# an extension reads MATLAB's files
-NAMES = [name for name in WRITERS if not name.endswith(".mat") or "matlab" in FORMATS]
+# an extension reads MATLAB's files and those of the first HCI benchmark
+NAMES = [name for name in WRITERS if not (name.endswith(".mat") or name == "old.h5") or "matlab" in FORMATS]
 
 
 @pytest.fixture(scope="module")

@@ -36,8 +36,8 @@ WRITERS: dict[str, Callable[[Path, np.ndarray], object]] = {
     "old.h5": hci_2013,
     "own.h5": lambda path, views: write_light_field(path, LightField(views.astype(np.float32), "a")),
 }
-# an extension reads MATLAB's files
-NAMES = [name for name in WRITERS if not name.endswith(".mat") or "matlab" in FORMATS]
+# an extension reads MATLAB's files and those of the first HCI benchmark
+NAMES = [name for name in WRITERS if not (name.endswith(".mat") or name == "old.h5") or "matlab" in FORMATS]
 
 
 def compressible(*shape: int) -> np.ndarray:

@@ -1,8 +1,7 @@
-"""The commands ``sepi export`` and ``sepi scenes``, which write light fields; not the stage :mod:`sepi.export`."""
+"""The command ``sepi export``, which writes light fields; not the stage :mod:`sepi.export`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,8 +47,8 @@ def export(
       sepi export LF.mat lego --axes HWTSC --disparity-range -2 2
       sepi depth lego
     """
+    from sepi.extensions.formats.exported import require_room, write_exported
     from sepi.inspection.disparity_range import settle_range
-    from sepi.io.readers.exported import require_room, write_exported
 
     if output.resolve() == light_field_path.resolve():
         raise SepiError(f"{output}: is the light field itself; choose another name")
@@ -65,47 +64,3 @@ def export(
     click.echo(f"{light_field.name}: {size_text(light_field)}")
     click.echo(f"disparity range: {range_text(light_field.require_disparity_range())}")
     click.echo(f"written: {output}{'/' if output.is_dir() else ''}")
-
-
-@click.command(cls=SepiCommand)
-@click.argument("names", metavar="[NAME]...", nargs=-1)
-@click.option("-o", "--output", type=PATH, default=Path("scenes"), show_default=True, help="Folder to write to.")
-@click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Pixels a side of a view.")
-@click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Views a side of the grid.")
-@click.option("--list", "only_list", is_flag=True, help="List the scenes and write nothing.")
-def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_list: bool) -> None:
-    """Write scenes, with exact ground truth, as HCI 4D benchmark folders.
-
-    Without NAMEs, all scenes are written. Built-in scenes consist of planar shapes and take seconds.
-
-    \b
-    Examples:
-      sepi scenes --list
-      sepi scenes pyramids stripes -o scenes --size 256
-    """
-    from sepi.scenes import SCENES, render, write_hci
-    from sepi.validation import require_known
-
-    if only_list:
-        list_scenes(SCENES)
-        return
-    require_known("built-in scenes", names, SCENES)
-    chosen = dict.fromkeys(names or SCENES)
-    require_new(output, chosen)
-    for name in chosen:
-        write_hci(render(name, size=size, views=views), output / name)
-        click.echo(f"written: {output / name}/")
-
-
-def list_scenes(told: dict[str, str]) -> None:
-    """Print names and descriptions."""
-    width = max(map(len, told))
-    for name, description in told.items():
-        click.echo(f"{name.ljust(width)}  {description}")
-
-
-def require_new(output: Path, folders: Iterable[str]) -> None:
-    """Raise if one of the folders exists."""
-    for name in folders:
-        if (output / name).exists():
-            raise SepiError(f"{output / name}: exists already; remove it, or choose another folder with -o")

@@ -11,10 +11,10 @@ from error_lines import call, done, error_of, reading_error
 from geometries import jittered
 
 from sepi.camera import Camera
+from sepi.extensions.formats.exported import write_exported
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import write_png
 from sepi.io.provenance import digest_of
-from sepi.io.readers.exported import write_exported
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sepi.cli.input_options import Geometry, camera_flags, camera_of, view_of_result
+from sepi.cli.input_options import Geometry, Pair, camera_flags, camera_of
 from sepi.errors import SepiError
 from sepi.process.command import PATH, SepiCommand
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from sepi.io.result_folder import Result
     from sepi.lightfield import FloatMap
 
 # names of sepi.stage, written out because its import takes longer than the help
@@ -27,7 +32,14 @@ _MAPS = {
 # names by which other programs know depth, and a grey picture
 _CHANNELS = {"depth": "Z"}
 _GREY = "Y"
-_PFM = ".pfm"
+_EXR, _PFM = ".exr", ".pfm"
+
+_view_of_result = click.option(
+    "--view",
+    type=Pair("ROW,COLUMN"),
+    metavar="ROW,COLUMN",
+    help="View to use, after 'sepi depth --all-views'; default: that of the result.",
+)
 
 
 @click.command(cls=SepiCommand)
@@ -35,7 +47,7 @@ _PFM = ".pfm"
 @click.argument("output", metavar="FILE", type=PATH)
 @click.option("--map", "name", type=click.Choice(list(_MAPS)), help="Map to write; default in .exr: all maps.")
 @click.option("--to", "kind", type=click.Choice(["rgbd"]), help="Colour and depth side by side, for displays.")
-@view_of_result
+@_view_of_result
 @camera_flags
 def convert(result_path: Path, output: Path, name: str | None, kind: str | None, **seen: Any) -> None:
     """Write maps of RESULT as FILE, a picture of 32-bit floats: OpenEXR (.exr), TIFF (.tif, .tiff) or PFM (.pfm).
@@ -57,10 +69,9 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
       sepi convert cotton-depth corner.pfm --view 0,0
       sepi convert cotton-depth cotton.png --to rgbd
     """
-    from sepi.io.codecs import EXR, TIFF, write_exr, write_tiff
+    from sepi.io.codecs import TIFF, write_tiff
     from sepi.io.disparity_maps import write_pfm
     from sepi.io.images import write_png
-    from sepi.io.map_pictures import colour_and_depth
     from sepi.io.result_folder import read_result
 
     suffix = output.suffix.lower()
@@ -68,13 +79,13 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
         if suffix != ".png" or name is not None:
             raise SepiError(f"{output}: --to rgbd writes a PNG of view and disparity; expected NAME.png, and no --map")
         result = read_result(result_path, seen["view"])
-        write_png(output, colour_and_depth(result.picture, result.disparity, result.unknown))
+        write_png(output, _colour_and_depth(result))
         click.echo(f"written: {output} (the view, and its disparity: black is far, white near)")
         return
-    if suffix not in (*EXR, *TIFF, _PFM):
+    if suffix not in (_EXR, *TIFF, _PFM):
         raise SepiError(f"{output}: expected a name that ends with .exr, .tif, .tiff or .pfm, the format of the file")
     maps = _maps(result_path, **seen)
-    if name is None and suffix not in EXR:
+    if name is None and suffix != _EXR:
         name = "disparity"
     if name is not None and name not in maps:
         if name != "depth" and "sigma" not in maps:
@@ -82,14 +93,56 @@ def convert(result_path: Path, output: Path, name: str | None, kind: str | None,
         raise SepiError(f"{result_path}: no {name}, since the camera is unknown; give --focal-length and the others")
     comment = ", ".join(f"{key}: {_MAPS[key]}" for key in (maps if name is None else [name]))
     if name is None:
-        write_exr(output, {_CHANNELS.get(key, key): values for key, values in maps.items()}, comment)
-    elif suffix in EXR:
-        write_exr(output, {_GREY: maps[name]}, comment)
+        _write_exr(output, {_CHANNELS.get(key, key): values for key, values in maps.items()}, comment)
+    elif suffix == _EXR:
+        _write_exr(output, {_GREY: maps[name]}, comment)
     elif suffix == _PFM:
         write_pfm(output, maps[name])
     else:
         write_tiff(output, maps[name], comment)
     click.echo(f"written: {output} ({comment})")
+
+
+def _write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> None:
+    """Write maps as channels of an OpenEXR file, losslessly compressed; equal content gives equal bytes.
+
+    Parameters
+    ----------
+    path : Path
+    channels : mapping of str to ndarray, shape (H, W), float32
+        Name to map, all of one shape; NaN and infinity stay. Programs know the names ``Z`` (depth) and ``Y`` (grey).
+    comment : str
+        Meaning and unit of the numbers.
+
+    Raises
+    ------
+    SepiError
+        If the package OpenEXR is not installed, or the file cannot be written.
+    """
+    import numpy as np
+
+    from sepi.io.codecs import open_exr
+    from sepi.io.files import atomic_path, naming
+
+    with naming(path):
+        exr = open_exr()
+    header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage, "comments": comment}
+    pixels = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
+    with atomic_path(path) as temporary, exr.File(header, pixels) as file:
+        file.write(str(temporary))
+
+
+def _colour_and_depth(result: Result) -> npt.NDArray[np.uint8]:
+    """View and disparity side by side, RGB (H, 2 W, 3), as light field displays take it; far is black, near white."""
+    import numpy as np
+
+    from sepi.io.map_pictures import levels, spread
+    from sepi.lightfield import as_unit_float
+
+    disparity = result.disparity
+    colours = np.broadcast_to(levels(as_unit_float(result.picture)), (*disparity.shape, 3))
+    depth = levels(spread(disparity, ~result.unknown & np.isfinite(disparity)))
+    return np.hstack([colours, np.repeat(depth[:, :, None], 3, axis=2)])
 
 
 def _maps(path: Path, view: tuple[int, int] | None, geometry: Geometry | None) -> dict[str, FloatMap]:
@@ -123,7 +176,7 @@ def _maps(path: Path, view: tuple[int, int] | None, geometry: Geometry | None) -
 )
 @click.option("--step", type=click.IntRange(min=1), default=1, metavar="N", help="Use every Nth row and column only.")
 @click.option("--keep-unknown", is_flag=True, help="Keep unknown pixels, for whose depth no view has evidence.")
-@view_of_result
+@_view_of_result
 @camera_flags
 def points(
     result_path: Path,
