@@ -9,7 +9,7 @@ from typing import Any
 
 import h5py
 
-from bench import plain
+from bench import floor, plain
 from bench.busy import stages_beside_another_program
 from bench.measure import Case, Figures, Prepared, command
 from bench.scene import VARIANT, Scene, inputs, sweep_values
@@ -18,6 +18,7 @@ from sepi.inspection.view_order import check_order
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
+from sepi.matching.view_subsets import halves_and_quarters
 from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field as read_any
 from sepi.scoring.scores import score
@@ -47,7 +48,7 @@ COMPRESSIONS: dict[str, dict[str, Any]] = {
 
 
 def _stage_cases(scene: Scene) -> Iterator[Case]:
-    """The whole command, a job on a tiny scene, and each step from files to maps."""
+    """The whole command, a job on a tiny scene, the arithmetic floor, and each step from files to maps."""
     sweeps = [
         f"--set={name}.num_disparities={scene.num_disparities}" for name in ("initial.sepi", "occlusion.half_sepi")
     ]
@@ -65,6 +66,8 @@ def _stage_cases(scene: Scene) -> Iterator[Case]:
     yield Case("whole", "start of a job", command, job)
     yield Case("whole", "sepi --help", command, ("sepi", "--help"))
     yield Case("whole", "sepi info", command, ("sepi", "info", str(scene.source)))
+    for name in floor.KERNELS:
+        yield Case("floor", name, floor.prepare, (name, scene.threads))
     yield Case("stages", "read the views", read, (scene.source,))
     yield Case("stages", "check their order", inspect, (scene.path, check_order))
     # for scenes without a range
@@ -270,11 +273,20 @@ def _scores(light_field: LightField, maps: StageMaps) -> Figures:
 
 
 def _operations(light_field: LightField, choice: str, settings: Any, maps: StageMaps) -> Figures:
-    """Number of samples of a stage's sweep; empty for other stages."""
+    """Number of samples of a stage's sweep, and of multiply-adds of its windows; empty for other stages."""
+    H, W = light_field.shape
     if choice == "sepi":
-        pixels = maps.disparity.size
+        pixels, groups = H * W, 1
     elif choice == "half_sepi":
         pixels = int(maps.extra["occlusion_candidates"].sum())
+        numbers = halves_and_quarters(light_field).groups
+        # the reference view's own group is empty
+        groups = len(set(numbers.ravel().tolist()) - {int(numbers[light_field.reference_position])})
     else:
         return {}
-    return {"samples": float(pixels * (light_field.present.sum() - 1) * settings.num_disparities)}
+    window = (2 * settings.window_radius + 1) ** 2
+    return {
+        "samples": float(pixels * (light_field.present.sum() - 1) * settings.num_disparities),
+        "channels": float(light_field.views.shape[-1]),
+        floor.WINDOW_OPERATIONS: float(pixels * settings.num_disparities * groups * window),
+    }

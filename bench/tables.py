@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from tabulate import tabulate
 
+from bench import floor
 from bench.measure import Measurement, Result
 from sepi.variants import STAGES
 
@@ -62,10 +63,15 @@ def sections(result: Result) -> dict[str, list[Row]]:
 
 
 def steps(result: Result) -> list[Row]:
-    """The steps from files to maps: time, share, memory, scores."""
-    steps = result.group("stages").values()
-    total = sum(m.median for m in steps)
-    return [_row(m, {"share %": 100 * m.median / total, **_scores(m)}) for m in steps]
+    """The steps from files to maps: time, share, memory, ratio to the arithmetic floor, scores."""
+    steps, prices = result.group("stages"), result.group("floor")
+    total = sum(m.median for m in steps.values())
+    rows = []
+    for m in steps.values():
+        least = floor.seconds(prices, m.figures)
+        more = {"share %": 100 * m.median / total, "times its floor": None if least is None else m.median / least}
+        rows.append(_row(m, {**more, **_scores(m)}))
+    return rows
 
 
 def variants(result: Result) -> list[Row]:
