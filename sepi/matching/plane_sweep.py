@@ -175,7 +175,8 @@ def sweep(
     groups[light_field.reference_position] = -1  # the reference view agrees with itself at every candidate
     groups, chosen = _without_empty(groups, among.subsets)
     mask = np.ones((H, W), bool) if mask is None else mask
-    colours = planar(softened(light_field, parameters.softening))
+    compared = softened(light_field, parameters.softening)
+    colours = planar(compared)
     noise = reference_residual_variance(light_field)
     squared_scale = parameters.scale**2 + noise
     scale2 = np.float32(squared_scale * full_scale(colours.dtype) ** 2)
@@ -183,8 +184,9 @@ def sweep(
     views = ViewStack(colours, *light_field.reference_position, groups, chosen, scale2, shown)
     disparities = parameters.candidates(light_field)
     candidates = sampled_candidates(disparities, light_field.baselines)
-    to_correct = parameters.noise_to_correct(light_field)
-    expected = expected_costs(light_field, to_correct, candidates, groups, chosen, squared_scale, LANES)
+    # the blur has taken some of the noise
+    to_correct = parameters.noise_to_correct(compared)
+    expected = expected_costs(compared, to_correct, candidates, groups, chosen, squared_scale, LANES)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     # where texture repeats, a window of one of its colours would hold all aliases alike
     variance = variance_within_surface(light_field.reference_view, parameters.window_sigma**2 + noise, TEXTURE_SHARE)
