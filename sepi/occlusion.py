@@ -66,7 +66,9 @@ class HalfSepiParameters(OcclusionParameters):
 
     side_reach: int = Field(16, ge=1, le=50, description="distance within which the nearer surface is searched, pixels")
     side_margin: float = Field(0.1, ge=0, description="by how much the occluder must be nearer, pixels per view step")
-    gain_unconfirmed: float = Field(0.03, ge=0, le=2, description="further gain without a nearer surface on that side")
+    gain_unconfirmed: float = Field(
+        0.03, ge=0, le=2, description="further gain that is needed if no nearer surface is found on the hidden side"
+    )
 
     @property
     def groups(self) -> int:

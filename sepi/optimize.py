@@ -70,11 +70,21 @@ THRESHOLDS = 0.01, 0.05
 class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     """Parameters of Gauss-Newton refinement and second-order smoothing."""
 
-    least_noise: float = Field(0.02, ge=0, le=1, description="noise from which this stage uses denoised views, 0..1")
+    least_noise: float = Field(
+        0.02,
+        ge=0,
+        le=1,
+        description="least noise at which this stage works on denoised views; standard deviation of one channel, "
+        "colours in 0..1. Below it, denoising would lose faint detail that many views show",
+    )
     views: int | None = Field(None, ge=2, description="least number of views for the last step; null: all")
-    first_views: int | None = Field(25, ge=2, description="least number of views for earlier steps; all if noisy")
+    first_views: int | None = Field(
+        25, ge=2, description="least number of views for all steps but the last; null, or if they are noisy: all"
+    )
     refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
-    noisy_refinements: int = Field(6, ge=0, le=20, description="the same for noisy views, whose matches are worse")
+    noisy_refinements: int = Field(
+        6, ge=0, le=20, description="the same for noisy views, where matching ends farther from the true depth"
+    )
     refinement_radius: int = Field(4, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
     one_surface: bool = Field(True, description="whether a window leaves out other surfaces, by depth and colour")
     solves: int = Field(4, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
@@ -84,8 +94,14 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     second_difference_threshold: float = Field(
         0.03, gt=0, description="second difference that marks a discontinuity in the first round, pixels per view step"
     )
-    roughness_factor: float = Field(40.0, ge=0, description="the same later, as a multiple of the map's upper quartile")
-    smooth_colour: float = Field(0.1, gt=0, description="RGB distance at which weights fall, 0..1; noise adds to it")
+    roughness_factor: float = Field(
+        40.0, ge=0, description="the same in later rounds, as a multiple of the second differences' upper quartile"
+    )
+    smooth_colour: float = Field(
+        0.1,
+        gt=0,
+        description="RGB distance at which smoothness and windows' weights fall, colours in 0..1; noise adds to it",
+    )
     reliable_confidence: float = Field(
         0.5, gt=0, le=1, description="confidence within two pixels from which a discontinuity in the data is trusted"
     )

@@ -63,7 +63,12 @@ class LtiParameters(CannyParameters):
 
     superpixel_size: int = Field(15, ge=4, le=100, description="superpixel width up to 512x512 pixels, in pixels")
     superpixel_size_large: int = Field(17, ge=4, le=100, description="superpixel width above 512x512 pixels, in pixels")
-    min_support: float = Field(0.25, ge=0, le=1, description="share of texture and agreement that keeps a depth")
+    min_support: float = Field(
+        0.25,
+        ge=0,
+        le=1,
+        description="share of texture points and agreeing slopes from which a superpixel keeps its depth",
+    )
     continuity: float = Field(0.3, ge=0, description="tau_out, weight of continuity between neighbours")
     tolerance: float = Field(0.05, gt=0, description="residual of an inlier, pixels per view step")
     keep_confidence: float = Field(0.7, ge=0, le=1, description="relative confidence from which pixels resist a plane")

@@ -56,7 +56,9 @@ reference view, and of the mean of many."""
 class DenoisingParameters(Parameters):
     """Parameters of the denoising."""
 
-    denoising: float = Field(1.5, ge=0, le=10, description="multiple of the noise up to which detail is left out")
+    denoising: float = Field(
+        1.5, ge=0, le=10, description="detail of noisy views below this multiple of its noise is left out; 0 keeps all"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

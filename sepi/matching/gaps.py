@@ -32,8 +32,12 @@ class GapParameters(OcclusionMarginParameters):
     """Parameters of what is seen through gaps."""
 
     gaps: bool = Field(True, description="whether surfaces seen through gaps get a depth of their own")
-    gap_step: float = Field(0.6, gt=0, description="least depth step in a gap, pixels per view step")
-    gap_reach: int = Field(32, ge=1, le=200, description="reach of the search for its colour behind it, in pixels")
+    gap_step: float = Field(
+        0.6, gt=0, description="least depth step from the gap's border to the surface behind, pixels per view step"
+    )
+    gap_reach: int = Field(
+        32, ge=1, le=200, description="distance within which a farther surface of the same colour is searched, pixels"
+    )
     gap_colour: float = Field(0.06, gt=0, le=2, description="largest RGB distance of the same colour, colours in 0..1")
     gap_gain: float = Field(0.5, gt=0, lt=1, description="share of squared residual that the farther depth may leave")
 

@@ -66,7 +66,11 @@ class SweepParameters(CandidateParameters):
     window_sigma: float = Field(
         0.02, ge=1e-6, le=10, description="RGB distance at which a window pixel's weight falls, colours in 0..1"
     )
-    correct_noise: bool = Field(True, description="whether costs and confidence leave out what noise alone makes")
+    correct_noise: bool = Field(
+        True,
+        description="whether costs are corrected for the effect of interpolation on noise, and confidence for most of "
+        "the cost of noise",
+    )
     softening: Softening = 0.7
 
     @property

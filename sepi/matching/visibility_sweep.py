@@ -73,7 +73,9 @@ BYTES_PER_PIXEL = 2 + 4
 """Per pixel of a view: the detail, and the z-buffer."""
 
 
-FirstViews = Annotated[int, Field(ge=2, description="least number of views for earlier maps; of a row, 25 or all")]
+FirstViews = Annotated[
+    int, Field(ge=2, description="least number of views for all maps but the last; of a single row, 25 or all")
+]
 
 
 class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, SmoothingParameters):
@@ -102,8 +104,19 @@ class VisibleViewsParameters(VisibilitySweepParameters, GapParameters):
     views: int = Field(41, ge=2, description="least number of views for the last map")
     sampling: float = Field(1.0, ge=1, le=8, description="distance of its candidates, steps of num_disparities")
     passes: int = Field(3, ge=1, le=10, description="number of times that visibility and depth are computed in turn")
-    mean_noise: float = Field(0.02, ge=0, le=1, description="noise from which views are compared with their mean, 0..1")
-    searched_views: int = Field(13, ge=2, description="least number of views that compare all candidates; all if noisy")
+    mean_noise: float = Field(
+        0.02,
+        ge=0,
+        le=1,
+        description="least noise at which views are compared with the mean of the views instead of the reference "
+        "view; standard deviation of one channel, colours in 0..1",
+    )
+    searched_views: int = Field(
+        13,
+        ge=2,
+        description="least number of views that compare all candidates; the others compare those near the earlier "
+        "map. All views if they are noisy",
+    )
     occluded_view_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is occluded")
 
     @property
