@@ -63,7 +63,9 @@ class UniformPlanesParameters(OcclusionMarginParameters, SofteningParameters, Bo
     )
     views: int | None = Field(25, ge=2, description="least number of views to average; if noisy at least 25; null: all")
     window_radius: int = Field(4, ge=1, le=20, description="gradients are averaged over 2 r + 1 pixels")
-    noise_factor: float = Field(4.0, gt=0, description="largest squared gradient of uniform regions, in units of noise")
+    noise_factor: float = Field(
+        4.0, gt=0, description="squared gradient below which a region is uniform, as a multiple of what noise explains"
+    )
     growth: int = Field(8, ge=0, le=50, description="how far regions grow over their colour, in pixels")
     colour_tolerance: float = Field(0.0102, ge=0, le=1, description="RGB distance that counts as one colour, 0..1")
     grow_confidence: float = Field(0.75, ge=0, le=1, description="confidence from which a region does not take a pixel")

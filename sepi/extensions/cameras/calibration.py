@@ -241,8 +241,9 @@ def _placed(pycolmap: Any, folder: Path, database: Path, camera: Any, count: int
         if best is not None and best.num_reg_images() >= _ENOUGH * count:
             return best
     if best is None:
-        expected = "expected a sweep sideways, not forward, past a scene with texture"
-        raise SepiError(f"{folder}: no two pictures tell the positions of their cameras; {expected}")
+        why = "the camera moved too little or along its viewing direction, or the pictures share too little"
+        told = f"no two pictures tell the positions of their cameras: {why}"
+        raise SepiError(f"{folder}: {told}; expected a sweep sideways past a scene with texture")
     return best
 
 

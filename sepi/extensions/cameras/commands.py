@@ -21,7 +21,11 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-cameras for a FOLDER called NAME.")
 @click.option("--lens", default="SIMPLE_RADIAL", show_default=True, help="COLMAP's lens model: RADIAL, OPENCV, ...")
 @click.option(
-    "--cameras", type=click.Choice(["one", "each"]), default="one", help="One camera, or one for each picture."
+    "--cameras",
+    type=click.Choice(["one", "each"]),
+    default="one",
+    show_default=True,
+    help="Whether one camera took all pictures, or each has its own.",
 )
 @click.option("--force", is_flag=True, help="Go on even if a check of a few pictures fails.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
@@ -63,10 +67,17 @@ def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force:
 @click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=PATH)
 @click.argument("result_path", metavar="RESULT", type=PATH)
-@click.option("--to", "kind", type=click.Choice(["colmap", "nerfstudio"]), default="colmap", show_default=True)
+@click.option(
+    "--to",
+    "kind",
+    type=click.Choice(["colmap", "nerfstudio"]),
+    default="colmap",
+    show_default=True,
+    help="Program to write for.",
+)
 @click.option("-o", "--output", type=PATH, help="Folder to make; default: NAME-colmap for an INPUT called NAME.")
-@click.option("--min-confidence", type=float, metavar="X", help="Least confidence of points; default: the median.")
-@click.option("--points", type=click.IntRange(min=0), default=10000, show_default=True, help="Most points.")
+@click.option("--min-confidence", type=float, help="Least confidence of points; default: the median of all pixels.")
+@click.option("--points", type=click.IntRange(min=0), default=10000, show_default=True, help="At most so many points.")
 @camera_flags
 @reading_flags
 def poses(
@@ -115,7 +126,10 @@ def poses(
     with progress_bar(light_field.name) as progress:
         {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](folder, posed, progress)
     if not posed.metric:
-        click.echo("the camera is unknown: pixels fit a nominal one, but lengths are neither in metres nor to scale")
+        click.echo(
+            "the camera is unknown: a nominal one sees the scene at a distance of 1 to 2; pixels fit exactly, but "
+            "positions and depth are neither in metres nor to scale"
+        )
     units = posed.units.partition(",")[0]
     click.echo(f"written: {folder}/ ({len(posed.positions)} views, {posed.chosen.sum()} points, {units})")
 

@@ -256,8 +256,9 @@ def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
     low, high = np.ceil(border.min(axis=0) - _OUTSIDE), np.floor(border.max(axis=0) + _OUTSIDE)
     larger = float((high - low).max()) / max(reference.lens.width, reference.lens.height)
     if not larger <= _MOST_LARGER:
-        told = f"would be {larger:.3g} times as large once rectified; expected a lens that fits its size"
-        raise SepiError(f"{seeing.model.path}: {reference.name}: {told}")
+        large = f"{larger:.3g} times as large" if np.isfinite(larger) else "without bounds"
+        expected = "expected focal lengths and distortion that fit its size, and are much the same for all cameras"
+        raise SepiError(f"{seeing.model.path}: {reference.name}: would be {large} once rectified; {expected}")
     stride = max(1.0, float((high - low).max()) / _LATTICE)
     counts = np.maximum(2, np.ceil((high - low) / stride).astype(int) + 1)
     across, down = (np.round(np.linspace(low[n], high[n], counts[n])) for n in (0, 1))
@@ -271,7 +272,8 @@ def frame_of(seeing: Seeing) -> tuple[Frame, list[int]]:
         share = min(height / reference.lens.height, width / reference.lens.width)
         if len(kept) > 1 and share >= _LEAST_PART and min(height, width) >= MIN_SIZE:
             return Frame((seeing.principal[0] - box[2], seeing.principal[1] - box[0]), (height, width)), kept
-    raise SepiError(f"{seeing.model.path}: the cameras share hardly anything of {reference.name}; expected one scene")
+    hardly = f"the cameras share hardly anything of the picture of {reference.name}"
+    raise SepiError(f"{seeing.model.path}: {hardly}; they look in too different directions, or stand too far apart")
 
 
 def _lattice(across: npt.NDArray[Any], down: npt.NDArray[Any]) -> Floats:

@@ -27,8 +27,18 @@ from sepi.workflow.rendered_scenes import NOISE_LEVELS, WITHOUT_NOISE, RenderedS
 _FLAGS = (
     click.Option(["--rendered"], is_flag=True, help="Path-traced scenes (Mitsuba 3, extra [render]); minutes each."),
     click.Option(["--samples"], type=click.IntRange(min=1), help="With --rendered: paths for each pixel; default: 64."),
-    click.Option(["--noise", "levels"], type=click.Choice(NOISE_LEVELS), multiple=True, help="With --rendered."),
-    click.Option(["--set", "settings"], multiple=True, metavar="KEY=VALUE", help="With --rendered: lens=0.5, ..."),
+    click.Option(
+        ["--noise", "levels"],
+        type=click.Choice(NOISE_LEVELS),
+        multiple=True,
+        help="With --rendered: noise of the sensor; repeatable, a folder for each; default: off.",
+    ),
+    click.Option(
+        ["--set", "settings"],
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="With --rendered: lens=0.5, vignetting=0.4, ...; repeatable. docs/reproduce/rendered.md lists them.",
+    ),
     click.Option(["--all-views"], is_flag=True, help="With --rendered: also write a disparity map for each view."),
 )
 

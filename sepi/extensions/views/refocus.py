@@ -131,7 +131,11 @@ _STEPS = 9
 @click.argument("light_field_path", metavar="INPUT", type=PATH)
 @click.argument("result_path", metavar="[RESULT]", type=PATH, required=False)
 @click.option("-o", "--output", type=PATH, help="Folder to write; default: NAME-refocused for an INPUT called NAME.")
-@click.option("--steps", type=click.IntRange(1, 999), help=f"Pictures; default: {_STEPS} without --disparity and --at.")
+@click.option(
+    "--steps",
+    type=click.IntRange(1, 999),
+    help=f"Pictures from the nearest to the farthest surface; default: {_STEPS} without --disparity and --at.",
+)
 @click.option("--disparity", "disparities", type=float, multiple=True, help="Focus at this disparity; repeatable.")
 @click.option(
     "--at", "pixels", type=click.IntRange(min=0), nargs=2, multiple=True, metavar="X Y", help="Pixel to focus on."
@@ -235,7 +239,8 @@ def _read_result(
     view = reading.options.view
     disparity = read_disparity_at(path, view)
     if disparity.shape != light_field.shape:
-        raise SepiError(f"{path}: is {disparity.shape}, but the views of {light_field_path} are {light_field.shape}")
+        views = f"the views of {light_field_path} are {light_field.shape} (height, width)"
+        raise SepiError(f"{path}: is {disparity.shape}, but {views}")
     if read_origin_at(path, view) is None:
         return disparity, disparity, None
     result = read_result(path, view)

@@ -25,7 +25,6 @@ from sepi.extensions.cameras.files import rotation_of
 from sepi.extensions.cameras.posed_views import PosedViews
 from sepi.extensions.cameras.reader import read_model
 from sepi.extensions.cameras.rectification import Rectification, light_field_of
-from sepi.extensions.views.files import write_all_views
 from sepi.io.disparity_maps import read_pfm
 from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import origin_attributes
@@ -176,8 +175,10 @@ def test_dots_are_where_they_should_be_in_every_rectified_view(tmp_path: Path) -
     assert max(errors) < 0.02
 
 
+@pytest.mark.extension("views")
 def test_depth_command_reads_a_table_and_its_light_field_is_kept(folder: Path, tmp_path: Path) -> None:
     """The rig survives a file, and the points that are written stand in the world."""
+    from sepi.extensions.views.files import write_all_views
     from sepi.io.hdf5 import write_light_field
 
     light_field = sepi.read_cameras(folder, disparity_range=(-2, 2))

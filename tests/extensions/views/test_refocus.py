@@ -207,7 +207,7 @@ def test_what_no_view_knows_is_not_focused_on(scene: LightField) -> None:
     ("words", "message"),
     [
         (("absent",), "absent: no such file or folder"),
-        (("lf.h5", "small.pfm"), "small.pfm: is (5, 5), but the views of lf.h5 are (64, 64)"),
+        (("lf.h5", "small.pfm"), "small.pfm: is (5, 5), but the views of lf.h5 are (64, 64) (height, width)"),
         (("lf.h5", "empty.pfm"), "empty.pfm: the map has no pixel"),
         (("lf.h5", "--at", "3", "4"), "--at: needs RESULT"),
         (("lf.h5", "maps", "--at", "64", "4"), "--at 64 4: outside the picture; X goes from 0 to 63, Y from 0 to 63"),
