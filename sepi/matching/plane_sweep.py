@@ -188,7 +188,7 @@ def sweep(
     views = ViewStack(colours, *light_field.reference_position, groups, chosen, scale2, shown)
     disparities = parameters.candidates(light_field)
     candidates = sampled_candidates(disparities, light_field.baselines)
-    # the blur has taken some of the noise
+    # noise of views that a blur has changed in part is seldom sure, and then nothing is corrected
     to_correct = parameters.noise_to_correct(compared)
     expected = expected_costs(compared, to_correct, candidates, groups, chosen, squared_scale, LANES)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))

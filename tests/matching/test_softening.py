@@ -53,8 +53,8 @@ def test_sharp_texture_is_drawn_to_no_whole_pixel(disparity: float, variant: str
     assert np.mean(((maps.low <= disparity) & (disparity <= maps.high))[PATCH]) > 0.9
 
 
-def test_costs_are_corrected_for_what_the_blur_leaves_of_noise() -> None:
-    """Corrected for more, positions between pixels cost too much, and most of a wall came out at whole pixels."""
+def test_softened_views_are_not_corrected_for_noise_that_the_blur_took() -> None:
+    """Corrected for all of it, positions between pixels cost too much: most of a wall was at whole pixels."""
     maps = estimate_depth(shown(np.float32(brick() / 255), 3, 0.1), "paper")
     assert np.mean(np.abs(maps.disparity - 0.1)[PATCH] > 0.07) < 0.2
 

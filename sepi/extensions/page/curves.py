@@ -148,7 +148,8 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     weights = np.exp(-0.5 * (difference**2).sum(axis=2) / (parameters.window_sigma**2 + noise))
     weights = (weights / weights.sum()).astype(np.float32)
     scale2 = np.float32(parameters.scale**2 + noise)
-    compared = softened(light_field, parameters.softening).rgb_views
+    soft = softened(light_field, parameters.softening)
+    compared = soft.rgb_views
     reference_view = as_unit_float(compared[t0, s0][np.ix_(rows, columns)])
     views, baselines = halves_and_quarters(light_field), light_field.baselines
     sums, counts = np.zeros((2, views.subsets.shape[1], len(disparities)), np.float32)
@@ -169,7 +170,7 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     total, number = views.subsets.astype(np.float32) @ sums, views.subsets.astype(np.float32) @ counts
     costs = np.divide(total, number, out=np.ones_like(total), where=number > 0)
     sampled = sampled_candidates(disparities, baselines)
-    to_correct = parameters.noise_to_correct(light_field)
-    expected = expected_costs(light_field, to_correct, sampled, views.groups, views.subsets, float(scale2), 1)
+    to_correct = parameters.noise_to_correct(soft)
+    expected = expected_costs(soft, to_correct, sampled, views.groups, views.subsets, float(scale2), 1)
     costs = 1 - (1 - costs) / (1 - np.tensordot(expected.weights[:, y, x], expected.moments, 1))
     return Curves(disparities, views.names, costs)
