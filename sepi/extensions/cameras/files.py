@@ -148,7 +148,8 @@ def rotation_of(told: Any) -> Floats:
     if values.shape == (3, 3) and np.abs(values @ values.T - np.eye(3)).max() < _NEARLY and np.linalg.det(values) > 0:
         left, _, right = np.linalg.svd(values)
         return np.asarray(left @ right, np.float64)
-    raise SepiError("rotation: expected a quaternion w x y z of length 1, or a 3x3 rotation matrix (no reflection)")
+    expected = "a quaternion w x y z of length 1, or a 3x3 rotation matrix (no reflection)"
+    raise SepiError(f"rotation: expected {expected}, from the world's axes to the camera's")
 
 
 def read_transforms(path: Path, pictures: Pictures) -> CameraModel:

@@ -374,5 +374,6 @@ def _masked(seeing: Seeing, view: int) -> npt.NDArray[np.uint8]:
         return np.zeros((lens.height, lens.width), np.uint8)
     mask = read_picture(path)
     if mask.shape[:2] != (lens.height, lens.width):
-        raise SepiError(f"{path}: {mask.shape[1]}x{mask.shape[0]} pixels; its picture has {lens.width}x{lens.height}")
+        expected = f"expected a mask as large as its picture, {lens.width}x{lens.height}"
+        raise SepiError(f"{path}: {mask.shape[1]}x{mask.shape[0]} pixels; {expected}")
     return np.asarray(mask.reshape(lens.height, lens.width, -1)[..., 0] == 0, np.uint8)

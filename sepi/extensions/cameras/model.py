@@ -120,7 +120,8 @@ class CameraModel:
         one, other = divmod(int(turned.argmax()), len(turned))
         require_alike(self.path, names[one], names[other], turned[one, other])
         if len(self.points) and np.mean((self.points - centres.mean(axis=0)) @ axes.mean(axis=0) > 0) < _BEFORE:
-            raise SepiError(f"{self.path}: the scene's points lie behind the cameras; expected axes as of OpenCV")
+            expected = "expected cameras that look along z, with y down (OpenCV), not against it with y up (OpenGL)"
+            raise SepiError(f"{self.path}: the scene's points lie behind the cameras; {expected}")
 
 
 def require_alike(where: Path, one: str, other: str, angle: float) -> None:
@@ -231,7 +232,8 @@ class Pictures:
         low, high = sorted(np.mean(self._middles or [[1.0, 1.0]], axis=0))
         if 0 < low <= high < _ALIKE * low and not 1 / _OTHER < low < _OTHER:
             told = f"the principal points are those of pictures about {low:.2g} times as large"
-            raise SepiError(f"{self._model}: {told}; expected w and h of these, or --crop-of")
+            expected = "expected w and h, the size of the calibrated pictures, or --crop-of if these are crops of them"
+            raise SepiError(f"{self._model}: {told}; {expected}")
         return (f"{self._scaled}; if the pictures are crops, give --crop-of",) if self._scaled else ()
 
 

@@ -175,13 +175,15 @@ def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], findin
         with pycolmap.Database.open(str(database)) as file:
             steps = _steps(file, size)
     if not steps:
-        raise SepiError(f"{folder}: no two of {_listed(names)} match; expected one static scene from near places")
+        expected = "expected one static scene, each picture from a position a little beside the last"
+        raise SepiError(f"{folder}: no two of {_listed(names)} match; {expected}")
     pairs = [names for names, *_ in steps]
     parallax, ahead, turned = np.array([measured for _, *measured in steps]).T
     widest, farthest = int(parallax.argmax()), int(turned.argmax())
     if parallax[widest] < _NARROW * unit:
-        told = f"the camera turned but hardly moved from {' to '.join(pairs[widest])}: parallax {parallax[widest]:.1f}"
-        raise SepiError(f"{folder}: {told}; expected at least {4 * _NARROW * unit:.0f} between near and far points")
+        told = f"from {' to '.join(pairs[widest])} the parallax is {parallax[widest]:.1f} pixels"
+        why = "the camera turned but hardly moved, or the scene is flat; expected a camera that moves sideways, with"
+        raise SepiError(f"{folder}: {told}: {why} at least {4 * _NARROW * unit:.0f} pixels between near and far points")
     require_alike(folder, *pairs[farthest], turned[farthest])
     firm = ahead[(parallax >= _FIRM * unit) & ~np.isnan(ahead)]
     if len(firm):

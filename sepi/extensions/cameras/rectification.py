@@ -72,8 +72,9 @@ class Rectification:
             elif errors[worst] > _TOO_MUCH:
                 name, ahead = model.shots[worst].name, plane.places[worst, 2] / plane.step
                 if len(model.shots) <= _FEWEST:
-                    told = f"{name} errs by {errors[worst]:.2g} pixels; expected at most {_TOO_MUCH:g}"
-                    raise SepiError(f"{model.path}: the cameras do not stand in a plane: {told}")
+                    far = f"{name} is so far off that the disparity error is {errors[worst]:.2g} pixels"
+                    told = f"the cameras do not stand in a plane: {far}; expected at most {_TOO_MUCH:g}"
+                    raise SepiError(f"{model.path}: {told}")
                 where = f"{abs(ahead):.2g} steps {'before' if ahead > 0 else 'behind'} the others"
                 notes.append(f"left out, since it stands {where}: {name} (disparity error {errors[worst]:.2g} pixels)")
                 model = model.of([n for n in range(len(model.shots)) if n != worst])
@@ -102,8 +103,9 @@ def _of_points(model: CameraModel, plane: Plane) -> tuple[float, float] | None:
     low, high = (float(value) for value in np.quantile(1 / depth, (_BEYOND, 1 - _BEYOND)))
     moved = (high - low) * float(np.abs(plane.baselines).max()) * plane.step * max(shot.lens.focal)
     if len(depth) > 1 and moved < _NOTHING:
-        told = f"the scene's points move by {moved:.2g} pixels at most; expected a longer baseline in their unit"
-        raise SepiError(f"{model.path}: the cameras stand too close together: {told}")
+        close = f"too close together for the scene: its points move by {moved:.2g} pixels at most"
+        expected = "expected a longer baseline (are positions and points in the same unit?)"
+        raise SepiError(f"{model.path}: the cameras stand {close}; {expected}")
     return low, high
 
 

@@ -292,7 +292,7 @@ def test_masks_of_pictures_leave_out_what_they_have_black(tmp_path: Path) -> Non
     found = own_scene("rig", path, (), "config.light_fields.rig")
     assert tmp_path / "rig/masks/1.png" in found.files
     cv2.imwrite(str(tmp_path / "rig/masks/1.png"), mask[:40])
-    with pytest.raises(SepiError, match=r"1\.png: 64x40 pixels; its picture has 64x64"):
+    with pytest.raises(SepiError, match=r"1\.png: 64x40 pixels; expected a mask as large as its picture, 64x64"):
         light_field_of(Rectification(read_model(path), inverse_depths=(0.7, 1.4)))
 
 
