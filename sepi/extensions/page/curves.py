@@ -15,9 +15,10 @@ from scipy.ndimage import map_coordinates
 
 from sepi.errors import SepiError
 from sepi.image.noise import residual_variance
+from sepi.image.texture import variance_within_surface
 from sepi.lightfield import FloatMap, LightField, as_unit_float, full_scale
 from sepi.matching.expected_costs import expected_costs
-from sepi.matching.plane_sweep import SweepParameters
+from sepi.matching.plane_sweep import TEXTURE_SHARE, SweepParameters
 from sepi.matching.softening import softened
 from sepi.matching.sweep_arrays import sampled_candidates
 from sepi.matching.view_subsets import halves_and_quarters
@@ -145,7 +146,8 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     columns = np.arange(max(0, x - r), min(W, x + r + 1))
     reference_view = as_unit_float(light_field.rgb_views[t0, s0][np.ix_(rows, columns)])
     difference = reference_view - reference_view[y - rows[0], x - columns[0]]
-    weights = np.exp(-0.5 * (difference**2).sum(axis=2) / (parameters.window_sigma**2 + noise))
+    variance = variance_within_surface(light_field.reference_view, parameters.window_sigma**2 + noise, TEXTURE_SHARE)
+    weights = np.exp(-0.5 * (difference**2).sum(axis=2) / variance[y, x])
     weights = (weights / weights.sum()).astype(np.float32)
     scale2 = np.float32(parameters.scale**2 + noise)
     soft = softened(light_field, parameters.softening)

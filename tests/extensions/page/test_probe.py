@@ -13,6 +13,7 @@ from sepi.extensions.page.pixels import APART, BORDER, InterestingPixel, interes
 from sepi.extensions.page.probe import GREY, HALF_WIDTH, Probe, SepiPicture, to_json
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
+from sepi.matching.softening import softened
 from sepi.matching.view_subsets import halves_and_quarters
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
@@ -220,3 +221,18 @@ def test_curves_are_corrected_for_noise_like_the_sweep():
     assert parameters.noise_to_correct(light_field) is not None
     cost = sweep(light_field, parameters).cost[0, 20, 31]
     assert cost_curves(light_field, 20, 31, parameters).costs[0].min() == pytest.approx(cost, abs=2e-5)
+
+
+def test_curves_are_corrected_for_noise_as_softened_views_have_it():
+    """The blur takes the noise of sharp texture, which leaves hardly anything to correct."""
+    picture = np.full((128, 128, 3), 120, np.uint8)
+    picture[16:56, 16:56] += 60 * np.random.default_rng(2).integers(0, 2, (40, 40, 3), np.uint8)
+    known = DisparityRange(-1, 1, "given")
+    light_field = with_noise(LightField(np.tile(picture, (5, 5, 1, 1, 1)), "sharp", disparity_range=known), 3)
+    parameters = SweepParameters(num_disparities=41)
+    assert softened(light_field, parameters.softening) is not light_field
+    assert parameters.noise_to_correct(light_field) is not None
+    # in the middle of the texture, and beside it
+    for y, x in ((36, 36), (84, 84)):
+        cost = sweep(light_field, parameters).cost[0, y, x]
+        assert cost_curves(light_field, y, x, parameters).costs[0].min() == pytest.approx(cost, abs=2e-5)
