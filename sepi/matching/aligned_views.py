@@ -90,13 +90,14 @@ class AlignedViews:
                 self._seen = disparity, self._seen_views(disparity, bands[0])
             add(self._splines, self._seen[1], bands[0])
             return
-        forget_splines(field)
         for band in bands:
+            if band.rows != (0, field.shape[0]):
+                # those of all rows, which another band may need, are kept
+                forget_splines(field)
             views = spline_views(field, self._parameters, band.rows, self.present)
             add(views, self._seen_views(disparity, band), band)
             # before the next ones are made
             del views
-        # a band may need all rows
         forget_splines(field)
 
     def _seen_views(self, disparity: FloatMap, band: Band) -> SeenViews:
