@@ -136,11 +136,21 @@ _STEPS = 9
     type=click.IntRange(1, 999),
     help=f"Pictures from the nearest to the farthest surface; default: {_STEPS} without --disparity and --at.",
 )
-@click.option("--disparity", "disparities", type=float, multiple=True, help="Focus at this disparity; repeatable.")
+@click.option(
+    "--disparity",
+    "disparities",
+    type=float,
+    multiple=True,
+    help="Focus at this disparity, pixels per view step; repeatable.",
+)
 @click.option(
     "--at", "pixels", type=click.IntRange(min=0), nargs=2, multiple=True, metavar="X Y", help="Pixel to focus on."
 )
-@click.option("--aperture", type=float, help="Radius in view steps; smaller: more in focus. Default: all views.")
+@click.option(
+    "--aperture",
+    type=float,
+    help="Radius of the aperture in view steps; a smaller one has more in focus. Default: all views.",
+)
 @click.option("--animation", is_flag=True, help="Also write the stack as an animation, focus.webp.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; default: one per core.")
 @camera_flags
