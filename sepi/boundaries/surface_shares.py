@@ -37,6 +37,9 @@ _ACROSS = 64
 _MOST_DIFFERENCE = 0.1
 """Of one channel in a view's residual, colours in 0..1."""
 
+_ENOUGH = 25
+"""Least number of views for a background that the reference view shows, too."""
+
 BYTES_PER_PIXEL, MOST_BYTES = 4, 2**26
 """Of a pixel of a view: the z-buffer; and of a band, which fits where the sweep's costs were."""
 
@@ -100,7 +103,7 @@ def share_costs(
     farthest = float(np.abs(disparity).max())
     height, width = light_field.shape
     layer, wanted = _more_distant_layer(disparity, rim, margin, moved)
-    shown = (layer == disparity) & ~rim.inside
+    shown, few = (layer == disparity) & ~rim.inside, spread_views(light_field, _ENOUGH)[present]
     background = np.zeros((height, width, 4), np.float32)
     # kernels take rows whose numbers lie side by side
     colours = np.ascontiguousarray(light_field.views)
@@ -108,7 +111,7 @@ def share_costs(
     for begin, end, rows in row_bands(light_field, present, farthest, BYTES_PER_PIXEL, rows_moved, MOST_BYTES):
         views = RimViews(*lines, units, SeenViews.of(light_field, around.nearest, present, rows, margin))
         first, last = max(0, begin - rows_moved), min(height, end + rows_moved)
-        background_kernels.background_of(views, layer, wanted, shown, first, last, background)
+        background_kernels.background_of(views, layer, wanted, shown, few, first, last, background)
         of_band = slice(*np.searchsorted(pixels, (begin * width, end * width)))
         kernels.costs_of_shares(
             views, rim, background, sides, *scales2, pixels[of_band], found.costs[of_band], found.told[of_band]

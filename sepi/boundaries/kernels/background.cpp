@@ -4,7 +4,6 @@
 namespace sepi::background {
 
 constexpr Index FEWEST_VIEWS = 3;  // least number of views for the colour of a background
-constexpr Index ENOUGH = 27;       // number of views for a background that the reference view shows, too
 constexpr float UNSEEN = -1;       // variance of a background that fewer views see; negative
 
 constexpr double MOST_DEVIATION2 = 0.01;  // largest squared residual of one view in the background's variance
@@ -36,11 +35,10 @@ float median(const float *values, Index n) {
 }
 
 // Rows begin..end of the farther surfaces, of disparity layer (H, W), where wanted (H, W), also behind nearer ones:
-// medians over the views that see them, or over ENOUGH of them where the reference view shows them, too (H, W).
-// Into background (H, W, 4): colours, and variance of the views' colours, mean of the channels, or UNSEEN.
-void background_of(const RimViews &views, Array<const float, 2> layer, Array<const bool, 2> wanted, Array<const bool, 2> shown, Index begin, Index end, Array<float, 3> background) {
+// medians over the views that see them, or over few_views (V,) of these where they are shown (H, W) by the reference view,
+// too. Into background (H, W, 4): colours, and variance of the views' colours, mean of the channels, or UNSEEN.
+void background_of(const RimViews &views, Array<const float, 2> layer, Array<const bool, 2> wanted, Array<const bool, 2> shown, Array<const bool, 1> few_views, Index begin, Index end, Array<float, 3> background) {
     const Index W = layer.shape[1];
-    const Index step = std::max<Index>(1, views.number() / ENOUGH);
     const ViewSamples samples_of{views};
     parallel_for(begin, end, [&](Index y) {
         std::vector<Index> columns;
@@ -55,7 +53,7 @@ void background_of(const RimViews &views, Array<const float, 2> layer, Array<con
         // view by view, since neighbouring pixels are close in memory
         for (Index view = 0; view < views.number(); ++view) {
             for (Index i = 0; i < few; ++i) {
-                if (view % step && shown(y, columns[i])) continue;
+                if (!few_views(view) && shown(y, columns[i])) continue;
                 const auto place = samples_of.place_seen(view, layer(y, columns[i]), y, columns[i]);
                 if (!place) continue;
                 const auto colour = samples_of.sample(view, *place);
@@ -82,7 +80,6 @@ void background_of(const RimViews &views, Array<const float, 2> layer, Array<con
 
 const Submodule submodule("background", {
     {"background_of", &background_of},
-    {"ENOUGH", ENOUGH},
     {"FEWEST_VIEWS", FEWEST_VIEWS},
     {"UNSEEN", UNSEEN},
 });
